@@ -1,0 +1,1 @@
+//! Identification from recordings, and diagnosis: which physics did the model leave out?

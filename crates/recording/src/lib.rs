@@ -1,0 +1,1 @@
+//! Recordings with SI columns: read, write, map foreign logs.

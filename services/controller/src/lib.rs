@@ -1,0 +1,1 @@
+//! The controller: observer, estimator and control law between setpoint and servo.

@@ -1,0 +1,1 @@
+//! The gateway: REST, WebSocket, recordings, metrics and the operator's console.

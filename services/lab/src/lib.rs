@@ -1,0 +1,1 @@
+//! The laboratory: simulate, fit, diagnose, explain, soak, reproduce, prove.

@@ -1,0 +1,1 @@
+//! The servo: the amplifier loop, real or simulated.
