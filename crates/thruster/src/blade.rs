@@ -1,0 +1,136 @@
+//! Lift and drag of the blades, lumped at 0.7 of the radius.
+//!
+//! Equations (14)-(17) of Whitcomb & Yoerger, in a form without angles: with the speed of the
+//! chord line through the water split in a chord-normal part `wn` and a chordwise part `wc`,
+//! `sin(2 alpha) = 2 wn wc / V^2` and `1 - cos(2 alpha) = 2 wn^2 / V^2`. The form has no
+//! singularity at `V = 0`, needs no wrapping of angles, and is exactly odd under reversal of
+//! shaft and flow together, so all four quadrants come from one expression.
+
+/// Where the blade's mean chord sits, as a fraction of the propeller's radius.
+pub const REFERENCE_RADIUS: f64 = 0.7;
+
+/// The blade row as Model 2 sees it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Blade {
+    /// Radius of the duct, m.
+    pub radius_m: f64,
+    /// Pitch angle of the chord at 0.7 radius, rad. Sine and cosine are kept beside it.
+    pub pitch_rad: f64,
+    /// Largest lift coefficient `CLmax`, dimensionless.
+    pub lift_max: f64,
+    /// Drag coefficient `CDmax`, dimensionless: drag is `CDmax (1 - cos 2 alpha)`.
+    pub drag_max: f64,
+    /// Density of the water, kg/m^3.
+    pub density_kg_m3: f64,
+}
+
+/// What the blades do to the water and to the shaft.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct BladeLoad {
+    /// Thrust, N; positive ahead.
+    pub thrust_n: f64,
+    /// Torque, N m; positive when it opposes positive shaft speed.
+    pub torque_n_m: f64,
+}
+
+/// The speed of the water relative to the chord at 0.7 radius.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Inflow {
+    /// Tangential speed of the blade through the water, m/s.
+    pub tangential_m_s: f64,
+    /// Axial speed of the water through the disc, m/s.
+    pub axial_m_s: f64,
+}
+
+impl Inflow {
+    /// Resultant speed `V`, m/s.
+    pub fn speed_m_s(self) -> f64 {
+        self.tangential_m_s.hypot(self.axial_m_s)
+    }
+
+    /// Angle of the inflow to the propeller's plane, `theta`, rad.
+    pub fn angle_rad(self) -> f64 {
+        self.axial_m_s.atan2(self.tangential_m_s)
+    }
+}
+
+impl Blade {
+    /// Disc area, m^2.
+    pub fn area_m2(&self) -> f64 {
+        std::f64::consts::PI * self.radius_m * self.radius_m
+    }
+
+    /// Radius at which lift and drag act, m.
+    pub fn lever_m(&self) -> f64 {
+        REFERENCE_RADIUS * self.radius_m
+    }
+
+    /// Inflow at the blade for a shaft speed, an axial flow, and a swirl speed of the water.
+    pub fn inflow(&self, shaft_speed_rad_s: f64, axial_m_s: f64, swirl_m_s: f64) -> Inflow {
+        Inflow { tangential_m_s: self.lever_m() * shaft_speed_rad_s - swirl_m_s, axial_m_s }
+    }
+
+    /// Angle of attack in (-pi/2, pi/2], rad: the chord has no preferred end in this model.
+    pub fn attack_rad(&self, inflow: Inflow) -> f64 {
+        let (sin, cos) = self.pitch_rad.sin_cos();
+        let wn = inflow.tangential_m_s * sin - inflow.axial_m_s * cos;
+        let wc = inflow.tangential_m_s * cos + inflow.axial_m_s * sin;
+        if wc < 0.0 { (-wn).atan2(-wc) } else { wn.atan2(wc) }
+    }
+
+    /// Thrust and torque for an inflow, equations (14)-(17).
+    pub fn load(&self, inflow: Inflow) -> BladeLoad {
+        let v = inflow.speed_m_s();
+        if v == 0.0 {
+            return BladeLoad::default();
+        }
+        let (sin, cos) = self.pitch_rad.sin_cos();
+        let (ut, vp) = (inflow.tangential_m_s, inflow.axial_m_s);
+        let wn = ut * sin - vp * cos;
+        let wc = ut * cos + vp * sin;
+        let scale = self.density_kg_m3 * self.area_m2() * wn / v;
+        BladeLoad {
+            thrust_n: scale * (self.lift_max * wc * ut - self.drag_max * wn * vp),
+            torque_n_m: self.lever_m() * scale * (self.lift_max * wc * vp + self.drag_max * wn * ut),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Equations (14)-(17) as printed, with angles.
+    fn printed(blade: &Blade, inflow: Inflow) -> BladeLoad {
+        let theta = inflow.angle_rad();
+        let alpha = blade.pitch_rad - theta;
+        let q = 0.5 * blade.density_kg_m3 * inflow.speed_m_s().powi(2) * blade.area_m2();
+        let lift = q * blade.lift_max * (2.0 * alpha).sin();
+        let drag = q * blade.drag_max * (1.0 - (2.0 * alpha).cos());
+        BladeLoad {
+            thrust_n: lift * theta.cos() - drag * theta.sin(),
+            torque_n_m: blade.lever_m() * (lift * theta.sin() + drag * theta.cos()),
+        }
+    }
+
+    #[test]
+    fn agrees_with_the_printed_equations_in_all_quadrants() {
+        let blade =
+            Blade { radius_m: 0.13, pitch_rad: 0.39, lift_max: 0.542, drag_max: 1.25, density_kg_m3: 998.0 };
+        for speed in [-60.0, -3.0, 0.0, 20.0, 60.0] {
+            for flow in [-1.5, -0.1, 0.0, 0.4, 1.2] {
+                let inflow = blade.inflow(speed, flow, 0.0);
+                let (ours, theirs) = (blade.load(inflow), printed(&blade, inflow));
+                assert!((ours.thrust_n - theirs.thrust_n).abs() < 1e-9, "{speed} {flow}");
+                assert!((ours.torque_n_m - theirs.torque_n_m).abs() < 1e-10, "{speed} {flow}");
+            }
+        }
+    }
+
+    #[test]
+    fn still_water_and_a_stopped_shaft_give_nothing() {
+        let blade =
+            Blade { radius_m: 0.13, pitch_rad: 0.39, lift_max: 0.542, drag_max: 1.25, density_kg_m3: 998.0 };
+        assert_eq!(blade.load(Inflow::default()), BladeLoad::default());
+    }
+}
