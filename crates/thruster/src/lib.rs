@@ -7,4 +7,8 @@
 //! bollard ahead; blade torque is positive when it opposes positive shaft speed.
 
 pub mod blade;
+pub mod effects;
+pub mod models;
+pub mod parameters;
+pub mod plant;
 pub mod rig;

@@ -336,7 +336,9 @@ impl Rig {
 }
 
 /// Every key, with the range a number must lie in (both ends allowed) and a hint on units.
-const KEYS: &[(&str, &str, Option<(f64, f64)>, &str)] = &[
+type Key = (&'static str, &'static str, Option<(f64, f64)>, &'static str);
+
+const KEYS: &[Key] = &[
     ("rig", "name", None, ""),
     ("rig", "class", None, ""),
     ("propeller", "kind", None, ""),

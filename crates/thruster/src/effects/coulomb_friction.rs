@@ -1,0 +1,61 @@
+//! Dry friction of bearings and seals, with a Stribeck rise near standstill.
+
+use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, free_shaft, one_start};
+use crate::plant::{Balance, Local};
+
+/// Catalogue entry.
+pub const DESCRIPTOR: Descriptor = Descriptor {
+    id: "coulomb_friction",
+    path: Path::Shaft,
+    what: "dry friction of bearings or shaft seals: a torque of constant size against the direction of turning, \
+           higher near standstill (Stribeck)",
+    equation: "I Om' = ... - [tc + (ts - tc) exp(-(Om/vs)^2)] tanh(Om/eps); tc, ts [N m], vs, eps [rad/s]",
+    signature: "an offset in the shaft's torque balance that changes sign with the direction; stick-slip near zero; \
+                thrust over speed squared is unchanged; the loss in thrust per torque falls as 1/Om^2",
+    confused_with: &["viscous_friction", "torque_channel_bias", "command_dead_band"],
+    separated_by: "a slow ramp through zero in both directions; a coast-down",
+    reference: "physics.md C1; Armstrong-Helouvry, Dupont, Canudas de Wit 1994 (Automatica 30:1083)",
+    parameters,
+    starts: one_start,
+    needs: free_shaft,
+    build: |values, context| {
+        Box::new(CoulombFriction {
+            level_n_m: values[0],
+            rise: values[1],
+            stribeck_rad_s: values[2],
+            // Sharp against the speeds in use, soft enough for the integrator's step:
+            // level / (eps I) stays below 1/tick.
+            eps_rad_s: (0.02 * values[2])
+                .max(1.2 * values[0].abs() * (1.0 + values[1].max(0.0)) * context.tick_s
+                    / context.parameters.get(crate::parameters::Parameter::InertiaKgM2)),
+        })
+    },
+};
+
+fn parameters(scale: &Scale) -> Vec<Spec> {
+    vec![
+        Spec::strength("coulomb_torque_n_m", "N m", 0.02 * scale.torque_n_m, 0.0, scale.torque_n_m),
+        Spec::shape("stribeck_rise", "1", 0.3, 0.0, 2.0),
+        Spec::shape("stribeck_speed_rad_s", "rad/s", 0.04 * scale.shaft_speed_rad_s, 0.002 * scale.shaft_speed_rad_s, 0.3 * scale.shaft_speed_rad_s),
+    ]
+}
+
+struct CoulombFriction {
+    level_n_m: f64,
+    rise: f64,
+    stribeck_rad_s: f64,
+    eps_rad_s: f64,
+}
+
+impl Effect for CoulombFriction {
+    fn hooks(&self) -> Hooks {
+        Hooks::BALANCE
+    }
+
+    fn balance(&self, at: &Local, _: &[f64], balance: &mut Balance, _: &mut [f64]) {
+        let speed = at.shaft_speed_rad_s;
+        let stribeck = (-(speed / self.stribeck_rad_s).powi(2)).exp();
+        let torque = self.level_n_m * (1.0 + self.rise * stribeck);
+        balance.shaft_torque_n_m -= torque * (speed / self.eps_rad_s).tanh();
+    }
+}

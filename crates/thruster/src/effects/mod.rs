@@ -1,0 +1,247 @@
+//! Physics a model may leave out: one effect, one file, registered in one list.
+//!
+//! The same code serves the simulated truth and the fit: an effect reads its parameters and acts
+//! at hooks of the [plant](crate::plant). Each file says what the effect is, its equation, what
+//! the residual looks like, what it is confused with, and what separates it; `kort explain`
+//! prints just that.
+
+use crate::plant::{Balance, Drive, Foil, Local, Sensed, Tick};
+use crate::{blade::Inflow, parameters::Parameters, rig::Rig};
+
+/// Where an effect enters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Path {
+    /// Between command and motor current or torque.
+    Drive,
+    /// The shaft's torque balance.
+    Shaft,
+    /// Lift and drag of the blades.
+    Blade,
+    /// The axial-flow balance, or the water coming in.
+    Flow,
+    /// Only what is measured, never the motion.
+    Sensor,
+}
+
+impl Path {
+    /// Name as in the report.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Path::Drive => "drive",
+            Path::Shaft => "shaft",
+            Path::Blade => "blade",
+            Path::Flow => "flow",
+            Path::Sensor => "sensor",
+        }
+    }
+}
+
+/// Sizes of a rig in use, from which an effect takes the scale of its parameters.
+#[derive(Clone, Copy, Debug)]
+pub struct Scale {
+    /// Largest shaft speed seen, rad/s.
+    pub shaft_speed_rad_s: f64,
+    /// Largest motor torque, N m.
+    pub torque_n_m: f64,
+    /// Largest thrust, N.
+    pub thrust_n: f64,
+    /// Largest axial flow, m/s.
+    pub flow_m_s: f64,
+    /// Largest current, A.
+    pub current_a: f64,
+    /// Largest command, in the unit of the command.
+    pub command: f64,
+    /// Nominal supply, V (zero if not stated).
+    pub supply_v: f64,
+    /// Stated inertia, kg m^2.
+    pub inertia_kg_m2: f64,
+    /// Control period, s.
+    pub tick_s: f64,
+    /// Length of the recording, s.
+    pub duration_s: f64,
+}
+
+/// One parameter of an effect.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spec {
+    /// Name, unit last.
+    pub name: &'static str,
+    /// Unit for reports.
+    pub unit: &'static str,
+    /// Where a fit starts: a value at which the effect is small but visible.
+    pub start: f64,
+    /// Smallest allowed value.
+    pub low: f64,
+    /// Largest allowed value.
+    pub high: f64,
+    /// A shape parameter does nothing alone; the effect vanishes when all its strength
+    /// parameters are zero.
+    pub shape: bool,
+}
+
+impl Spec {
+    /// A strength: the effect vanishes at zero.
+    pub const fn strength(name: &'static str, unit: &'static str, start: f64, low: f64, high: f64) -> Self {
+        Self { name, unit, start, low, high, shape: false }
+    }
+
+    /// A shape: where, how fast, how sharp.
+    pub const fn shape(name: &'static str, unit: &'static str, start: f64, low: f64, high: f64) -> Self {
+        Self { name, unit, start, low, high, shape: true }
+    }
+}
+
+/// What an effect does at the hooks of the plant. All default to nothing.
+///
+/// `own` holds the effect's continuous states (as many as [`Effect::states`] says), integrated
+/// with the plant; their rates go to `rates` in [`Effect::balance`].
+pub trait Effect: Send {
+    /// Number of continuous states.
+    fn states(&self) -> usize {
+        0
+    }
+    /// Which hooks are used; the others are never called.
+    fn hooks(&self) -> Hooks;
+    /// Once a control tick, before the drive acts: command, limits, lag, supply.
+    fn drive(&mut self, _tick: &Tick, _drive: &mut Drive) {}
+    /// The water that meets the blade.
+    fn inflow(&self, _at: &Local, _own: &[f64], _inflow: &mut Inflow) {}
+    /// Lift and drag coefficients, density.
+    fn foil(&self, _at: &Local, _own: &[f64], _foil: &mut Foil) {}
+    /// Torques on the shaft and forces on the water.
+    fn balance(&self, _at: &Local, _own: &[f64], _balance: &mut Balance, _rates: &mut [f64]) {}
+    /// Once a control tick, after the step: what the sensors see.
+    fn sense(&mut self, _tick: &Tick, _sensed: &mut Sensed) {}
+}
+
+/// Hooks an effect uses.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Hooks {
+    /// [`Effect::drive`]
+    pub drive: bool,
+    /// [`Effect::inflow`]
+    pub inflow: bool,
+    /// [`Effect::foil`]
+    pub foil: bool,
+    /// [`Effect::balance`]
+    pub balance: bool,
+    /// [`Effect::sense`]
+    pub sense: bool,
+}
+
+impl Hooks {
+    /// No hook.
+    pub const NONE: Self = Self { drive: false, inflow: false, foil: false, balance: false, sense: false };
+    /// Drive only.
+    pub const DRIVE: Self = Self { drive: true, ..Self::NONE };
+    /// Inflow only.
+    pub const INFLOW: Self = Self { inflow: true, ..Self::NONE };
+    /// Foil only.
+    pub const FOIL: Self = Self { foil: true, ..Self::NONE };
+    /// Balance only.
+    pub const BALANCE: Self = Self { balance: true, ..Self::NONE };
+    /// Sense only.
+    pub const SENSE: Self = Self { sense: true, ..Self::NONE };
+}
+
+/// Which signals a recording (or a run) offers to an effect as drivers and to a fit as responses.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Available {
+    /// Columns with data, by their contract names.
+    pub columns: Vec<String>,
+    /// The shaft speed is prescribed (a recorded speed drives the model).
+    pub shaft_prescribed: bool,
+    /// The current is prescribed (a recorded current drives the model).
+    pub current_prescribed: bool,
+}
+
+impl Available {
+    /// Is this column there?
+    pub fn has(&self, name: &str) -> bool {
+        self.columns.iter().any(|c| c == name)
+    }
+}
+
+/// One entry of the catalogue.
+pub struct Descriptor {
+    /// Identifier as in the report.
+    pub id: &'static str,
+    /// Where it enters.
+    pub path: Path,
+    /// One line: what it is, in an engineer's words.
+    pub what: &'static str,
+    /// The equation, with symbols and units.
+    pub equation: &'static str,
+    /// When it shows and what the residual looks like.
+    pub signature: &'static str,
+    /// Effects it is confused with, by identifier.
+    pub confused_with: &'static [&'static str],
+    /// The excitation or instrument that separates it.
+    pub separated_by: &'static str,
+    /// Where the equation and the ranges come from.
+    pub reference: &'static str,
+    /// Its parameters at a rig's scale.
+    pub parameters: fn(&Scale) -> Vec<Spec>,
+    /// Further starting points for a fit, beyond the one in the parameters; may be empty.
+    pub starts: fn(&Scale) -> Vec<Vec<f64>>,
+    /// Why it cannot be fitted from this recording, if so.
+    pub needs: fn(&Rig, &Available) -> Result<(), &'static str>,
+    /// Builds the effect with values for its parameters.
+    pub build: fn(&[f64], &Context) -> Box<dyn Effect>,
+}
+
+/// What an effect may know of the plant when it is built.
+#[derive(Clone, Copy, Debug)]
+pub struct Context<'a> {
+    /// The plant's parameters.
+    pub parameters: &'a Parameters,
+    /// The stated rig.
+    pub rig: &'a Rig,
+    /// Control period, s.
+    pub tick_s: f64,
+}
+
+/// No further starting points.
+pub fn one_start(_: &Scale) -> Vec<Vec<f64>> {
+    Vec::new()
+}
+
+/// Can always be fitted.
+pub fn always(_: &Rig, _: &Available) -> Result<(), &'static str> {
+    Ok(())
+}
+
+/// Needs a propeller in water.
+pub fn wet(rig: &Rig, _: &Available) -> Result<(), &'static str> {
+    if rig.propeller.is_some() { Ok(()) } else { Err("a dry shaft has no blades and no water") }
+}
+
+/// Needs the shaft's torque balance: the shaft must be driven by current, voltage or torque.
+pub fn free_shaft(_: &Rig, available: &Available) -> Result<(), &'static str> {
+    if available.shaft_prescribed {
+        Err("the recorded shaft speed drives the model, so the shaft's torque balance is not seen")
+    } else {
+        Ok(())
+    }
+}
+
+macro_rules! catalogue {
+    ($($name:ident),* $(,)?) => {
+        $(pub mod $name;)*
+        /// Every effect, in the order of `physics.md`, part C.
+        pub const ALL: &[&Descriptor] = &[$(&$name::DESCRIPTOR),*];
+    };
+}
+
+catalogue! {
+    coulomb_friction,
+    transport_delay,
+    rotational_flow,
+    thrust_bias_gain_hysteresis,
+}
+
+/// The effect with this identifier.
+pub fn find(id: &str) -> Option<&'static Descriptor> {
+    ALL.iter().copied().find(|d| d.id == id)
+}

@@ -1,0 +1,58 @@
+//! Errors of the force sensor: zero, gain, drift, hysteresis.
+
+use super::{Available, Descriptor, Effect, Hooks, Path, Scale, Spec, one_start};
+use crate::plant::{Sensed, Tick};
+use crate::rig::Rig;
+
+/// Catalogue entry.
+pub const DESCRIPTOR: Descriptor = Descriptor {
+    id: "thrust_bias_gain_hysteresis",
+    path: Path::Sensor,
+    what: "the force sensor's zero, gain or hysteresis is off",
+    equation: "y = g T + b + h sat(play(T)); g [1], b, h [N]",
+    signature: "thrust alone is off, in proportion (gain), by a constant also at rest (bias), or by a loop between rising \
+                and falling load (hysteresis); shaft speed and flow fit",
+    confused_with: &["forward_reverse_asymmetry", "ambient_axial_flow", "duct_loss", "water_density"],
+    separated_by: "known static loads; the zero before and after the run",
+    reference: "physics.md C5",
+    parameters,
+    starts: one_start,
+    needs: thrust_measured,
+    build: |values, _| Box::new(ThrustSensor { gain_error: values[0], bias_n: values[1], loop_n: values[2], width_n: values[3], anchor_n: 0.0 }),
+};
+
+fn parameters(scale: &Scale) -> Vec<Spec> {
+    let t = scale.thrust_n;
+    vec![
+        Spec::strength("gain_error", "1", 0.03, -0.5, 0.5),
+        Spec::strength("bias_n", "N", 0.01 * t, -0.3 * t, 0.3 * t),
+        Spec::strength("hysteresis_n", "N", 0.005 * t, 0.0, 0.2 * t),
+        Spec::shape("hysteresis_width_n", "N", 0.1 * t, 0.01 * t, 0.5 * t),
+    ]
+}
+
+/// Needs a measured thrust.
+pub(super) fn thrust_measured(_: &Rig, available: &Available) -> Result<(), &'static str> {
+    if available.has("thrust_n") { Ok(()) } else { Err("thrust is not recorded") }
+}
+
+struct ThrustSensor {
+    gain_error: f64,
+    bias_n: f64,
+    loop_n: f64,
+    width_n: f64,
+    anchor_n: f64,
+}
+
+impl Effect for ThrustSensor {
+    fn hooks(&self) -> Hooks {
+        Hooks::SENSE
+    }
+
+    /// A play operator of half-width `width_n` carries the memory of the loop.
+    fn sense(&mut self, _: &Tick, sensed: &mut Sensed) {
+        let t = sensed.thrust_n;
+        self.anchor_n = self.anchor_n.clamp(t - self.width_n, t + self.width_n);
+        sensed.thrust_n = t * (1.0 + self.gain_error) + self.bias_n + self.loop_n * (self.anchor_n - t) / self.width_n;
+    }
+}
