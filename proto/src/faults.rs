@@ -1,0 +1,153 @@
+//! Faults with stable codes; each has a page in `docs/faults/`. A fault is latched: the output is
+//! zero and disarmed until the cause is gone and someone clears it.
+
+/// A fault. The discriminant is its code and its bit in a bitset; codes never change meaning.
+/// 1 to 31 are raised by the servo, 33 to 47 by the controller.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[repr(u32)]
+pub enum Fault {
+    /// Measured current beyond the trip level.
+    OverCurrent = 1,
+    /// Measured shaft speed beyond the trip level.
+    OverSpeed = 2,
+    /// Heating beyond what the I2t foldback could hold.
+    ThermalOverload = 3,
+    /// No new command from the controller within its time-out.
+    CommandTimeout = 4,
+    /// A command that is not a number, out of range or of the wrong kind.
+    CommandInvalid = 5,
+    /// A needed sensor gave NaN or infinity.
+    SensorNotFinite = 6,
+    /// The shaft sensor shows the same value while the motor pulls.
+    SensorFrozen = 7,
+    /// A sensor jumps faster than the thruster can move.
+    SensorSpike = 8,
+    /// The drive reports a fault, or cannot be talked to.
+    AmplifierFault = 9,
+    /// The supply is outside its band.
+    SupplyOutOfRange = 10,
+    /// The motor is too hot.
+    OverTemperature = 11,
+    /// The servo's loop stood still longer than the command time-out.
+    LoopStalled = 12,
+    /// Another controller process began to command while armed.
+    ControllerRestarted = 13,
+    /// No word from the gateway within its time-out while armed.
+    GatewayLost = 33,
+    /// No telemetry from the servo within its time-out while armed.
+    ServoLost = 34,
+    /// The control law's output or the observer's state was not finite.
+    ControlNotFinite = 35,
+    /// Another gateway process took over while armed.
+    GatewayRestarted = 36,
+}
+
+impl Fault {
+    /// Every fault, in the order of codes.
+    pub const ALL: [Self; 17] = [
+        Self::OverCurrent,
+        Self::OverSpeed,
+        Self::ThermalOverload,
+        Self::CommandTimeout,
+        Self::CommandInvalid,
+        Self::SensorNotFinite,
+        Self::SensorFrozen,
+        Self::SensorSpike,
+        Self::AmplifierFault,
+        Self::SupplyOutOfRange,
+        Self::OverTemperature,
+        Self::LoopStalled,
+        Self::ControllerRestarted,
+        Self::GatewayLost,
+        Self::ServoLost,
+        Self::ControlNotFinite,
+        Self::GatewayRestarted,
+    ];
+
+    /// Stable code.
+    pub const fn code(self) -> u32 {
+        self as u32
+    }
+
+    /// Its bit in a bitset.
+    pub const fn bit(self) -> u64 {
+        1 << self as u32
+    }
+
+    /// Name in the JSON state and as a metric's label; the page is `docs/faults/<name>.md`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::OverCurrent => "over_current",
+            Self::OverSpeed => "over_speed",
+            Self::ThermalOverload => "thermal_overload",
+            Self::CommandTimeout => "command_timeout",
+            Self::CommandInvalid => "command_invalid",
+            Self::SensorNotFinite => "sensor_not_finite",
+            Self::SensorFrozen => "sensor_frozen",
+            Self::SensorSpike => "sensor_spike",
+            Self::AmplifierFault => "amplifier_fault",
+            Self::SupplyOutOfRange => "supply_out_of_range",
+            Self::OverTemperature => "over_temperature",
+            Self::LoopStalled => "loop_stalled",
+            Self::ControllerRestarted => "controller_restarted",
+            Self::GatewayLost => "gateway_lost",
+            Self::ServoLost => "servo_lost",
+            Self::ControlNotFinite => "control_not_finite",
+            Self::GatewayRestarted => "gateway_restarted",
+        }
+    }
+
+    /// One line for the operator.
+    pub const fn help(self) -> &'static str {
+        match self {
+            Self::OverCurrent => {
+                "the motor drew more current than allowed: look for a short, a jam or a wrong limit"
+            }
+            Self::OverSpeed => {
+                "the shaft ran faster than allowed: look for a lost propeller, air, or a wrong limit"
+            }
+            Self::ThermalOverload => "the motor has taken more heat than its I2t budget: let it cool",
+            Self::CommandTimeout => {
+                "the controller stopped sending commands: see its log, then clear and arm again"
+            }
+            Self::CommandInvalid => "a command was not a number or out of range: see the controller's log",
+            Self::SensorNotFinite => "a sensor gave no number: check its cable and supply",
+            Self::SensorFrozen => {
+                "the shaft sensor stands still while the motor pulls: jammed shaft or dead sensor"
+            }
+            Self::SensorSpike => "a sensor jumped more than the thruster can move: check cable and shielding",
+            Self::AmplifierFault => "the drive reports a fault or does not answer: see its display or log",
+            Self::SupplyOutOfRange => "the supply voltage left its band: check battery, cable and charger",
+            Self::OverTemperature => "the motor is too hot: let it cool, check cooling and load",
+            Self::LoopStalled => "the servo's loop stood still: the machine is overloaded or was suspended",
+            Self::ControllerRestarted => "the controller was replaced while armed: arm again",
+            Self::GatewayLost => "the gateway stopped while armed: take the lease and arm again",
+            Self::ServoLost => "the servo stopped sending telemetry: see its log",
+            Self::ControlNotFinite => "the control law gave no number: check its parameters",
+            Self::GatewayRestarted => "the gateway was replaced while armed: take the lease and arm again",
+        }
+    }
+
+    /// The faults in a bitset, in the order of codes.
+    pub fn in_set(set: u64) -> impl Iterator<Item = Self> {
+        Self::ALL.into_iter().filter(move |fault| set & fault.bit() != 0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn codes_are_in_order_and_every_fault_has_its_page() {
+        assert!(Fault::ALL.windows(2).all(|w| w[0].code() < w[1].code()));
+        for fault in Fault::ALL {
+            let page = format!("{}/../docs/faults/{}.md", env!("CARGO_MANIFEST_DIR"), fault.name());
+            let text = std::fs::read_to_string(&page).unwrap_or_else(|e| panic!("{page}: {e}"));
+            assert!(text.contains(&format!("code {}", fault.code())), "{page} does not name its code");
+            for part in ["## Cause", "## What kort did", "## What to do"] {
+                assert!(text.contains(part), "{page} lacks \"{part}\"");
+            }
+        }
+    }
+}

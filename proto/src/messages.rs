@@ -1,0 +1,463 @@
+//! Fixed-layout messages. Every message starts with a [`Header`]; numbers are SI; NaN means "not
+//! there". Enumerations travel as `u32` and are read through `from_u32`, so that a foreign value
+//! is an answer and not undefined behaviour.
+
+use crate::signals::{Estimates, Signals};
+use crate::text::Text;
+#[cfg(feature = "transport")]
+use iceoryx2::prelude::ZeroCopySend;
+
+/// Most parameters of a control law or of an estimator in one message.
+pub const PARAMETERS: usize = 16;
+/// Most control laws in one message.
+pub const LAWS: usize = 12;
+/// Upper bounds of the buckets of a lateness histogram, ns; a last bucket has no bound.
+pub const LATENESS_BOUNDS_NS: [u64; 11] =
+    [5_000, 10_000, 20_000, 50_000, 100_000, 200_000, 500_000, 1_000_000, 2_000_000, 5_000_000, 10_000_000];
+
+macro_rules! message {
+    ($type_name:literal, $(#[$doc:meta])* $name:ident { $($(#[$field_doc:meta])* $field:ident: $type:ty,)* }) => {
+        $(#[$doc])*
+        #[repr(C)]
+        #[derive(Clone, Copy, Debug, Default, PartialEq)]
+        #[cfg_attr(feature = "transport", derive(ZeroCopySend))]
+        #[cfg_attr(feature = "transport", type_name($type_name))]
+        pub struct $name {
+            $($(#[$field_doc])* pub $field: $type,)*
+        }
+    };
+}
+
+macro_rules! enumeration {
+    ($(#[$doc:meta])* $name:ident { $($(#[$case_doc:meta])* $case:ident = $value:literal $word:literal,)* }) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        #[repr(u32)]
+        pub enum $name { $($(#[$case_doc])* $case = $value,)* }
+
+        impl $name {
+            /// Reads it from a message; `None` for a value this version does not know.
+            pub const fn from_u32(value: u32) -> Option<Self> {
+                match value {
+                    $($value => Some(Self::$case),)*
+                    _ => None,
+                }
+            }
+
+            /// Its word in logs and JSON.
+            pub const fn name(self) -> &'static str {
+                match self { $(Self::$case => $word,)* }
+            }
+        }
+    };
+}
+
+enumeration! {
+    /// What a setpoint asks for.
+    SetpointKind {
+        /// Nothing: zero thrust.
+        Zero = 0 "zero",
+        /// Thrust, N.
+        Thrust = 1 "thrust_n",
+        /// Shaft speed, rad/s.
+        Speed = 2 "speed_rad_s",
+    }
+}
+
+enumeration! {
+    /// Unit of the drive in a [`Command`]; must be the one of the servo's amplifier.
+    DriveKind {
+        /// Motor current, A.
+        Current = 0 "current_cmd_a",
+        /// Motor voltage, V.
+        Voltage = 1 "voltage_cmd_v",
+        /// Duty, -1 to 1.
+        Duty = 2 "duty_cmd",
+        /// Shaft speed, rad/s.
+        Speed = 3 "speed_cmd_rad_s",
+    }
+}
+
+enumeration! {
+    /// What a [`Request`] wants.
+    RequestKind {
+        /// Arm the servo.
+        Arm = 1 "arm",
+        /// Disarm: zero at once.
+        Disarm = 2 "disarm",
+        /// Clear latched faults whose cause is gone; stays disarmed.
+        ClearFaults = 3 "clear-faults",
+        /// Switch the control law, or change its parameters.
+        SetController = 4 "set-controller",
+    }
+}
+
+enumeration! {
+    /// Who answers.
+    Process {
+        /// The servo.
+        Servo = 1 "servo",
+        /// The controller.
+        Controller = 2 "controller",
+        /// The gateway.
+        Gateway = 3 "gateway",
+        /// The supervisor.
+        Supervisor = 4 "supervisor",
+    }
+}
+
+enumeration! {
+    /// The answer to a [`Request`].
+    Outcome {
+        /// Done.
+        Done = 1 "done",
+        /// Understood, but the present state forbids it.
+        Refused = 2 "refused",
+        /// Unknown name, value out of range.
+        Invalid = 3 "invalid",
+    }
+}
+
+message! { "kort.Header",
+    /// In front of every message.
+    Header {
+        /// Counts up by one a message of one sender; a repeated or smaller one is old.
+        sequence: u64,
+        /// CLOCK_MONOTONIC when sent, ns.
+        stamp_ns: u64,
+        /// The sending process's start on CLOCK_MONOTONIC, ns: changes when it restarts.
+        session: u64,
+    }
+}
+
+message! { "kort.Timing",
+    /// A loop's timing since its process started.
+    Timing {
+        /// Period of the loop, ns.
+        period_ns: u64,
+        /// Ticks done.
+        ticks: u64,
+        /// Ticks skipped because the loop came too late.
+        overruns: u64,
+        /// Lateness of the last wake-up, ns.
+        lateness_ns: u64,
+        /// Largest lateness, ns.
+        lateness_max_ns: u64,
+        /// Sum of all latenesses, ns.
+        lateness_sum_ns: u64,
+        /// Work of the last tick, wake-up to send, ns.
+        busy_ns: u64,
+        /// Wake-ups by lateness, see [`LATENESS_BOUNDS_NS`]; not cumulative.
+        histogram: [u64; LATENESS_BOUNDS_NS.len() + 1],
+    }
+}
+
+impl Timing {
+    /// Counts one wake-up, `lateness_ns` after its deadline.
+    pub fn count(&mut self, lateness_ns: u64) {
+        self.ticks = self.ticks.wrapping_add(1);
+        self.lateness_ns = lateness_ns;
+        self.lateness_max_ns = self.lateness_max_ns.max(lateness_ns);
+        self.lateness_sum_ns = self.lateness_sum_ns.wrapping_add(lateness_ns);
+        let bucket =
+            LATENESS_BOUNDS_NS.iter().position(|b| lateness_ns <= *b).unwrap_or(LATENESS_BOUNDS_NS.len());
+        if let Some(n) = self.histogram.get_mut(bucket) {
+            *n += 1;
+        }
+    }
+}
+
+message! { "kort.Parameter",
+    /// A named number: parameter of a control law or of an estimator.
+    Parameter {
+        /// Name, unit last.
+        name: Text<32>,
+        /// Unit.
+        unit: Text<16>,
+        /// Value.
+        value: f64,
+        /// Standard error; NaN if it has none.
+        std_error: f64,
+        /// Smallest allowed value; NaN if not bounded.
+        low: f64,
+        /// Largest allowed value; NaN if not bounded.
+        high: f64,
+    }
+}
+
+message! { "kort.Setpoint",
+    /// Gateway to controller, sent again every heartbeat so that silence means loss.
+    Setpoint {
+        /// Sequence, stamp, session of the gateway.
+        header: Header,
+        /// Counts accepted operator commands of this gateway session. A controller that has
+        /// zeroed itself waits for a larger one.
+        generation: u64,
+        /// End of the lease on CLOCK_MONOTONIC, ns; zero without a lease.
+        lease_until_ns: u64,
+        /// [`SetpointKind`]
+        kind: u32,
+        /// Spare, zero.
+        reserved: u32,
+        /// Value in the unit of the kind.
+        value: f64,
+    }
+}
+
+message! { "kort.Command",
+    /// Controller to servo, one a controller tick.
+    Command {
+        /// Sequence, stamp, session of the controller.
+        header: Header,
+        /// Stamp of the telemetry this command answers, ns.
+        telemetry_stamp_ns: u64,
+        /// The drive, in the unit of `kind`.
+        drive: f64,
+        /// Thrust setpoint in force, N; NaN if none (for the recording).
+        thrust_cmd_n: f64,
+        /// Shaft speed asked for, rad/s; NaN if none (for the recording).
+        speed_cmd_rad_s: f64,
+        /// [`DriveKind`]
+        kind: u32,
+        /// Non-zero: stop, zero output and disarm now.
+        stop: u32,
+    }
+}
+
+message! { "kort.Telemetry",
+    /// Servo to all, one a servo tick: a whole row of the recording and the servo's state.
+    Telemetry {
+        /// Sequence, stamp, session of the servo.
+        header: Header,
+        /// The instant of the tick on CLOCK_MONOTONIC, ns: `time_s` of the row.
+        time_ns: u64,
+        /// Every column; NaN if not measured.
+        signals: Signals,
+        /// Latched faults, bits of [`Fault`](crate::faults::Fault).
+        faults: u64,
+        /// Limits in force, bits of [`Limit`](crate::limits::Limit).
+        limits: u64,
+        /// Armed: the drive may be non-zero.
+        armed: u32,
+        /// [`DriveKind`] of the amplifier.
+        drive_kind: u32,
+        /// When it was armed last on CLOCK_MONOTONIC, ns; zero if never.
+        armed_at_ns: u64,
+        /// Sequence of the command in force.
+        command_sequence: u64,
+        /// Stamp of the command in force, ns.
+        command_stamp_ns: u64,
+        /// Telemetry stamp the command in force answers, ns.
+        command_telemetry_stamp_ns: u64,
+        /// Commands refused since start: not finite, out of range, wrong kind.
+        commands_invalid: u64,
+        /// Commands ignored since start: repeated, reordered or too old.
+        commands_stale: u64,
+        /// Share of the I2t budget in use, 0 to 1.
+        thermal_load: f64,
+        /// The loop's timing.
+        timing: Timing,
+    }
+}
+
+message! { "kort.ControllerState",
+    /// Controller to gateway, one a controller tick.
+    ControllerState {
+        /// Sequence, stamp, session of the controller.
+        header: Header,
+        /// Law that runs.
+        law: Text<32>,
+        /// Its parameters.
+        law_parameters: [Parameter; PARAMETERS],
+        /// How many are used.
+        law_parameter_count: u32,
+        /// [`SetpointKind`] in force.
+        setpoint_kind: u32,
+        /// Setpoint in force, after ramps and limits; what the law is given now.
+        setpoint_value: f64,
+        /// Setpoint as accepted, before ramps and limits.
+        setpoint_accepted: f64,
+        /// Gateway session and generation of the setpoint in force.
+        setpoint_session: u64,
+        /// Generation of the setpoint in force.
+        setpoint_generation: u64,
+        /// Setpoints refused since start: not finite, out of range, unknown kind.
+        setpoints_invalid: u64,
+        /// What the observer believes.
+        estimates: Estimates,
+        /// The estimator's parameters.
+        parameters: [Parameter; PARAMETERS],
+        /// How many are used.
+        parameter_count: u32,
+        /// Non-zero: the estimator is frozen for want of excitation.
+        estimator_frozen: u32,
+        /// Latched faults, bits of [`Fault`](crate::faults::Fault).
+        faults: u64,
+        /// Limits in force, bits of [`Limit`](crate::limits::Limit).
+        limits: u64,
+        /// Every law that can be chosen.
+        laws: [Text<32>; LAWS],
+        /// How many are used.
+        law_count: u32,
+        /// Spare, zero.
+        reserved: u32,
+        /// The loop's timing.
+        timing: Timing,
+    }
+}
+
+message! { "kort.Request",
+    /// Gateway (or supervisor) to servo and controller. Every process that the kind concerns
+    /// answers with one [`Reply`]: arm, servo; disarm and clear-faults, both; set-controller,
+    /// controller. A request older than [`REQUEST_LIFE_NS`] is not acted upon.
+    Request {
+        /// Sequence, stamp, session of the sender.
+        header: Header,
+        /// Chosen by the sender, comes back in the reply.
+        id: u64,
+        /// [`RequestKind`]
+        kind: u32,
+        /// How many parameters are used.
+        parameter_count: u32,
+        /// Law to switch to; empty keeps the present one and changes parameters only.
+        law: Text<32>,
+        /// Parameters to set: only `name` and `value` count.
+        parameters: [Parameter; PARAMETERS],
+    }
+}
+
+/// A request older than this is not acted upon, ns.
+pub const REQUEST_LIFE_NS: u64 = 500_000_000;
+
+message! { "kort.Reply",
+    /// The answer to a request.
+    Reply {
+        /// Sequence, stamp, session of the answering process.
+        header: Header,
+        /// Session of the asker.
+        to_session: u64,
+        /// Id of the request.
+        id: u64,
+        /// [`Process`] that answers.
+        from: u32,
+        /// [`Outcome`]
+        outcome: u32,
+        /// Words for the operator: why not, and what to do.
+        message: Text<240>,
+    }
+}
+
+/// A message with its header in front.
+pub trait Message: Copy + Default + std::fmt::Debug + 'static {
+    /// Its header.
+    fn header(&self) -> &Header;
+    /// Its header, to be stamped by the sender.
+    fn header_mut(&mut self) -> &mut Header;
+}
+
+macro_rules! messages {
+    ($($name:ident),*) => {
+        $(impl Message for $name {
+            fn header(&self) -> &Header {
+                &self.header
+            }
+            fn header_mut(&mut self) -> &mut Header {
+                &mut self.header
+            }
+        })*
+    };
+}
+
+messages!(Setpoint, Command, Telemetry, ControllerState, Request, Reply);
+
+/// Only *new* messages pass: keeps one sender's session, and asks for a growing sequence, a stamp
+/// that is not older than `life_ns` and not in the future. A new session passes if it is younger.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Freshness {
+    session: u64,
+    sequence: u64,
+}
+
+/// What [`Freshness::check`] says of a message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fresh {
+    /// Next message of the known sender.
+    Yes,
+    /// First message of a younger sender.
+    NewSession,
+    /// Repeated, reordered, too old, from the future, or from a sender that was replaced.
+    No,
+}
+
+impl Freshness {
+    /// Judges a message and remembers it if it is new.
+    pub fn check(&mut self, header: &Header, now_ns: u64, life_ns: u64) -> Fresh {
+        // One clock on one machine: a stamp ahead of ours by more than a scheduling hiccup is wrong.
+        let in_time = header.stamp_ns <= now_ns.saturating_add(1_000_000)
+            && now_ns.saturating_sub(header.stamp_ns) <= life_ns;
+        if !in_time || header.session < self.session || header.session > header.stamp_ns {
+            return Fresh::No;
+        }
+        if header.session > self.session {
+            *self = Self { session: header.session, sequence: header.sequence };
+            return Fresh::NewSession;
+        }
+        if header.sequence <= self.sequence {
+            return Fresh::No;
+        }
+        self.sequence = header.sequence;
+        Fresh::Yes
+    }
+
+    /// Session of the sender in force; zero before the first message.
+    pub fn session(&self) -> u64 {
+        self.session
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn header(sequence: u64, stamp_ns: u64, session: u64) -> Header {
+        Header { sequence, stamp_ns, session }
+    }
+
+    #[test]
+    fn only_new_messages_pass() {
+        let mut f = Freshness::default();
+        assert_eq!(f.check(&header(1, 1_000, 500), 1_000, 100), Fresh::NewSession);
+        assert_eq!(f.check(&header(1, 1_000, 500), 1_010, 100), Fresh::No, "repeated");
+        assert_eq!(f.check(&header(2, 1_020, 500), 1_200, 100), Fresh::No, "too old");
+        assert_eq!(f.check(&header(2, 1_020, 500), 1_050, 100), Fresh::Yes);
+        assert_eq!(f.check(&header(3, 9_000_000, 500), 1_060, 100), Fresh::No, "from the future");
+        assert_eq!(f.check(&header(9, 1_060, 400), 1_060, 100), Fresh::No, "replaced sender");
+        assert_eq!(f.check(&header(1, 1_070, 600), 1_070, 100), Fresh::NewSession);
+        assert_eq!(f.check(&header(3, 1_080, 500), 1_080, 100), Fresh::No, "the old sender again");
+    }
+
+    proptest! {
+        #[test]
+        fn a_message_passes_at_most_once(headers in prop::collection::vec((0u64..5, 0u64..50, 1u64..4), 1..60)) {
+            let mut f = Freshness::default();
+            let mut passed = std::collections::HashSet::new();
+            for (sequence, stamp, session) in headers {
+                let h = header(sequence, stamp + session, session);
+                if f.check(&h, 50, 50) != Fresh::No {
+                    prop_assert!(passed.insert((h.session, h.sequence)));
+                }
+            }
+        }
+
+        #[test]
+        fn the_histogram_counts_every_wake_up(late in prop::collection::vec(0u64..30_000_000, 0..50)) {
+            let mut timing = Timing::default();
+            for l in &late {
+                timing.count(*l);
+            }
+            prop_assert_eq!(timing.histogram.iter().sum::<u64>(), late.len() as u64);
+            prop_assert_eq!(timing.lateness_max_ns, late.iter().copied().max().unwrap_or(0));
+        }
+    }
+}

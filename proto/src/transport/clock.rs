@@ -1,0 +1,86 @@
+//! The one clock of all processes, and a loop on absolute deadlines.
+
+use crate::messages::Timing;
+use rustix::time::{ClockId, Timespec, clock_gettime};
+
+/// CLOCK_MONOTONIC now, ns.
+pub fn monotonic_ns() -> u64 {
+    let now = clock_gettime(ClockId::Monotonic);
+    (now.tv_sec as u64).saturating_mul(1_000_000_000).saturating_add(now.tv_nsec as u64)
+}
+
+/// Wakes at absolute deadlines; missed ones are skipped and counted.
+#[derive(Debug)]
+pub struct Ticker {
+    next_ns: u64,
+    /// What the loop has done so far.
+    pub timing: Timing,
+}
+
+impl Ticker {
+    /// First deadline one period from now.
+    pub fn new(period_ns: u64) -> Self {
+        Self {
+            next_ns: monotonic_ns() + period_ns,
+            timing: Timing { period_ns: period_ns.max(1), ..Timing::default() },
+        }
+    }
+
+    /// Sleeps to the next deadline and returns it together with the number of deadlines missed
+    /// since the last call.
+    pub fn wait(&mut self) -> (u64, u64) {
+        let mut deadline = self.next_ns;
+        sleep_until(deadline);
+        let late = monotonic_ns().saturating_sub(deadline);
+        let missed = late / self.timing.period_ns;
+        self.timing.overruns += missed;
+        deadline += missed * self.timing.period_ns;
+        self.timing.count(late);
+        self.next_ns = deadline + self.timing.period_ns;
+        (deadline, missed)
+    }
+
+    /// Notes the work of this tick: time since its wake-up.
+    pub fn worked(&mut self, woke_ns: u64) {
+        self.timing.busy_ns = monotonic_ns().saturating_sub(woke_ns);
+    }
+}
+
+/// Sleeps to an instant of CLOCK_MONOTONIC; interruptions by signals do not shorten it.
+fn sleep_until(at_ns: u64) {
+    let at = Timespec { tv_sec: (at_ns / 1_000_000_000) as _, tv_nsec: (at_ns % 1_000_000_000) as _ };
+    // EINTR is retried; other errors cannot happen for a valid timespec and would at worst make
+    // the loop spin for one tick.
+    while rustix::thread::clock_nanosleep_absolute(ClockId::Monotonic, &at) == Err(rustix::io::Errno::INTR) {}
+}
+
+/// Makes the calling thread a real-time one as far as the system permits: SCHED_FIFO with this
+/// priority, all memory of the process locked (if `lock_memory`), timer slack of 1 ns.
+///
+/// Returns what was not permitted, in words fit for a warning.
+pub fn realtime(priority: i32, lock_memory: bool) -> Vec<String> {
+    let mut missing = Vec::new();
+    // SAFETY: sched_setscheduler only reads the parameter; 0 is the calling thread.
+    let done = unsafe {
+        let parameter = libc::sched_param { sched_priority: priority };
+        libc::sched_setscheduler(0, libc::SCHED_FIFO, &parameter)
+    };
+    if done != 0 {
+        missing.push(format!(
+            "SCHED_FIFO is not permitted ({}): expect wake-ups late by milliseconds under load\nhint: run as root, or grant CAP_SYS_NICE or an rtprio limit",
+            std::io::Error::last_os_error()
+        ));
+    }
+    if lock_memory {
+        use rustix::mm::{MlockAllFlags, mlockall};
+        if let Err(e) = mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE) {
+            missing.push(format!(
+                "memory cannot be locked ({e}): a page fault may delay a tick\nhint: grant CAP_IPC_LOCK or raise the memlock limit"
+            ));
+        }
+    }
+    if let Err(e) = rustix::thread::set_current_timer_slack(std::num::NonZeroU64::new(1)) {
+        missing.push(format!("timer slack cannot be set ({e}): wake-ups come about 50 us later"));
+    }
+    missing
+}

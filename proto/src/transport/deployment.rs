@@ -1,0 +1,272 @@
+//! One deployment's shared memory on this machine: a folder (the root), a prefix in `/dev/shm`,
+//! a lock, and the number of the present generation.
+//!
+//! A kill while iceoryx2 creates a service leaves it broken for good. So one process, the owner,
+//! holds the lock, clears what others left under its root and prefix, creates every service under
+//! a new generation, and only then writes the generation down; all others wait for the number
+//! and only open.
+
+use std::fs;
+use std::os::unix::fs::DirBuilderExt;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use iceoryx2::prelude::*;
+use rustix::fs::{FlockOperation, flock};
+use thiserror::Error;
+
+use super::clock::monotonic_ns;
+use super::ports::{Services, create_services};
+
+/// Why shared memory cannot be used.
+#[derive(Debug, Error)]
+pub enum TransportError {
+    /// Another process owns the deployment.
+    #[error(
+        "{}: another kort ({holder}) already runs here\nhint: stop it, or give this one a root of its own with --root DIR or transport.root in kort.toml",
+        root.display()
+    )]
+    Locked {
+        /// The root folder.
+        root: PathBuf,
+        /// What the lock file says of its holder.
+        holder: String,
+    },
+    /// A file of the deployment cannot be used.
+    #[error("{}: {error}\nhint: choose another folder with --root DIR or transport.root in kort.toml", path.display())]
+    File {
+        /// The file or folder.
+        path: PathBuf,
+        /// The system's words.
+        error: std::io::Error,
+    },
+    /// A path that shared memory cannot take.
+    #[error("{}: not usable as the root of shared memory\nhint: an absolute path of at most 100 bytes without odd characters", root.display())]
+    Path {
+        /// The root folder.
+        root: PathBuf,
+    },
+    /// Nobody owns the deployment.
+    #[error("{}: nothing runs here\nhint: start `kort up` or `kort servo` first, with the same --root", root.display())]
+    NoGeneration {
+        /// The root folder.
+        root: PathBuf,
+    },
+    /// iceoryx2 said no.
+    #[error("shared memory, {what}: {error}")]
+    Iceoryx {
+        /// What was tried.
+        what: String,
+        /// iceoryx2's word for it.
+        error: String,
+    },
+}
+
+impl TransportError {
+    pub(super) fn iceoryx(what: impl Into<String>, error: impl std::fmt::Debug) -> Self {
+        Self::Iceoryx { what: what.into(), error: format!("{error:?}") }
+    }
+}
+
+/// Where a deployment's shared memory lives.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Deployment {
+    root: PathBuf,
+}
+
+impl Deployment {
+    /// A deployment at a root folder; `None` or an empty path takes the environment variable
+    /// `KORT_ROOT`, else a folder of the user's.
+    pub fn new(root: Option<&Path>) -> Self {
+        let given = root.filter(|r| !r.as_os_str().is_empty()).map(Path::to_path_buf);
+        let root = given.or_else(|| std::env::var_os("KORT_ROOT").map(PathBuf::from)).unwrap_or_else(|| {
+            match std::env::var_os("XDG_RUNTIME_DIR") {
+                Some(dir) if Path::new(&dir).is_dir() => Path::new(&dir).join("kort"),
+                _ => PathBuf::from(format!("/tmp/kort-{}", rustix::process::getuid().as_raw())),
+            }
+        });
+        Self { root: std::path::absolute(&root).unwrap_or(root) }
+    }
+
+    /// The root folder.
+    pub fn root(&self) -> &Path {
+        &self.root
+    }
+
+    /// Number of the present generation; `None` while nobody has created one.
+    pub fn generation(&self) -> Option<u64> {
+        fs::read_to_string(self.generation_file()).ok()?.trim().parse().ok()
+    }
+
+    /// Waits for an owner to have created a generation.
+    ///
+    /// # Errors
+    /// [`TransportError::NoGeneration`] if there is none after `timeout`.
+    pub fn wait_for_generation(&self, timeout: Duration) -> Result<u64, TransportError> {
+        let end = std::time::Instant::now() + timeout;
+        loop {
+            if let Some(generation) = self.generation() {
+                return Ok(generation);
+            }
+            if std::time::Instant::now() >= end {
+                return Err(TransportError::NoGeneration { root: self.root.clone() });
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    }
+
+    /// Becomes the owner: takes the lock and clears root and prefix.
+    ///
+    /// # Errors
+    /// [`TransportError::Locked`] if another process is the owner; [`TransportError::File`] if the
+    /// folder cannot be made.
+    pub fn own(&self) -> Result<Owner, TransportError> {
+        let file_error = |path: &Path| {
+            let path = path.to_path_buf();
+            move |error| TransportError::File { path, error }
+        };
+        if let Some(parent) = self.root.parent() {
+            fs::create_dir_all(parent).map_err(file_error(parent))?;
+        }
+        let lock_path = self.beside("lock");
+        let lock = fs::OpenOptions::new()
+            .create(true)
+            .truncate(false)
+            .write(true)
+            .read(true)
+            .open(&lock_path)
+            .map_err(file_error(&lock_path))?;
+        if flock(&lock, FlockOperation::NonBlockingLockExclusive).is_err() {
+            let holder = fs::read_to_string(&lock_path).unwrap_or_default();
+            let holder = if holder.is_empty() { "process unknown".into() } else { holder };
+            return Err(TransportError::Locked { root: self.root.clone(), holder });
+        }
+        let _ = fs::write(&lock_path, format!("process {}", std::process::id()));
+        let owner = Owner { deployment: self.clone(), _lock: lock, node: None, services: Vec::new() };
+        owner.clear()?;
+        let mut folder = fs::DirBuilder::new();
+        folder.recursive(true).mode(0o700).create(&self.root).map_err(file_error(&self.root))?;
+        Ok(owner)
+    }
+
+    /// A node (iceoryx2's word for a participant) of this deployment.
+    pub(super) fn node(&self, name: &str) -> Result<Node<ipc::Service>, TransportError> {
+        // iceoryx2 talks about every dead peer; what matters is in our own errors.
+        set_log_level(LogLevel::Fatal);
+        let name = NodeName::new(name).map_err(|e| TransportError::iceoryx("node name", e))?;
+        NodeBuilder::new()
+            .name(&name)
+            .config(&self.config()?)
+            .signal_handling_mode(SignalHandlingMode::Disabled)
+            .create::<ipc::Service>()
+            .map_err(|e| TransportError::iceoryx("creating a node", e))
+    }
+
+    fn config(&self) -> Result<Config, TransportError> {
+        let path_error = || TransportError::Path { root: self.root.clone() };
+        let mut config = Config::default();
+        let root = iceoryx2::prelude::Path::new(self.root.as_os_str().as_encoded_bytes())
+            .map_err(|_| path_error())?;
+        config.global.set_root_path(&root);
+        config.global.prefix = FileName::new(self.prefix().as_bytes()).map_err(|_| path_error())?;
+        // Clearing up after the dead takes tens of milliseconds: only the owner does it.
+        config.global.node.cleanup_dead_nodes_on_creation = false;
+        config.global.node.cleanup_dead_nodes_on_destruction = false;
+        config.global.service.cleanup_dead_nodes_on_open = false;
+        Ok(config)
+    }
+
+    /// Prefix of the objects in `/dev/shm`: a hash (FNV-1a) of the root keeps deployments apart.
+    fn prefix(&self) -> String {
+        let hash =
+            self.root.as_os_str().as_encoded_bytes().iter().fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
+                (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3)
+            });
+        format!("kort_{hash:016x}_")
+    }
+
+    fn generation_file(&self) -> PathBuf {
+        self.beside("generation")
+    }
+
+    /// A file beside the root, so that clearing the root leaves it.
+    fn beside(&self, extension: &str) -> PathBuf {
+        let mut name = self.root.file_name().unwrap_or_default().to_os_string();
+        name.push(".");
+        name.push(extension);
+        self.root.with_file_name(name)
+    }
+}
+
+/// The process that owns a deployment; the lock is given up when it is dropped or dies.
+pub struct Owner {
+    deployment: Deployment,
+    _lock: fs::File,
+    node: Option<Node<ipc::Service>>,
+    services: Vec<Services>,
+}
+
+impl Owner {
+    /// Creates all services of the thrusters under a new generation and publishes its number.
+    ///
+    /// # Errors
+    /// [`TransportError`] if iceoryx2 or the file system refuses.
+    pub fn create(&mut self, thrusters: &[&str]) -> Result<u64, TransportError> {
+        let generation = monotonic_ns();
+        let node = match self.node.take() {
+            Some(node) => node,
+            None => self.deployment.node("owner")?,
+        };
+        let created: Result<Vec<_>, _> =
+            thrusters.iter().map(|thruster| create_services(&node, thruster, generation)).collect();
+        self.node = Some(node);
+        self.services = created?;
+        let path = self.deployment.generation_file();
+        let draft = self.deployment.beside("generation.new");
+        fs::write(&draft, generation.to_string())
+            .and_then(|()| fs::rename(&draft, &path))
+            .map_err(|error| TransportError::File { path, error })?;
+        Ok(generation)
+    }
+
+    /// Frees what dead processes held. Takes tens of milliseconds for each of them.
+    pub fn clear_up_after_the_dead(&self) {
+        if let Some(node) = &self.node {
+            let _ = node.try_cleanup_dead_nodes();
+        }
+    }
+
+    /// The deployment.
+    pub fn deployment(&self) -> &Deployment {
+        &self.deployment
+    }
+
+    /// Removes everything under root and prefix, whoever left it.
+    fn clear(&self) -> Result<(), TransportError> {
+        let _ = fs::remove_file(self.deployment.generation_file());
+        match fs::remove_dir_all(&self.deployment.root) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                return Err(TransportError::File { path: self.deployment.root.clone(), error });
+            }
+            _ => {}
+        }
+        let prefix = self.deployment.prefix();
+        for folder in ["/dev/shm", "/tmp"] {
+            for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+                if entry.file_name().as_encoded_bytes().starts_with(prefix.as_bytes()) {
+                    let _ = fs::remove_file(entry.path());
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Owner {
+    fn drop(&mut self) {
+        // Services first: iceoryx2 removes what nobody uses; then whatever the dead left.
+        self.services.clear();
+        self.node = None;
+        let _ = self.clear();
+    }
+}

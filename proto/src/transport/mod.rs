@@ -1,0 +1,10 @@
+//! Shared memory between the processes of one deployment: who creates it, who opens it, and ports
+//! that stamp what they send and let only new samples through.
+
+mod clock;
+mod deployment;
+mod ports;
+
+pub use clock::{Ticker, monotonic_ns, realtime};
+pub use deployment::{Deployment, Owner, TransportError};
+pub use ports::{ControllerPorts, GatewayPorts, Inbox, Outbox, ServoPorts, Ticks, Waker, create_services};
