@@ -1,0 +1,376 @@
+//! One controller: observer, estimator, law and limits, ticked together.
+
+use kort_thruster::rig::{AmplifierKind, Rig};
+
+use crate::config::ControllerConfig;
+use crate::estimators::{Adapted, Estimator, EstimatorInput};
+use crate::laws::{Law, LawInput, LawKind, RotationalFlowOptions};
+use crate::limits::{Bumpless, Limit, LimitSet, RateLimiter};
+use crate::model::{ControlModel, ModelError, Swirl};
+use crate::observers::{Observer, ObserverInput};
+use crate::signals::{DriveCommand, Estimate, Measurement, Reference};
+
+/// What one tick gives.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Output {
+    /// What the drive is told.
+    pub command: DriveCommand,
+    /// What the observer says.
+    pub estimate: Estimate,
+    /// Limits in force.
+    pub limits: LimitSet,
+    /// Thrust reference after its limits, N; `None` under a speed reference or at rest.
+    pub thrust_reference_n: Option<f64>,
+    /// Shaft speed the law aims at, rad/s.
+    pub speed_target_rad_s: f64,
+}
+
+/// A running controller. Plain data: a tick neither allocates nor blocks nor panics.
+#[derive(Clone, Copy, Debug)]
+pub struct Controller {
+    config: ControllerConfig,
+    /// As the rig states it.
+    stated: ControlModel,
+    /// As the law was designed: with friction of the configuration and swirl where the law has it.
+    nominal: ControlModel,
+    /// As adapted.
+    model: ControlModel,
+    observer: Observer,
+    estimator: Estimator,
+    law: Law,
+    /// Serves speed references whatever the law.
+    speed_law: Law,
+    adapted: Adapted,
+    mode: Mode,
+    thrust_rate: RateLimiter,
+    current_rate: RateLimiter,
+    bumpless: Bumpless,
+    current_a: f64,
+    drive_a: f64,
+    last_speed_rad_s: f64,
+    gated: u64,
+    limited: bool,
+}
+
+/// Which kind of reference ran last.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Mode {
+    Off,
+    Thrust,
+    Speed,
+}
+
+impl Controller {
+    /// A controller at rest.
+    ///
+    /// # Errors
+    /// [`ModelError`] if the rig has no propeller or the period is out of range.
+    pub fn new(rig: &Rig, config: &ControllerConfig, period_s: f64) -> Result<Self, ModelError> {
+        let stated = ControlModel::from_rig(rig, period_s)?;
+        let nominal = design_model(&stated, config);
+        let servo = ControllerConfig { law: LawKind::VelocityServo, ..*config };
+        Ok(Self {
+            config: *config,
+            stated,
+            nominal,
+            model: nominal,
+            observer: Observer::new(config.observer, &nominal, &config.observers),
+            estimator: Estimator::new(config.estimator, &nominal, &config.adaptation),
+            law: Law::new(config.law, &nominal, &config.laws),
+            speed_law: Law::new(servo.law, &nominal, &config.laws),
+            adapted: Adapted::default(),
+            mode: Mode::Off,
+            thrust_rate: RateLimiter::default(),
+            current_rate: RateLimiter::default(),
+            bumpless: Bumpless::default(),
+            current_a: 0.0,
+            drive_a: 0.0,
+            last_speed_rad_s: 0.0,
+            gated: 0,
+            limited: false,
+        })
+    }
+
+    /// The configuration in force.
+    pub fn config(&self) -> &ControllerConfig {
+        &self.config
+    }
+
+    /// The model the law runs on now.
+    pub fn model(&self) -> &ControlModel {
+        &self.model
+    }
+
+    /// The model as designed, before adaptation.
+    pub fn nominal(&self) -> &ControlModel {
+        &self.nominal
+    }
+
+    /// The adapted coefficients.
+    pub fn adapted(&self) -> &Adapted {
+        &self.adapted
+    }
+
+    /// Changes law, options, observer or estimator while running. The command goes on from where it
+    /// is; observer and estimator keep what they know unless their own part changed.
+    pub fn configure(&mut self, config: &ControllerConfig) {
+        let old = std::mem::replace(&mut self.config, *config);
+        let nominal = design_model(&self.stated, config);
+        let model_changed = nominal != self.nominal;
+        self.nominal = nominal;
+        if config.estimator != old.estimator || config.adaptation != old.adaptation || model_changed {
+            self.estimator = Estimator::new(config.estimator, &nominal, &config.adaptation);
+            self.adapted = Adapted::default();
+        }
+        self.model = nominal;
+        self.adapted.apply(&nominal, &mut self.model);
+        if config.observer != old.observer || config.observers != old.observers || model_changed {
+            self.observer = Observer::new(config.observer, &self.model, &config.observers);
+        }
+        self.law = Law::new(config.law, &self.model, &config.laws);
+        self.speed_law = Law::new(LawKind::VelocityServo, &self.model, &config.laws);
+        self.bumpless.arm();
+    }
+
+    /// One tick: measurements and reference in, drive command out. `dt_s` is the time since the last
+    /// tick; it is held between a fifth and five times the design period.
+    pub fn tick(&mut self, measured: &Measurement, reference: Reference, dt_s: f64) -> Output {
+        let period = self.stated.period_s;
+        let dt = if dt_s.is_finite() { dt_s.clamp(0.2 * period, 5.0 * period) } else { period };
+        let m = &self.stated;
+        let measured = measured.sane(3.0 * m.speed_max_rad_s, 3.0 * m.current_limit_a, 4.0 * m.thrust_max_n);
+        let current_a = self.drive_current(&measured, dt);
+        let estimate = self.observer.tick(&ObserverInput {
+            model: &self.model,
+            measured: &measured,
+            current_a,
+            dt_s: dt,
+        });
+        self.adapt(&measured, &estimate, current_a, dt);
+
+        let mut limits = LimitSet::default();
+        let reference = finite(reference);
+        let wanted = match reference {
+            Reference::Off => Mode::Off,
+            Reference::Thrust(_) => Mode::Thrust,
+            Reference::Speed(_) => Mode::Speed,
+        };
+        self.enter(wanted);
+        let speed = measured.shaft_speed_rad_s.unwrap_or(estimate.shaft_speed_rad_s.value);
+        let (demand, thrust_n) = match reference {
+            Reference::Off => {
+                self.current_a = 0.0;
+                self.current_rate.reset(0.0);
+                self.limited = false;
+                self.last_speed_rad_s = speed;
+                return Output {
+                    command: self.command(0.0, 0.0, speed, &measured, &mut limits),
+                    estimate,
+                    limits,
+                    thrust_reference_n: None,
+                    speed_target_rad_s: 0.0,
+                };
+            }
+            Reference::Thrust(thrust) => {
+                let thrust = self.limit_thrust(thrust, dt, &mut limits);
+                let input = LawInput {
+                    model: &self.model,
+                    measured: &measured,
+                    estimate: &estimate,
+                    thrust_n: thrust,
+                    dt_s: dt,
+                };
+                (self.law.tick(&input), Some(thrust))
+            }
+            Reference::Speed(target) => {
+                let cap = self.model.speed_max_rad_s;
+                if target.abs() > cap {
+                    limits.set(Limit::ShaftSpeed);
+                }
+                let target = target.clamp(-cap, cap);
+                let thrust = self.model.map.thrust_n(target);
+                let input = LawInput {
+                    model: &self.model,
+                    measured: &measured,
+                    estimate: &estimate,
+                    thrust_n: thrust,
+                    dt_s: dt,
+                };
+                (self.speed_law.tick(&input), None)
+            }
+        };
+        limits.0 |= demand.limits.0;
+        let kt = self.model.torque_constant_nm_a;
+        let asked = if demand.torque_n_m.is_finite() { demand.torque_n_m / kt } else { 0.0 };
+        let blended = self.bumpless.step(asked, self.current_a, self.config.limits.fade_s, dt);
+        let applied = self.limit_current(blended, speed, &measured, dt, &mut limits);
+        // The law follows what was applied of its own demand, the fading difference left out.
+        let own = if applied == blended { asked } else { applied - (blended - asked) };
+        match reference {
+            Reference::Speed(_) => self.speed_law.settle(kt * own, dt),
+            _ => self.law.settle(kt * own, dt),
+        }
+        self.current_a = applied;
+        self.limited = limits.contains(Limit::Current)
+            || limits.contains(Limit::Voltage)
+            || limits.contains(Limit::AntiSpin);
+        self.last_speed_rad_s = speed;
+        let command = self.command(applied, demand.speed_rad_s, speed, &measured, &mut limits);
+        Output {
+            command,
+            estimate,
+            limits,
+            thrust_reference_n: thrust_n,
+            speed_target_rad_s: demand.speed_rad_s,
+        }
+    }
+
+    /// Motor current over the last period: measured, or the last command behind the drive's lag.
+    fn drive_current(&mut self, measured: &Measurement, dt: f64) -> f64 {
+        let lag = self.model.amplifier_lag_s;
+        self.drive_a += (self.current_a - self.drive_a) * dt / (lag + dt);
+        if let Some(current) = measured.current_a {
+            self.drive_a = current;
+        }
+        self.drive_a
+    }
+
+    fn adapt(&mut self, measured: &Measurement, estimate: &Estimate, current_a: f64, dt: f64) {
+        let suspect = self.limited || estimate.gated != self.gated || self.mode == Mode::Off;
+        self.gated = estimate.gated;
+        let input =
+            EstimatorInput { nominal: &self.nominal, measured, estimate, current_a, suspect, dt_s: dt };
+        if let Some(adapted) = self.estimator.tick(&input) {
+            let moved = adapted.ratio != self.adapted.ratio;
+            self.adapted = adapted;
+            if moved {
+                adapted.apply(&self.nominal, &mut self.model);
+            }
+        }
+    }
+
+    /// A change of mode starts the law afresh and goes on from the present command.
+    fn enter(&mut self, wanted: Mode) {
+        if wanted == self.mode {
+            return;
+        }
+        match wanted {
+            Mode::Off => self.bumpless.clear(),
+            Mode::Thrust => {
+                self.law = Law::new(self.config.law, &self.model, &self.config.laws);
+                let now =
+                    if self.mode == Mode::Off { 0.0 } else { self.model.map.thrust_n(self.last_speed_rad_s) };
+                self.thrust_rate.reset(now);
+                self.bumpless.arm();
+            }
+            Mode::Speed => {
+                self.speed_law = Law::new(LawKind::VelocityServo, &self.model, &self.config.laws);
+                self.bumpless.arm();
+            }
+        }
+        self.mode = wanted;
+    }
+
+    fn limit_thrust(&mut self, thrust_n: f64, dt: f64, limits: &mut LimitSet) -> f64 {
+        let most = self.stated.thrust_max_n;
+        if thrust_n.abs() > most {
+            limits.set(Limit::ThrustReference);
+        }
+        let rate = self.config.limits.thrust_rate_per_s * most;
+        let (thrust, limited) = self.thrust_rate.step(thrust_n.clamp(-most, most), rate, dt);
+        if limited {
+            limits.set(Limit::ThrustReferenceRate);
+        }
+        thrust
+    }
+
+    /// Magnitude, supply, overspeed and rate, in that order; the rate last, as the drive sees it.
+    fn limit_current(
+        &mut self,
+        asked_a: f64,
+        speed: f64,
+        measured: &Measurement,
+        dt: f64,
+        limits: &mut LimitSet,
+    ) -> f64 {
+        let model = &self.model;
+        let mut current = asked_a.clamp(-model.current_limit_a, model.current_limit_a);
+        if current != asked_a {
+            limits.set(Limit::Current);
+        }
+        if let (Some(r), Some(supply)) = (model.winding_resistance_ohm, measured.supply_v.or(model.supply_v))
+            && r > 0.0
+        {
+            let emf = model.torque_constant_nm_a * speed;
+            let inside = current.clamp(((-supply - emf) / r).min(0.0), ((supply - emf) / r).max(0.0));
+            if inside != current {
+                limits.set(Limit::Voltage);
+                current = inside;
+            }
+        }
+        let cap = self.config.limits.overspeed * model.speed_max_rad_s;
+        let span = 0.1 * cap;
+        if speed.abs() > cap - span && current * speed > 0.0 {
+            let share = ((cap - speed.abs()) / span).clamp(0.0, 1.0);
+            let most = share * model.current_limit_a;
+            if current.abs() > most {
+                current = most.copysign(current);
+                limits.set(Limit::ShaftSpeed);
+            }
+        }
+        let rate = self.config.limits.current_rate_per_s * model.current_limit_a;
+        let (current, limited) = self.current_rate.step(current, rate, dt);
+        if limited {
+            limits.set(Limit::CurrentRate);
+        }
+        current
+    }
+
+    fn command(
+        &self,
+        current_a: f64,
+        target: f64,
+        speed: f64,
+        measured: &Measurement,
+        limits: &mut LimitSet,
+    ) -> DriveCommand {
+        let model = &self.model;
+        match model.amplifier {
+            AmplifierKind::Current => DriveCommand { current_a, ..DriveCommand::default() },
+            AmplifierKind::Voltage => {
+                let wanted = model.winding_resistance_ohm.unwrap_or(0.0) * current_a
+                    + model.torque_constant_nm_a * speed;
+                let supply = measured.supply_v.or(model.supply_v).unwrap_or(f64::INFINITY);
+                let voltage =
+                    if current_a == 0.0 && target == 0.0 { 0.0 } else { wanted.clamp(-supply, supply) };
+                if wanted.abs() > supply {
+                    limits.set(Limit::Voltage);
+                }
+                DriveCommand { current_a, voltage_v: Some(voltage), speed_rad_s: None }
+            }
+            AmplifierKind::Speed => {
+                let cap = model.speed_max_rad_s;
+                DriveCommand { current_a, voltage_v: None, speed_rad_s: Some(target.clamp(-cap, cap)) }
+            }
+        }
+    }
+}
+
+/// A reference that is not finite is none.
+fn finite(reference: Reference) -> Reference {
+    match reference {
+        Reference::Thrust(x) | Reference::Speed(x) if !x.is_finite() => Reference::Off,
+        other => other,
+    }
+}
+
+fn design_model(stated: &ControlModel, config: &ControllerConfig) -> ControlModel {
+    let mut model = *stated;
+    model.current_rate_a_s = config.limits.current_rate_per_s * model.current_limit_a;
+    model.coulomb_friction_n_m = config.coulomb_friction * model.torque_constant_nm_a * model.current_limit_a;
+    if config.law == LawKind::RotationalFlowInversion {
+        let RotationalFlowOptions { drag, inertia } = config.laws.rotational_flow;
+        model = model.with_swirl(Swirl { drag, inertia });
+    }
+    model
+}

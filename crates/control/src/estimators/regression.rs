@@ -1,0 +1,210 @@
+//! The equations that adaptation learns from.
+//!
+//! Reference: physics.md D9. With `W = rho a wn / V`:
+//! ```text
+//! thrust    T                      = W [wc ut, -wn vp] [CL, CD]
+//! torque    kt im - I Om' - Qf     = re W [wc vp,  wn ut] [CL, CD]
+//! momentum  T - m vp'              = rho a (vp - va)|vp| dbeta
+//! ```
+//! Both sides pass `lam/(s + lam)`, so that no derivative is taken: `F[x'] = lam (x - F[x])`. The
+//! flow comes from the momentum balance under the *measured* thrust, pulled by the flow meter
+//! where there is one: it does not depend on the coefficients that are being learnt.
+//!
+//! Equations are divided by full thrust and torque, coefficients by their stated values. A
+//! windowed Gram matrix of the equations' own directions (scaled to the level of operation) says
+//! whether lift and drag are both seen.
+
+use serde::{Deserialize, Serialize};
+
+use super::{AdaptationOptions, COEFFICIENTS, EstimatorInput};
+use crate::model::ControlModel;
+
+/// Why adaptation stands still.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Freeze {
+    /// A limit is in force or a measurement was gated.
+    Suspect,
+    /// The windowed Gram matrix is singular.
+    NoExcitation,
+    /// Speed or current is not measured.
+    NotMeasured,
+}
+
+/// One scalar equation `y = phi . ratio`, as a share of full scale.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Equation {
+    /// Left side.
+    pub y: f64,
+    /// Regressor.
+    pub phi: [f64; COEFFICIENTS],
+    /// Whether it may be learnt from.
+    pub valid: bool,
+}
+
+impl Equation {
+    /// Filters both sides by the same share; `derived` is the part of y that is filtered already.
+    fn step(&mut self, held: &mut f64, y: f64, phi: [f64; COEFFICIENTS], share: f64, derived: f64) {
+        *held += (y - *held) * share;
+        for (state, input) in self.phi.iter_mut().zip(phi) {
+            *state += (input - *state) * share;
+        }
+        self.y = *held - derived;
+    }
+}
+
+/// Filters and windows.
+#[derive(Clone, Copy, Debug)]
+pub struct Regression {
+    lambda_rad_s: f64,
+    window_s: f64,
+    every_s: f64,
+    since_s: f64,
+    suspect_s: f64,
+    flow_m_s: f64,
+    filtered_speed_rad_s: f64,
+    filtered_flow_m_s: f64,
+    equations: [Equation; 3],
+    held: [f64; 3],
+    gram: [f64; 3],
+    excitation_min: f64,
+    flux: bool,
+}
+
+impl Regression {
+    /// Filters at rest.
+    pub fn new(model: &ControlModel, options: &AdaptationOptions) -> Self {
+        let lambda = 0.5 * model.poles_per_rad().0 * model.speed_max_rad_s;
+        Self {
+            lambda_rad_s: lambda,
+            window_s: 12.0 / lambda,
+            every_s: (10.0 * model.period_s).max(0.01),
+            since_s: 0.0,
+            suspect_s: 0.0,
+            flow_m_s: 0.0,
+            filtered_speed_rad_s: 0.0,
+            filtered_flow_m_s: 0.0,
+            equations: [Equation::default(); 3],
+            held: [0.0; 3],
+            gram: [0.0; 3],
+            excitation_min: options.excitation_min,
+            flux: options.adapt_flux,
+        }
+    }
+
+    /// Advances the filters; every hundredth of a second gives the equations or why there are none.
+    pub fn tick(&mut self, input: &EstimatorInput) -> Option<Result<[Equation; 3], Freeze>> {
+        let (model, dt) = (input.nominal, input.dt_s);
+        let Some(speed) = input.measured.shaft_speed_rad_s else { return Some(Err(Freeze::NotMeasured)) };
+        let thrust = input.measured.thrust_n;
+        self.advance_flow(input);
+        self.filter(model, input, speed, thrust);
+        // Filters remember a suspect tick for a while, so that it must not be learnt from later.
+        self.suspect_s = if input.suspect { 2.0 / self.lambda_rad_s } else { (self.suspect_s - dt).max(0.0) };
+        self.since_s += dt;
+        if self.since_s < self.every_s {
+            return None;
+        }
+        self.since_s = 0.0;
+        self.weigh();
+        Some(if self.suspect_s > 0.0 {
+            Err(Freeze::Suspect)
+        } else if !self.excited() {
+            Err(Freeze::NoExcitation)
+        } else {
+            Ok(self.equations)
+        })
+    }
+
+    fn advance_flow(&mut self, input: &EstimatorInput) {
+        let (model, dt) = (input.nominal, input.dt_s);
+        let Some(thrust) = input.measured.thrust_n else {
+            self.flow_m_s = input.estimate.flow_m_s.value;
+            return;
+        };
+        let ambient = input.measured.ambient_m_s.unwrap_or(0.0);
+        let rate = model.flow_acceleration(thrust, self.flow_m_s, ambient);
+        let flux = model.flux_coefficient * model.blade.density_kg_m3 * model.blade.area_m2();
+        let decay = 2.0 * flux * self.flow_m_s.abs() / model.added_mass_kg;
+        let pull = input.measured.flow_m_s.map_or(0.0, |f| 3.0 * (f - self.flow_m_s));
+        self.flow_m_s += dt * (rate + pull) / (1.0 + dt * decay);
+        let bound = 3.0 * model.map.flow_m * model.speed_max_rad_s + 4.0;
+        self.flow_m_s = self.flow_m_s.clamp(-bound, bound);
+    }
+
+    fn filter(&mut self, model: &ControlModel, input: &EstimatorInput, speed: f64, thrust: Option<f64>) {
+        let share = input.dt_s * self.lambda_rad_s / (1.0 + input.dt_s * self.lambda_rad_s);
+        let flow = self.flow_m_s;
+        let inflow = model.blade.inflow(speed, flow, 0.0);
+        let (ut, vp, v) = (inflow.tangential_m_s, inflow.axial_m_s, inflow.speed_m_s().max(1e-6));
+        let (s, c) = model.blade.pitch_rad.sin_cos();
+        let (wn, wc) = (ut * s - vp * c, ut * c + vp * s);
+        let density_area = model.blade.density_kg_m3 * model.blade.area_m2();
+        let w = density_area * wn / v;
+        let (lift, drag) = (model.blade.lift_max, model.blade.drag_max);
+        let thrust_scale = 1.0 / model.thrust_max_n;
+        let torque_scale = 1.0 / (model.map.torque_n_m_s2 * model.speed_max_rad_s.powi(2));
+        let wt = w * thrust_scale;
+        let wq = w * model.blade.lever_m() * torque_scale;
+
+        let motor = model.torque_constant_nm_a * input.current_a - model.friction_n_m(speed);
+        let acceleration = self.lambda_rad_s * (speed - self.filtered_speed_rad_s);
+        self.filtered_speed_rad_s += (speed - self.filtered_speed_rad_s) * share;
+        let flow_acceleration = self.lambda_rad_s * (flow - self.filtered_flow_m_s);
+        self.filtered_flow_m_s += (flow - self.filtered_flow_m_s) * share;
+
+        let ambient = input.measured.ambient_m_s.unwrap_or(0.0);
+        // Each: what of y is still to be filtered, phi, and whether it is measured.
+        let rows = [
+            (
+                thrust.unwrap_or(0.0) * thrust_scale,
+                [wt * wc * ut * lift, -wt * wn * vp * drag, 0.0],
+                thrust.is_some(),
+            ),
+            (motor * torque_scale, [wq * wc * vp * lift, wq * wn * ut * drag, 0.0], true),
+            (
+                thrust.unwrap_or(0.0) * thrust_scale,
+                [
+                    0.0,
+                    0.0,
+                    density_area * (flow - ambient) * flow.abs() * model.flux_coefficient * thrust_scale,
+                ],
+                self.flux && thrust.is_some() && input.measured.flow_m_s.is_some(),
+            ),
+        ];
+        // F[x'] = lam (x - F[x]) comes out filtered.
+        let derived = [
+            0.0,
+            model.inertia_kg_m2 * acceleration * torque_scale,
+            model.added_mass_kg * flow_acceleration * thrust_scale,
+        ];
+        for (i, (y, phi, valid)) in rows.into_iter().enumerate() {
+            self.equations[i].step(&mut self.held[i], y, phi, share, derived[i]);
+            self.equations[i].valid = valid;
+        }
+    }
+
+    fn weigh(&mut self) {
+        let keep = 1.0 - (self.every_s / self.window_s).min(1.0);
+        let mut fresh = [0.0; 3];
+        for e in self.equations[..2].iter().filter(|e| e.valid) {
+            let [a, b, _] = e.phi;
+            // Directions count, not levels, down to a tenth of full load.
+            let scale = 1.0 / (a * a + b * b).max(1e-3);
+            fresh[0] += a * a * scale;
+            fresh[1] += a * b * scale;
+            fresh[2] += b * b * scale;
+        }
+        for (g, f) in self.gram.iter_mut().zip(fresh) {
+            *g = keep * *g + (1.0 - keep) * f;
+        }
+    }
+
+    fn excited(&self) -> bool {
+        let [a, b, c] = self.gram;
+        let half = 0.5 * (a + c);
+        let root = (0.25 * (a - c) * (a - c) + b * b).sqrt();
+        let (least, most) = (half - root, half + root);
+        least > self.excitation_min && most < 1e4 * least
+    }
+}

@@ -1,0 +1,50 @@
+//! Model 1 (Yoerger) inverted.
+//!
+//! Reference: Yoerger, Cooke & Slotine 1990; (7)-(9) of Whitcomb & Yoerger; physics.md D3:
+//! `tau = (1/2) eta r tan(p) Td + Omr' / beta`, `beta = 1 / (eta^2 r^2 tan^2(p) rho V)`, with the
+//! efficiency `eta` that makes (7) agree with the rig's static thrust map.
+//!
+//! Assumes: the water moves with the blades (no flow state), quasi-static; its torque per thrust
+//! follows from power balance and not from the measured map.
+//! Needs measured: nothing.
+//!
+//! Fails: no flow transient, so no overshoot is foreseen or prevented; with one `eta` the torque is
+//! off where (18) and (19) ask for different efficiencies (0.49 and 0.81 on the stand); all that
+//! fails in `static_map` fails here.
+
+use super::{Demand, LawInput};
+use crate::limits::LimitSet;
+use crate::model::ControlModel;
+
+/// A running Model 1 inversion.
+#[derive(Clone, Copy, Debug)]
+pub struct Model1Inversion {
+    smoothing_s: f64,
+    speed_rad_s: f64,
+}
+
+impl Model1Inversion {
+    /// At rest. The reference's derivative is taken over the shaft loop's own time scale.
+    pub fn new(model: &ControlModel) -> Self {
+        let (crossover, _) = model.speed_loop(56f64.to_radians());
+        Self { smoothing_s: 1.0 / crossover, speed_rad_s: 0.0 }
+    }
+
+    /// Torque of the inverted model.
+    pub fn tick(&mut self, input: &LawInput) -> Demand {
+        let blade = &input.model.blade;
+        let advance = blade.radius_m * blade.pitch_rad.tan();
+        let eta = (input.model.map.thrust_n_s2 / (blade.density_kg_m3 * blade.area_m2())).sqrt() / advance;
+        let target = input.model.map.speed_rad_s(input.thrust_n);
+        let rate = (target - self.speed_rad_s) / (self.smoothing_s + input.dt_s);
+        self.speed_rad_s += rate * input.dt_s;
+        let inertia = (eta * advance).powi(2) * input.model.duct_water_kg;
+        let torque = 0.5 * eta * advance * input.thrust_n
+            + inertia * rate
+            + input.model.friction_n_m(self.speed_rad_s);
+        Demand { torque_n_m: torque, speed_rad_s: self.speed_rad_s, limits: LimitSet::default() }
+    }
+
+    /// Nothing to follow.
+    pub fn settle(&mut self, _applied_n_m: f64, _dt_s: f64) {}
+}

@@ -1,0 +1,85 @@
+//! PI thrust control on a force sensor.
+//!
+//! Reference: the plain loop of the field; the design is ours. `tau = a1 Td + Kp e + Ki int(e)`,
+//! `e = Td - T`. The plant from torque to thrust is `1/a1` behind the slow flow pole `p`, which grows
+//! in proportion to shaft speed (similarity, physics.md A8), so the zero follows it:
+//! `Kp = a1 w / p`, `Ki = a1 w`, `w = bandwidth_ratio x p`, kept under a fifth of what the sensor's
+//! filter and the drive allow.
+//!
+//! Assumes: a calibrated force sensor without structural resonance inside the bandwidth.
+//! Needs measured: thrust. Without it the integral holds and the law is `static_map`.
+//!
+//! Fails: sensor bias and gain are thrust errors one to one; near standstill the plant is slow and
+//! so is the loop; ventilation makes it race, as it asks for thrust that is not to be had.
+
+use serde::{Deserialize, Serialize};
+
+use super::{Demand, LawInput};
+use crate::limits::{Integrator, LimitSet};
+use crate::model::ControlModel;
+
+/// Options of the PI loop.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ThrustPiOptions {
+    /// Bandwidth as a multiple of the plant's slow pole.
+    pub bandwidth_ratio: f64,
+}
+
+impl Default for ThrustPiOptions {
+    fn default() -> Self {
+        Self { bandwidth_ratio: 1.0 }
+    }
+}
+
+/// A running PI loop.
+#[derive(Clone, Copy, Debug)]
+pub struct ThrustPi {
+    ratio: f64,
+    ceiling_rad_s: f64,
+    slow_per_rad: f64,
+    integral: Integrator,
+    asked_n_m: f64,
+    tracking_time_s: f64,
+}
+
+impl ThrustPi {
+    /// At rest.
+    pub fn new(model: &ControlModel, options: &ThrustPiOptions) -> Self {
+        let lags = model.thrust_filter_s + model.amplifier_lag_s + 1.5 * model.period_s;
+        Self {
+            ratio: options.bandwidth_ratio,
+            ceiling_rad_s: 0.2 / lags,
+            slow_per_rad: model.poles_per_rad().0,
+            integral: Integrator::default(),
+            asked_n_m: 0.0,
+            tracking_time_s: 0.1,
+        }
+    }
+
+    /// Torque of feedforward and PI.
+    pub fn tick(&mut self, input: &LawInput) -> Demand {
+        let model = input.model;
+        let a1 = model.map.torque_n_m_s2 / model.map.thrust_n_s2;
+        let target = model.map.speed_rad_s(input.thrust_n);
+        let speed = input.speed_rad_s();
+        let scale = speed.abs().max(0.5 * target.abs()).max(0.05 * model.speed_max_rad_s);
+        let pole = self.slow_per_rad * scale;
+        let bandwidth = (self.ratio * pole).min(self.ceiling_rad_s);
+        let mut torque = a1 * input.thrust_n + model.friction_n_m(speed);
+        if let Some(thrust) = input.measured.thrust_n {
+            let error = input.thrust_n - thrust;
+            let authority = 0.5 * model.torque_constant_nm_a * model.current_limit_a;
+            self.integral.step(a1 * bandwidth * error, authority, input.dt_s);
+            torque += a1 * bandwidth / pole * error;
+        }
+        self.tracking_time_s = 1.0 / bandwidth;
+        self.asked_n_m = torque + self.integral.state;
+        Demand { torque_n_m: self.asked_n_m, speed_rad_s: target, limits: LimitSet::default() }
+    }
+
+    /// Back-calculation.
+    pub fn settle(&mut self, applied_n_m: f64, dt_s: f64) {
+        self.integral.follow(self.asked_n_m, applied_n_m, self.tracking_time_s, dt_s);
+    }
+}
