@@ -7,6 +7,8 @@
 //! gateway --Request--> controller, servo --Reply--> gateway
 //! ```
 
+#[cfg(feature = "config")]
+pub mod config;
 pub mod faults;
 pub mod limits;
 pub mod messages;

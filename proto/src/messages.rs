@@ -7,10 +7,12 @@ use crate::text::Text;
 #[cfg(feature = "transport")]
 use iceoryx2::prelude::ZeroCopySend;
 
-/// Most parameters of a control law or of an estimator in one message.
+/// Most parameters of a controller in one message.
+pub const LAW_PARAMETERS: usize = 48;
+/// Most estimated parameters, and most parameters changed by one request.
 pub const PARAMETERS: usize = 16;
 /// Most control laws in one message.
-pub const LAWS: usize = 12;
+pub const LAWS: usize = 16;
 /// Upper bounds of the buckets of a lateness histogram, ns; a last bucket has no bound.
 pub const LATENESS_BOUNDS_NS: [u64; 11] =
     [5_000, 10_000, 20_000, 50_000, 100_000, 200_000, 500_000, 1_000_000, 2_000_000, 5_000_000, 10_000_000];
@@ -185,6 +187,37 @@ message! { "kort.Parameter",
     }
 }
 
+message! { "kort.ParameterTable",
+    /// All parameters of a controller, in two halves because arrays beyond 32 have no default.
+    ParameterTable {
+        /// The first half.
+        first: [Parameter; LAW_PARAMETERS / 2],
+        /// The second half.
+        second: [Parameter; LAW_PARAMETERS / 2],
+    }
+}
+
+impl ParameterTable {
+    /// The parameter at a place; `None` beyond the end.
+    pub fn get(&self, index: usize) -> Option<&Parameter> {
+        self.first.get(index).or_else(|| self.second.get(index.checked_sub(LAW_PARAMETERS / 2)?))
+    }
+
+    /// As [`Self::get`], to write.
+    pub fn get_mut(&mut self, index: usize) -> Option<&mut Parameter> {
+        if index < LAW_PARAMETERS / 2 {
+            self.first.get_mut(index)
+        } else {
+            self.second.get_mut(index - LAW_PARAMETERS / 2)
+        }
+    }
+
+    /// The first `count` parameters.
+    pub fn iter(&self, count: u32) -> impl Iterator<Item = &Parameter> {
+        self.first.iter().chain(&self.second).take(count as usize)
+    }
+}
+
 message! { "kort.Setpoint",
     /// Gateway to controller, sent again every heartbeat so that silence means loss.
     Setpoint {
@@ -267,8 +300,12 @@ message! { "kort.ControllerState",
         header: Header,
         /// Law that runs.
         law: Text<32>,
-        /// Its parameters.
-        law_parameters: [Parameter; PARAMETERS],
+        /// Observer that runs.
+        observer: Text<32>,
+        /// Estimator that runs.
+        estimator: Text<32>,
+        /// Parameters of the controller that may be changed.
+        law_parameters: ParameterTable,
         /// How many are used.
         law_parameter_count: u32,
         /// [`SetpointKind`] in force.
@@ -319,8 +356,12 @@ message! { "kort.Request",
         kind: u32,
         /// How many parameters are used.
         parameter_count: u32,
-        /// Law to switch to; empty keeps the present one and changes parameters only.
+        /// Law to switch to; empty keeps the present one.
         law: Text<32>,
+        /// Observer to switch to; empty keeps the present one.
+        observer: Text<32>,
+        /// Estimator to switch to; empty keeps the present one.
+        estimator: Text<32>,
         /// Parameters to set: only `name` and `value` count.
         parameters: [Parameter; PARAMETERS],
     }
