@@ -157,6 +157,22 @@ pub struct Tunable {
 }
 
 impl Tunable {
+    /// Whether it does anything under this configuration.
+    pub fn applies(&self, config: &ControllerConfig) -> bool {
+        let law = config.law;
+        match self.name {
+            n if n.starts_with("thrust_pi") => law == LawKind::ThrustPi,
+            n if n.starts_with("trim") => law == LawKind::TrimmedModel2Inversion,
+            n if n.starts_with("anti_spin") => law == LawKind::CombinedAntiSpin,
+            n if n.starts_with("swirl") => law == LawKind::RotationalFlowInversion,
+            n if n.starts_with("look_ahead") => law == LawKind::LookAhead,
+            n if n.starts_with("adaptation") => config.estimator != EstimatorKind::Off,
+            "ambient_std_m_s" | "ambient_time_s" | "load_std" | "load_time_s" | "thrust_std"
+            | "flow_std_m_s" => config.observer != ObserverKind::OpenLoop,
+            _ => true,
+        }
+    }
+
     fn check(&self, value: f64) -> Result<(), ConfigError> {
         if value >= self.least && value <= self.most {
             return Ok(());

@@ -340,6 +340,14 @@ impl ControlModel {
         (torque_n_m / self.blade.lever_m() - drag * swirl_m_s) / self.swirl_mass_kg(swirl)
     }
 
+    /// How fast the axial flow washes the swirl out, 1/s; zero without rotational flow.
+    pub fn swirl_decay_per_s(&self, flow_m_s: f64) -> f64 {
+        self.swirl.map_or(0.0, |swirl| {
+            swirl.drag * self.blade.density_kg_m3 * self.blade.area_m2() * flow_m_s.abs()
+                / self.swirl_mass_kg(swirl)
+        })
+    }
+
     /// Mass of the swirling water at 0.7 radius, kg: `rho a l gr`.
     pub fn swirl_mass_kg(&self, swirl: Swirl) -> f64 {
         (self.duct_water_kg * swirl.inertia).max(1e-9)

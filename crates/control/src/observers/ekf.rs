@@ -6,7 +6,7 @@
 //! of at most what the thruster's fastest pole allows; `va` and `Qd` are first-order Gauss-Markov, so that
 //! an unobservable one goes back to its prior standard deviation and says so. Each measurement
 //! is a scalar update behind a five-sigma gate; a gate shut for a fifth of a second opens with
-//! the covariance reset, or a stale filter would never come back.
+//! the filter started again from the measured speed, or a stale one would never come back.
 //!
 //! `va` and `Qd` are not separable from shaft speed alone: their standard errors then stay near the
 //! prior and their correlation near one. Thrust, flow, or speed variation parts them.
@@ -191,9 +191,17 @@ impl Belief {
             && let Some(speed) = input.measured.shaft_speed_rad_s
         {
             self.started = true;
+            self.x[SWIRL] = 0.0;
             (self.x[SPEED], self.x[FILTERED]) = (speed, speed);
             self.x[FLOW] = input.model.map.flow_m * speed;
         }
+    }
+
+    /// Forgets what it believed: the next measured speed starts it again, at the prior's doubt.
+    fn restart(&mut self) {
+        self.p = Matrix::from_diagonal(&self.noise.prior);
+        (self.x[AMBIENT], self.x[LOAD]) = (0.0, 0.0);
+        self.started = false;
     }
 
     /// Scalar update with sensitivities `ph = P h`, innovation variance `s`; Joseph form, expanded.
@@ -206,7 +214,7 @@ impl Belief {
             }
             Verdict::Reset => {
                 self.gated += 1;
-                self.p = Matrix::from_diagonal(&self.noise.prior);
+                self.restart();
                 return;
             }
         }
@@ -239,6 +247,9 @@ impl Belief {
                     self.p[(j, i)] *= scale;
                 }
             }
+        }
+        if !self.x.iter().all(|x| x.is_finite()) {
+            self.x = Vector::zeros();
         }
         let boxed = water_of(&self.x).boxed(model);
         put_back(&mut self.x, &boxed);
@@ -357,6 +368,11 @@ fn transition(model: &ControlModel, x: &Vector, noise: &Noise, dt: f64) -> Matri
     }
     a[(AMBIENT, AMBIENT)] = -1.0 / noise.ambient_time_s;
     a[(LOAD, LOAD)] = -1.0 / noise.load_time_s;
+    // As implicit as the step itself.
+    let swirl_step = 1.0 / (1.0 - dt * a[(SWIRL, SWIRL)]);
+    for j in 0..N {
+        a[(SWIRL, j)] *= swirl_step;
+    }
     let step = a * dt;
     let mut f = Matrix::identity() + step + step * step * 0.5;
     let keep = filter_keep(model, dt);

@@ -144,8 +144,9 @@ struct Water {
     load_n_m: f64,
 }
 
-/// Rates of shaft, flow and swirl.
-type Rates = [f64; 3];
+/// Rates of shaft, flow and swirl, and how fast the swirl is washed out, 1/s: a light swirl is
+/// stiffer than the rest and takes a step that is implicit in it.
+type Rates = [f64; 4];
 
 impl Water {
     fn rates(&self, model: &ControlModel, motor_n_m: f64) -> Rates {
@@ -155,6 +156,7 @@ impl Water {
                 / model.inertia_kg_m2,
             model.flow_acceleration(load.thrust_n, self.flow_m_s, self.ambient_m_s),
             model.swirl_acceleration(load.torque_n_m, self.flow_m_s, self.swirl_m_s),
+            model.swirl_decay_per_s(self.flow_m_s),
         ]
     }
 
@@ -162,7 +164,7 @@ impl Water {
         Self {
             speed_rad_s: self.speed_rad_s + rates[0] * dt_s,
             flow_m_s: self.flow_m_s + rates[1] * dt_s,
-            swirl_m_s: self.swirl_m_s + rates[2] * dt_s,
+            swirl_m_s: self.swirl_m_s + rates[2] * dt_s / (1.0 + rates[3] * dt_s),
             ..*self
         }
     }
@@ -184,6 +186,10 @@ impl Water {
         let speed = 2.0 * model.speed_max_rad_s;
         let flow = 3.0 * model.map.flow_m * model.speed_max_rad_s + 4.0;
         let load = 0.5 * model.torque_constant_nm_a * model.current_limit_a;
+        let sum = self.speed_rad_s + self.flow_m_s + self.swirl_m_s + self.ambient_m_s + self.load_n_m;
+        if !sum.is_finite() {
+            return Self::default();
+        }
         self.speed_rad_s = self.speed_rad_s.clamp(-speed, speed);
         self.flow_m_s = self.flow_m_s.clamp(-flow, flow);
         self.swirl_m_s = self.swirl_m_s.clamp(-flow, flow);
