@@ -146,6 +146,7 @@ impl<'a> Search<'a> {
             let leader = best.effect.id;
             self.problem.place_edges(&best.fit.hypothesis, &best.fit.values);
             self.problem.learn_noise(&best.fit.hypothesis, &best.fit.values);
+            let base = criterion(&before);
             let worth = base - candidates[0].criterion;
             candidates.retain(|c| base - c.criterion > 0.2 * worth);
             before = self.again(&before);
