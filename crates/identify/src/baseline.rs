@@ -147,3 +147,48 @@ pub fn with_effect(
 fn shape_sigma(at: f64, low: f64, high: f64) -> f64 {
     (0.7 * at.abs()).max(0.02 * (high - low)).min(0.5 * (high - low))
 }
+
+/// An effect with values at which it enters a hypothesis.
+pub type Member = (&'static Descriptor, Vec<f64>);
+
+/// The members of a fitted hypothesis, with their values.
+pub fn members(problem: &crate::fit::Problem, fit: &crate::fit::Fit) -> Vec<Member> {
+    let (_, effects) = problem.assemble(&fit.hypothesis, &fit.values);
+    fit.hypothesis.effects.iter().copied().zip(effects).collect()
+}
+
+/// The same baseline, at a fit's values, with other members; derivative columns that carry over
+/// come with it.
+pub fn recompose(
+    fit: &crate::fit::Fit,
+    members: &[Member],
+    scale: &Scale,
+) -> (Hypothesis, Vec<Option<std::sync::Arc<crate::fit::Stack>>>) {
+    let base: Vec<usize> =
+        (0..fit.values.len()).filter(|k| matches!(fit.hypothesis.free[*k].target, Target::Base(_))).collect();
+    let values: Vec<f64> = base.iter().map(|k| fit.values[*k]).collect();
+    let mut hypothesis = Hypothesis {
+        effects: Vec::new(),
+        free: base.iter().map(|k| fit.hypothesis.free[*k].clone()).collect(),
+        start: values,
+        fixed: Vec::new(),
+    };
+    for (effect, at) in members {
+        let values = hypothesis.start.clone();
+        hypothesis = with_effect(&hypothesis, &values, effect, scale, Some(at));
+    }
+    let key = |h: &Hypothesis, target: Target| match target {
+        Target::Base(p) => (p.name(), usize::MAX),
+        Target::Effect(i, j) => (h.effects[i].id, j),
+    };
+    let columns = hypothesis
+        .free
+        .iter()
+        .map(|free| {
+            let wanted = key(&hypothesis, free.target);
+            let at = fit.hypothesis.free.iter().position(|f| key(&fit.hypothesis, f.target) == wanted)?;
+            fit.columns[at].clone()
+        })
+        .collect();
+    (hypothesis, columns)
+}

@@ -62,6 +62,7 @@ pub struct Hypothesis {
 }
 
 /// Everything that stays the same while hypotheses are compared.
+#[derive(Clone)]
 pub struct Problem<'a> {
     /// Baseline model.
     pub model: ModelName,

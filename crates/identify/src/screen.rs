@@ -70,6 +70,17 @@ impl Projector {
         Self { inverse, gradient, scale, jacobian }
     }
 
+    /// Standard error of every free parameter; zero for one at its bound.
+    pub fn std_errors(&self) -> Vec<f64> {
+        (0..self.scale.len()).map(|k| self.inverse[(k, k)].max(0.0).sqrt() * self.scale[k]).collect()
+    }
+
+    /// Covariance of the free parameters.
+    pub fn covariance(&self) -> DMatrix<f64> {
+        let n = self.scale.len();
+        DMatrix::from_fn(n, n, |i, j| self.inverse[(i, j)] * self.scale[i] * self.scale[j])
+    }
+
     /// Gram matrix and gradient of directions after the projection.
     fn project(&self, fit: &Fit, directions: &[DVector<f64>]) -> (DMatrix<f64>, DVector<f64>) {
         let d = DMatrix::from_columns(directions);
