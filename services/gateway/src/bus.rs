@@ -1,0 +1,233 @@
+//! The bridge: shared memory on one side, latest values, windows and commands on the other.
+//!
+//! iceoryx2's ports belong to one thread and know no async, so this thread owns them. It sends every
+//! thruster's setpoint anew each heartbeat: silence means the gateway is gone, and the controller
+//! then goes to zero by itself.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, mpsc};
+use std::time::{Duration, Instant};
+
+use kort_proto::messages::{Reply, Setpoint as SetpointMessage, SetpointKind, Telemetry};
+use kort_proto::transport::{Deployment, GatewayPorts, Ticker, TransportError, monotonic_ns, realtime};
+
+use crate::record::Recorder;
+use crate::tally::Tally;
+use crate::thruster::{ANSWER_WITHIN, Ask, Thruster};
+use crate::view::Setpoint;
+
+/// Ports that cannot be opened, or that belong to a past generation, are tried again this often.
+const REOPEN_EVERY: Duration = Duration::from_millis(100);
+
+/// Below servo and controller, above everything that may wait.
+const PRIORITY: i32 = 60;
+
+/// One thruster's way through shared memory.
+pub struct Link {
+    /// Desk and latest values.
+    pub thruster: Arc<Thruster>,
+    /// Windows and counters for the metrics.
+    pub tally: Arc<Tally>,
+    /// Requests from the routes.
+    pub asks: mpsc::Receiver<Ask>,
+    /// Period of the heartbeat.
+    pub heartbeat: Duration,
+}
+
+/// Runs until `stop` is set.
+pub fn run(deployment: &Deployment, links: Vec<Link>, recorder: &Recorder, stop: &AtomicBool) {
+    for warning in realtime(PRIORITY, false) {
+        tracing::warn!("{warning}");
+    }
+    let period = links.iter().map(|link| link.heartbeat).min().unwrap_or(Duration::from_millis(4));
+    let mut bridges: Vec<Bridge> = links.into_iter().map(Bridge::new).collect();
+    let mut ticker = Ticker::new(period.as_nanos() as u64);
+    while !stop.load(Ordering::Relaxed) {
+        for bridge in &mut bridges {
+            bridge.tick(deployment, recorder);
+            bridge.link.tally.gateway_timing(&ticker.timing);
+        }
+        ticker.wait();
+    }
+}
+
+struct Bridge {
+    link: Link,
+    ports: Option<GatewayPorts>,
+    checked: Option<Instant>,
+    complaint: String,
+    pending: Vec<Pending>,
+    next_ask: u64,
+    last_servo_sequence: (u64, u64),
+}
+
+/// A request that waits for its answers.
+struct Pending {
+    id: u64,
+    since: Instant,
+    ask: Ask,
+    replies: Vec<Reply>,
+}
+
+impl Bridge {
+    fn new(link: Link) -> Bridge {
+        Bridge {
+            link,
+            ports: None,
+            checked: None,
+            complaint: String::new(),
+            pending: Vec::new(),
+            next_ask: 1,
+            last_servo_sequence: (0, 0),
+        }
+    }
+
+    fn tick(&mut self, deployment: &Deployment, recorder: &Recorder) {
+        let now = Instant::now();
+        if self.checked.is_none_or(|at| now.duration_since(at) >= REOPEN_EVERY) {
+            self.checked = Some(now);
+            self.link.thruster.hear(|_| {}); // silence too is news: what was rendered is no longer so
+            self.keep_open(deployment);
+        }
+        let Some(mut ports) = self.ports.take() else {
+            self.answer_overdue(now);
+            return;
+        };
+        self.receive(&ports, recorder, now);
+        let sent = self.send_asks(&mut ports, now).and_then(|()| ports.setpoint.send(self.setpoint(now)));
+        self.answer_overdue(now);
+        match sent {
+            Ok(()) => self.ports = Some(ports),
+            Err(error) => self.complain(error),
+        }
+    }
+
+    /// Opens the ports of the deployment's present generation.
+    fn keep_open(&mut self, deployment: &Deployment) {
+        let generation = deployment.generation();
+        if generation.is_some() && self.ports.as_ref().map(|ports| ports.generation) == generation {
+            return;
+        }
+        self.ports = None;
+        match GatewayPorts::open(deployment, &self.link.thruster.id) {
+            Ok(ports) => {
+                tracing::info!(
+                    thruster = self.link.thruster.id,
+                    generation = ports.generation,
+                    "shared memory is open"
+                );
+                self.complaint.clear();
+                self.ports = Some(ports);
+            }
+            Err(error) => self.complain(error),
+        }
+    }
+
+    /// Says what is wrong once, not at every try.
+    fn complain(&mut self, error: TransportError) {
+        let words = error.to_string();
+        if words != self.complaint {
+            tracing::warn!(thruster = self.link.thruster.id, "{words}");
+            self.complaint = words;
+        }
+    }
+
+    fn receive(&mut self, ports: &GatewayPorts, recorder: &Recorder, now: Instant) {
+        let thruster = &self.link.thruster;
+        let mut last: Option<Telemetry> = None;
+        while let Some(telemetry) = ports.telemetry.next() {
+            let (session, sequence) = (telemetry.header.session, telemetry.header.sequence);
+            let known = self.last_servo_sequence;
+            if session < known.0 || (session == known.0 && sequence <= known.1) {
+                continue;
+            }
+            let lost = if session == known.0 { sequence - known.1 - 1 } else { 0 };
+            self.last_servo_sequence = (session, sequence);
+            self.link.tally.telemetry(&telemetry, lost);
+            recorder.offer(&thruster.id, &telemetry, lost);
+            last = Some(telemetry);
+        }
+        let state = ports.state.latest();
+        if let Some(state) = &state {
+            self.link.tally.controller(state);
+        }
+        if last.is_some() || state.is_some() {
+            thruster.hear(|heard| {
+                if let Some(telemetry) = last {
+                    heard.servo = Some((now, telemetry));
+                }
+                if let Some(state) = state {
+                    heard.controller = Some((now, state));
+                }
+            });
+        }
+        while let Some(reply) = ports.reply.next() {
+            if reply.to_session == ports.request.session()
+                && let Some(pending) = self.pending.iter_mut().find(|pending| pending.id == reply.id)
+            {
+                pending.replies.push(reply);
+            }
+        }
+        let (complete, waiting) = std::mem::take(&mut self.pending).into_iter().partition(Pending::complete);
+        self.pending = waiting;
+        complete.into_iter().for_each(Pending::finish);
+    }
+
+    fn send_asks(&mut self, ports: &mut GatewayPorts, now: Instant) -> Result<(), TransportError> {
+        while let Ok(mut ask) = self.link.asks.try_recv() {
+            ask.request.id = self.next_ask;
+            self.next_ask += 1;
+            let request = ask.request;
+            self.pending.push(Pending { id: request.id, since: now, ask, replies: Vec::new() });
+            ports.request.send(request)?;
+        }
+        Ok(())
+    }
+
+    fn answer_overdue(&mut self, now: Instant) {
+        if self.ports.is_none() {
+            while let Ok(ask) = self.link.asks.try_recv() {
+                let _ = ask.answer.send(Vec::new());
+            }
+        }
+        let (over, waiting) = std::mem::take(&mut self.pending)
+            .into_iter()
+            .partition(|pending| now.duration_since(pending.since) >= ANSWER_WITHIN);
+        self.pending = waiting;
+        over.into_iter().for_each(Pending::finish);
+    }
+
+    /// What the desk asks for now. A disarmed thruster is asked for nothing, so that arming starts at rest.
+    fn setpoint(&self, now: Instant) -> SetpointMessage {
+        let heard = self.link.thruster.heard();
+        let mut desk = self.link.thruster.desk();
+        desk.expire(now);
+        if !heard.armed(now) {
+            desk.rest();
+        }
+        let (kind, value) = match desk.setpoint() {
+            Some(Setpoint::ThrustN(value)) => (SetpointKind::Thrust, value),
+            Some(Setpoint::SpeedRadS(value)) => (SetpointKind::Speed, value),
+            None => (SetpointKind::Zero, 0.0),
+        };
+        let lease_until_ns =
+            desk.lease.current(now).map_or(0, |lease| monotonic_ns() + lease.expires_in_ms(now) * 1_000_000);
+        SetpointMessage {
+            generation: desk.generation(),
+            lease_until_ns,
+            kind: kind as u32,
+            value,
+            ..SetpointMessage::default()
+        }
+    }
+}
+
+impl Pending {
+    fn complete(&self) -> bool {
+        self.ask.expects.iter().all(|process| self.replies.iter().any(|reply| reply.from == *process as u32))
+    }
+
+    fn finish(self) {
+        let _ = self.ask.answer.send(self.replies);
+    }
+}

@@ -1,0 +1,180 @@
+//! Who may command: one holder at a time, for a bounded time, renewed by every accepted command.
+//!
+//! Pure: the caller hands in the time, so expiry is tested without waiting.
+
+use std::time::{Duration, Instant};
+
+use crate::problem::{Kind, Problem};
+
+/// Life of a lease when the request names none, ms.
+pub const TTL_DEFAULT_MS: u64 = 500;
+/// Longest life a lease can be given, ms.
+pub const TTL_MAX_MS: u64 = 60_000;
+
+/// A lease in force.
+#[derive(Clone, Debug)]
+pub struct Lease {
+    /// Secret of the holder; whoever shows it may command.
+    pub id: String,
+    /// Name the holder gave itself.
+    pub holder: String,
+    ttl: Duration,
+    expires: Instant,
+}
+
+impl Lease {
+    /// Time left, ms; at least 1 while the lease is in force.
+    pub fn expires_in_ms(&self, now: Instant) -> u64 {
+        (self.expires.saturating_duration_since(now).as_millis() as u64).max(1)
+    }
+}
+
+/// The lease of one thruster, taken or free.
+#[derive(Debug, Default)]
+pub struct LeaseDesk {
+    lease: Option<Lease>,
+    granted: u64,
+    expired: u64,
+}
+
+impl LeaseDesk {
+    /// The lease in force, if any.
+    pub fn current(&self, now: Instant) -> Option<&Lease> {
+        self.lease.as_ref().filter(|lease| now < lease.expires)
+    }
+
+    /// Drops a lease whose time is over; true if one was dropped.
+    pub fn expire(&mut self, now: Instant) -> bool {
+        let over = self.lease.as_ref().is_some_and(|lease| now >= lease.expires);
+        if over {
+            self.lease = None;
+            self.expired += 1;
+        }
+        over
+    }
+
+    /// Leases granted and leases that ran out since start.
+    pub fn counts(&self) -> (u64, u64) {
+        (self.granted, self.expired)
+    }
+
+    /// Takes command, if nobody has it.
+    pub fn take(
+        &mut self,
+        thruster: &str,
+        holder: &str,
+        ttl_ms: u64,
+        now: Instant,
+    ) -> Result<Lease, Problem> {
+        self.expire(now);
+        if let Some(lease) = &self.lease {
+            return Err(held(thruster, lease, now));
+        }
+        let ttl = Duration::from_millis(ttl_ms);
+        let id = format!("{:032x}", rand::random::<u128>());
+        self.granted += 1;
+        Ok(self.lease.insert(Lease { id, holder: holder.to_owned(), ttl, expires: now + ttl }).clone())
+    }
+
+    /// Renews the lease this id names; every accepted command does so.
+    pub fn renew(&mut self, thruster: &str, id: Option<&str>, now: Instant) -> Result<Lease, Problem> {
+        self.check(thruster, id, now)?;
+        let lease = self.lease.as_mut().expect("check found it");
+        lease.expires = now + lease.ttl;
+        Ok(lease.clone())
+    }
+
+    /// Gives command up.
+    pub fn give(&mut self, thruster: &str, id: Option<&str>, now: Instant) -> Result<(), Problem> {
+        self.check(thruster, id, now)?;
+        self.lease = None;
+        Ok(())
+    }
+
+    /// Is this the lease in force?
+    pub fn check(&mut self, thruster: &str, id: Option<&str>, now: Instant) -> Result<(), Problem> {
+        self.expire(now);
+        match (&self.lease, id) {
+            (Some(lease), Some(id)) if lease.id == id => Ok(()),
+            (Some(lease), Some(_)) => Err(held(thruster, lease, now)),
+            (None, Some(_)) => Err(Problem::new(
+                Kind::LeaseLost,
+                format!("this lease on {thruster} ran out or was given up"),
+            )
+            .hint(format!(
+                "POST /v1/thrusters/{thruster}/lease takes a new one; command faster than its ttl_ms"
+            ))),
+            (lease, None) => {
+                let problem = Problem::new(Kind::LeaseRequired, "header Lease-Id is missing").hint(format!(
+                    "POST /v1/thrusters/{thruster}/lease, then send its lease_id as header Lease-Id"
+                ));
+                Err(match lease {
+                    Some(lease) => problem.holder(&lease.holder),
+                    None => problem,
+                })
+            }
+        }
+    }
+}
+
+fn held(thruster: &str, lease: &Lease, now: Instant) -> Problem {
+    let (holder, left_ms) = (&lease.holder, lease.expires_in_ms(now));
+    Problem::new(
+        Kind::LeaseHeld,
+        format!("thruster {thruster} is commanded by \"{holder}\" for another {left_ms} ms"),
+    )
+    .hint("wait until it ends, or ask the holder to DELETE it")
+    .holder(holder)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn ms(n: u64) -> Duration {
+        Duration::from_millis(n)
+    }
+
+    #[test]
+    fn a_second_holder_is_refused_with_the_name_of_the_first() {
+        let (mut desk, t0) = (LeaseDesk::default(), Instant::now());
+        desk.take("t1", "bench", 500, t0).unwrap();
+        let problem = desk.take("t1", "other", 500, t0 + ms(499)).unwrap_err();
+        let text = serde_json::to_string(&problem).unwrap();
+        assert!(text.contains(r#""holder":"bench""#) && text.contains("409"), "{text}");
+        desk.take("t1", "other", 500, t0 + ms(500)).expect("free once the first ran out");
+    }
+
+    #[test]
+    fn a_renewed_lease_lives_on_and_a_lost_one_does_not_come_back() {
+        let (mut desk, t0) = (LeaseDesk::default(), Instant::now());
+        let lease = desk.take("t1", "bench", 100, t0).unwrap();
+        for step in 1..50 {
+            desk.renew("t1", Some(&lease.id), t0 + ms(99 * step)).unwrap();
+        }
+        let late = t0 + ms(99 * 49 + 100);
+        assert!(desk.renew("t1", Some(&lease.id), late).is_err());
+        assert!(desk.renew("t1", Some(&lease.id), t0).is_err(), "an old instant must not revive it");
+    }
+
+    proptest! {
+        /// Whatever is tried in whatever order, at most one id is ever accepted at one instant.
+        #[test]
+        fn at_most_one_commander(steps in prop::collection::vec((0u64..3, 0usize..4, 1u64..300), 1..80)) {
+            let (mut desk, mut now) = (LeaseDesk::default(), Instant::now());
+            let mut ids: Vec<String> = vec!["made-up".into()];
+            for (action, who, wait) in steps {
+                now += ms(wait);
+                match action {
+                    0 => if let Ok(lease) = desk.take("t1", "x", 200, now) { ids.push(lease.id) },
+                    1 => { let _ = desk.renew("t1", ids.get(who).map(String::as_str), now); }
+                    _ => { let _ = desk.give("t1", ids.get(who).map(String::as_str), now); }
+                }
+                let accepted = ids.iter().filter(|id| desk.check("t1", Some(id), now).is_ok()).count();
+                prop_assert!(accepted <= 1);
+                prop_assert_eq!(accepted == 1, desk.current(now).is_some());
+            }
+        }
+    }
+}

@@ -1,0 +1,70 @@
+//! Arming, disarming, clearing faults. Each answers once servo and controller have done it.
+
+use std::sync::Arc;
+
+use axum::extract::State;
+use axum::response::Response;
+use utoipa_axum::{router::OpenApiRouter, routes};
+
+use super::thrusters::json;
+use crate::App;
+use crate::extract::{LeaseId, Path};
+use crate::problem::Problem;
+use crate::view::ThrusterState;
+
+pub fn routes() -> OpenApiRouter<Arc<App>> {
+    OpenApiRouter::new().routes(routes!(arm)).routes(routes!(disarm)).routes(routes!(clear_faults))
+}
+
+/// Arms the drive, at zero: only a setpoint that comes after moves it. A `Lease-Id`, if sent, must be in force.
+#[utoipa::path(post, path = "/v1/thrusters/{id}/arm", tag = "command",
+    params(("id" = String, Path, description = "Name of the thruster", example = "t1"),
+           ("Lease-Id" = Option<String>, Header, description = "The lease_id, for a commander who holds one")),
+    responses(
+        (status = 200, description = "Armed", body = ThrusterState),
+        (status = 400, description = "`malformed-header`", body = Problem, content_type = "application/problem+json"),
+        (status = 404, description = "`unknown-thruster`", body = Problem, content_type = "application/problem+json"),
+        (status = 409, description = "`fault-latched`, `lease-held`, `lease-lost`", body = Problem, content_type = "application/problem+json"),
+        (status = 503, description = "`not-ready`: servo or controller is away", body = Problem, content_type = "application/problem+json")))]
+async fn arm(
+    State(app): State<Arc<App>>,
+    Path(id): Path<String>,
+    LeaseId(lease_id): LeaseId,
+) -> Result<Response, Problem> {
+    let thruster = app.thruster(&id)?;
+    thruster.arm(lease_id.as_deref()).await?;
+    Ok(json(thruster.state_json()))
+}
+
+/// Disarms: zero torque at once. Anybody may, with or without the lease.
+#[utoipa::path(post, path = "/v1/thrusters/{id}/disarm", tag = "command",
+    params(("id" = String, Path, description = "Name of the thruster", example = "t1")),
+    responses(
+        (status = 200, description = "Disarmed", body = ThrusterState),
+        (status = 404, description = "`unknown-thruster`", body = Problem, content_type = "application/problem+json"),
+        (status = 503, description = "`not-ready`: the servo is away", body = Problem, content_type = "application/problem+json")))]
+async fn disarm(State(app): State<Arc<App>>, Path(id): Path<String>) -> Result<Response, Problem> {
+    let thruster = app.thruster(&id)?;
+    thruster.disarm().await?;
+    Ok(json(thruster.state_json()))
+}
+
+/// Clears latched faults whose cause is gone. The thruster stays disarmed.
+#[utoipa::path(post, path = "/v1/thrusters/{id}/clear-faults", tag = "command",
+    params(("id" = String, Path, description = "Name of the thruster", example = "t1"),
+           ("Lease-Id" = Option<String>, Header, description = "The lease_id, for a commander who holds one")),
+    responses(
+        (status = 200, description = "No fault is latched", body = ThrusterState),
+        (status = 400, description = "`malformed-header`", body = Problem, content_type = "application/problem+json"),
+        (status = 404, description = "`unknown-thruster`", body = Problem, content_type = "application/problem+json"),
+        (status = 409, description = "`fault-latched`: the cause is still there; `lease-held`, `lease-lost`", body = Problem, content_type = "application/problem+json"),
+        (status = 503, description = "`not-ready`: servo or controller is away", body = Problem, content_type = "application/problem+json")))]
+async fn clear_faults(
+    State(app): State<Arc<App>>,
+    Path(id): Path<String>,
+    LeaseId(lease_id): LeaseId,
+) -> Result<Response, Problem> {
+    let thruster = app.thruster(&id)?;
+    thruster.clear_faults(lease_id.as_deref()).await?;
+    Ok(json(thruster.state_json()))
+}

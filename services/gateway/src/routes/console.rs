@@ -1,0 +1,56 @@
+//! The operator's console: one self-contained page, put together once from its parts.
+
+use std::sync::{Arc, LazyLock};
+
+use axum::http::header;
+use axum::response::{Html, IntoResponse};
+use rust_embed::Embed;
+use utoipa_axum::{router::OpenApiRouter, routes};
+
+use crate::App;
+
+#[derive(Embed)]
+#[folder = "console/"]
+struct Parts;
+
+static PAGE: LazyLock<String> = LazyLock::new(|| {
+    let part = |name: &str| {
+        let file = Parts::get(name).unwrap_or_else(|| panic!("console/{name} is embedded at build time"));
+        String::from_utf8_lossy(&file.data).into_owned()
+    };
+    ["style.css", "plot.js", "console.js"]
+        .iter()
+        .fold(part("index.html"), |page, name| page.replace(&format!("/*{name}*/"), &part(name)))
+});
+
+/// What the page may load: itself, and nothing from elsewhere.
+const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; \
+    img-src 'self' data:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+
+pub fn routes() -> OpenApiRouter<Arc<App>> {
+    OpenApiRouter::new().routes(routes!(console))
+}
+
+/// The operator's console.
+#[utoipa::path(get, path = "/", tag = "console",
+    responses((status = 200, description = "One self-contained page", body = String, content_type = "text/html")))]
+async fn console() -> impl IntoResponse {
+    ([(header::CONTENT_SECURITY_POLICY, POLICY), (header::CACHE_CONTROL, "no-cache")], Html(PAGE.as_str()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::PAGE;
+
+    #[test]
+    fn the_page_is_whole_and_asks_nobody_else() {
+        assert!(
+            !PAGE.contains("/*style.css*/")
+                && !PAGE.contains("/*plot.js*/")
+                && !PAGE.contains("/*console.js*/")
+        );
+        for outside in ["src=\"http", "href=\"http", "@import", "url(http", "fetch(\"http"] {
+            assert!(!PAGE.contains(outside), "the console asks another host: {outside}");
+        }
+    }
+}

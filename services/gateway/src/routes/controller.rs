@@ -1,0 +1,108 @@
+//! Which control law runs, and its parameters.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use axum::extract::State;
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+use utoipa_axum::{router::OpenApiRouter, routes};
+
+use crate::App;
+use crate::extract::{Json, LeaseId, Path};
+use crate::problem::Problem;
+
+pub fn routes() -> OpenApiRouter<Arc<App>> {
+    OpenApiRouter::new().routes(routes!(get, put))
+}
+
+/// The control law that runs.
+#[derive(Serialize, ToSchema)]
+pub struct ControllerView {
+    /// Its name.
+    #[schema(example = "velocity_servo")]
+    pub controller: String,
+    /// Observer beside it.
+    pub observer: String,
+    /// Estimator beside it.
+    pub estimator: String,
+    /// Its parameters.
+    pub parameters: Vec<LawParameter>,
+    /// Every law that can be chosen.
+    pub available: Vec<String>,
+}
+
+/// A parameter of a control law.
+#[derive(Serialize, ToSchema)]
+pub struct LawParameter {
+    /// Name.
+    pub name: String,
+    /// Value in force.
+    pub value: Option<f64>,
+    /// SI unit.
+    pub unit: String,
+    /// Smallest allowed value; null if not bounded.
+    pub low: Option<f64>,
+    /// Largest allowed value; null if not bounded.
+    pub high: Option<f64>,
+}
+
+/// A law to switch to, parameters to change, or both.
+#[derive(Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+#[schema(example = json!({"controller": "velocity_servo"}))]
+pub struct ControllerRequest {
+    /// Law to switch to; left out keeps the present one.
+    #[serde(default, alias = "name")]
+    #[schema(min_length = 1, max_length = 32)]
+    pub controller: Option<String>,
+    /// Observer to switch to; left out keeps the present one.
+    #[serde(default)]
+    #[schema(min_length = 1, max_length = 32)]
+    pub observer: Option<String>,
+    /// Estimator to switch to; left out keeps the present one.
+    #[serde(default)]
+    #[schema(min_length = 1, max_length = 32)]
+    pub estimator: Option<String>,
+    /// Parameters to change, by name; the others keep their value.
+    #[serde(default)]
+    pub parameters: BTreeMap<String, f64>,
+}
+
+/// Which control law runs, its parameters, and the laws to choose from.
+#[utoipa::path(get, path = "/v1/thrusters/{id}/controller", tag = "command",
+    params(("id" = String, Path, description = "Name of the thruster", example = "t1")),
+    responses(
+        (status = 200, description = "The control law", body = ControllerView),
+        (status = 404, description = "`unknown-thruster`", body = Problem, content_type = "application/problem+json"),
+        (status = 503, description = "`not-ready`: the controller is away", body = Problem, content_type = "application/problem+json")))]
+async fn get(
+    State(app): State<Arc<App>>,
+    Path(id): Path<String>,
+) -> Result<axum::Json<ControllerView>, Problem> {
+    Ok(axum::Json(app.thruster(&id)?.controller()?))
+}
+
+/// Switches the control law, bumpless, also under way. A `Lease-Id`, if sent, must be in force.
+#[utoipa::path(put, path = "/v1/thrusters/{id}/controller", tag = "command", request_body = ControllerRequest,
+    params(("id" = String, Path, description = "Name of the thruster", example = "t1"),
+           ("Lease-Id" = Option<String>, Header, description = "The lease_id, for a commander who holds one")),
+    responses(
+        (status = 200, description = "The law that runs now", body = ControllerView),
+        (status = 400, description = "`malformed-json`, `malformed-body`, `malformed-header`", body = Problem, content_type = "application/problem+json"),
+        (status = 404, description = "`unknown-thruster`", body = Problem, content_type = "application/problem+json"),
+        (status = 409, description = "`refused`, `lease-held`, `lease-lost`", body = Problem, content_type = "application/problem+json"),
+        (status = 413, description = "`body-too-large`", body = Problem, content_type = "application/problem+json"),
+        (status = 415, description = "`unsupported-media-type`", body = Problem, content_type = "application/problem+json"),
+        (status = 422, description = "`unknown-controller`, `invalid-field`, `out-of-range`", body = Problem, content_type = "application/problem+json"),
+        (status = 503, description = "`not-ready`: the controller is away", body = Problem, content_type = "application/problem+json")))]
+async fn put(
+    State(app): State<Arc<App>>,
+    Path(id): Path<String>,
+    LeaseId(lease_id): LeaseId,
+    Json(request): Json<ControllerRequest>,
+) -> Result<axum::Json<ControllerView>, Problem> {
+    let thruster = app.thruster(&id)?;
+    thruster.set_controller(lease_id.as_deref(), &request).await?;
+    Ok(axum::Json(thruster.controller()?))
+}

@@ -1,0 +1,281 @@
+//! Metrics for Prometheus: base units, label `thruster`.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::time::Instant;
+
+use axum::extract::State;
+use axum::http::header;
+use axum::response::IntoResponse;
+use kort_proto::faults::Fault;
+use kort_proto::limits::Limit;
+use kort_proto::messages::{LATENESS_BOUNDS_NS, Timing};
+use prometheus::proto::{Bucket, Counter, Gauge, Histogram, LabelPair, Metric, MetricFamily, MetricType};
+use prometheus::{TEXT_FORMAT, TextEncoder};
+use utoipa_axum::{router::OpenApiRouter, routes};
+
+use crate::App;
+use crate::problem::{Kind, Problem};
+use crate::tally::Tally;
+use crate::thruster::Thruster;
+
+pub fn routes() -> OpenApiRouter<Arc<App>> {
+    OpenApiRouter::new().routes(routes!(metrics))
+}
+
+/// Metrics in Prometheus' text format. Fast signals come as smallest, mean and largest value of the last second.
+#[utoipa::path(get, path = "/metrics", tag = "health",
+    responses(
+        (status = 200, description = "Prometheus text format 0.0.4", body = String, content_type = "text/plain"),
+        (status = 500, description = "`internal`", body = Problem, content_type = "application/problem+json")))]
+async fn metrics(State(app): State<Arc<App>>) -> Result<impl IntoResponse, Problem> {
+    let families = gather(&app).into_families();
+    let text = TextEncoder::new()
+        .encode_to_string(&families)
+        .map_err(|e| Problem::new(Kind::Internal, e.to_string()))?;
+    Ok(([(header::CONTENT_TYPE, TEXT_FORMAT)], text))
+}
+
+fn gather(app: &App) -> Families {
+    let mut families = Families::default();
+    families.gauge(
+        "build_info",
+        "Always 1; the label says which kort runs.",
+        &[("version", env!("CARGO_PKG_VERSION"))],
+        1.0,
+    );
+    for (thruster, tally) in app.thrusters().iter().zip(app.tallies()) {
+        signals(&mut families, thruster, tally);
+        state(&mut families, thruster, tally);
+        loops(&mut families, thruster, tally);
+    }
+    let (recording, rows, lost) = app.recorder().progress();
+    families.gauge("recording_active", "Is a recording running?", &[], f64::from(recording));
+    families.counter("recording_rows_total", "Rows recorded since the gateway started.", &[], rows as f64);
+    families.counter(
+        "recording_lost_samples_total",
+        "Samples a recording missed since the gateway started.",
+        &[],
+        lost as f64,
+    );
+    for (class, count) in app.answers() {
+        families.counter(
+            "http_responses_total",
+            "Answers by class of status code.",
+            &[("class", class)],
+            count as f64,
+        );
+    }
+    families
+}
+
+/// One row of `proto/src/signals.rs` is one metric here.
+fn signals(families: &mut Families, thruster: &Thruster, tally: &Tally) {
+    for (metric, meaning, window) in tally.counts().windows() {
+        let Some(window) = window else { continue };
+        for (stat, value) in [("min", window.min), ("mean", window.mean), ("max", window.max)] {
+            families.gauge(metric, meaning, &[("thruster", &thruster.id), ("stat", stat)], value);
+        }
+    }
+}
+
+fn state(families: &mut Families, thruster: &Thruster, tally: &Tally) {
+    let now = Instant::now();
+    let (id, heard, counts) = (thruster.id.as_str(), thruster.heard(), tally.counts());
+    let label = [("thruster", id)];
+    let (servo, controller) = heard.alive(now);
+    for (process, alive) in [("servo", servo), ("controller", controller)] {
+        families.gauge(
+            "process_up",
+            "Is this process heard?",
+            &[("thruster", id), ("process", process)],
+            f64::from(alive),
+        );
+    }
+    families.gauge("armed", "Is the drive armed?", &label, f64::from(heard.armed(now)));
+
+    let latched = heard.faults(now);
+    for (fault, raised) in Fault::ALL.iter().zip(&counts.faults_raised) {
+        let labels = [("thruster", id), ("fault", fault.name())];
+        families.gauge(
+            "fault_latched",
+            "Is this fault latched?",
+            &labels,
+            f64::from(latched & fault.bit() != 0),
+        );
+        families.counter("faults_total", "Times this fault was raised.", &labels, *raised as f64);
+    }
+    let limits = heard.limits(now);
+    for limit in Limit::all() {
+        let active = f64::from(limits & limit.bit() != 0);
+        families.gauge(
+            "limit_active",
+            "Does this limit hold the thruster back?",
+            &[("thruster", id), ("limit", limit.name())],
+            active,
+        );
+    }
+
+    let desk = thruster.desk();
+    let left_s = desk.lease.current(now).map(|lease| lease.expires_in_ms(now) as f64 * 1e-3);
+    families.gauge("lease_held", "Has somebody the lease?", &label, f64::from(left_s.is_some()));
+    families.gauge("lease_remaining_seconds", "Life left of the lease.", &label, left_s.unwrap_or(0.0));
+    let (granted, expired) = desk.lease.counts();
+    families.counter("leases_granted_total", "Leases granted.", &label, granted as f64);
+    families.counter("leases_expired_total", "Leases that ran out.", &label, expired as f64);
+    families.counter("setpoints_accepted_total", "Setpoints accepted.", &label, desk.accepted() as f64);
+    drop(desk);
+
+    families.counter(
+        "telemetry_samples_total",
+        "Samples read from the servo.",
+        &label,
+        counts.telemetry.0 as f64,
+    );
+    families.counter(
+        "telemetry_lost_samples_total",
+        "Samples the gateway came too late for.",
+        &label,
+        counts.telemetry.1 as f64,
+    );
+    if let Some((_, telemetry)) = &heard.servo {
+        for (reason, count) in [("invalid", telemetry.commands_invalid), ("stale", telemetry.commands_stale)]
+        {
+            families.counter(
+                "commands_refused_total",
+                "Commands the servo refused.",
+                &[("thruster", id), ("reason", reason)],
+                count as f64,
+            );
+        }
+        families.gauge(
+            "thermal_load_ratio",
+            "Share of the I2t budget in use.",
+            &label,
+            telemetry.thermal_load,
+        );
+    }
+    if let Some((_, state)) = &heard.controller {
+        families.counter(
+            "setpoints_refused_total",
+            "Setpoints the controller refused.",
+            &label,
+            state.setpoints_invalid as f64,
+        );
+        families.gauge(
+            "controller_info",
+            "Always 1; the label says which law runs.",
+            &[("thruster", id), ("controller", state.law.as_str())],
+            1.0,
+        );
+        families.gauge(
+            "estimator_frozen",
+            "Is the estimator frozen for want of excitation?",
+            &label,
+            f64::from(state.estimator_frozen != 0),
+        );
+        for parameter in state.parameters.iter().take(state.parameter_count as usize) {
+            let labels =
+                [("thruster", id), ("parameter", parameter.name.as_str()), ("unit", parameter.unit.as_str())];
+            families.gauge(
+                "estimated_parameter",
+                "Estimate, in the unit the label names.",
+                &labels,
+                parameter.value,
+            );
+            families.gauge(
+                "estimated_parameter_error",
+                "Standard error of the estimate, in the unit the label names.",
+                &labels,
+                parameter.std_error,
+            );
+        }
+    }
+}
+
+fn loops(families: &mut Families, thruster: &Thruster, tally: &Tally) {
+    let heard = thruster.heard();
+    let loops = [
+        ("servo", heard.servo.map(|(_, t)| t.timing)),
+        ("controller", heard.controller.map(|(_, c)| c.timing)),
+        ("gateway", Some(tally.counts().gateway)),
+    ];
+    for (process, timing) in loops {
+        let Some(timing) = timing else { continue };
+        let labels = [("thruster", thruster.id.as_str()), ("process", process)];
+        families.gauge("loop_period_seconds", "Period of the loop.", &labels, timing.period_ns as f64 * 1e-9);
+        families.gauge("loop_busy_seconds", "Work of the last tick.", &labels, timing.busy_ns as f64 * 1e-9);
+        families.counter(
+            "loop_overruns_total",
+            "Ticks skipped because the loop came too late.",
+            &labels,
+            timing.overruns as f64,
+        );
+        families.lateness("loop_lateness_seconds", "How late the loop woke up.", &labels, &timing);
+    }
+}
+
+/// Metric families by name, in the order of names.
+#[derive(Default)]
+struct Families(BTreeMap<&'static str, MetricFamily>);
+
+impl Families {
+    fn gauge(&mut self, name: &'static str, help: &'static str, labels: &[(&str, &str)], value: f64) {
+        if value.is_finite() {
+            let mut gauge = Gauge::default();
+            gauge.set_value(value);
+            self.add(name, help, MetricType::GAUGE, labels).set_gauge(gauge);
+        }
+    }
+
+    fn counter(&mut self, name: &'static str, help: &'static str, labels: &[(&str, &str)], value: f64) {
+        let mut counter = Counter::default();
+        counter.set_value(value);
+        self.add(name, help, MetricType::COUNTER, labels).set_counter(counter);
+    }
+
+    fn lateness(&mut self, name: &'static str, help: &'static str, labels: &[(&str, &str)], timing: &Timing) {
+        let mut below = 0;
+        let buckets = LATENESS_BOUNDS_NS.iter().zip(timing.histogram).map(|(bound, count)| {
+            below += count;
+            let mut bucket = Bucket::default();
+            bucket.set_upper_bound(*bound as f64 * 1e-9);
+            bucket.set_cumulative_count(below);
+            bucket
+        });
+        let mut histogram = Histogram::default();
+        histogram.set_bucket(buckets.collect());
+        histogram.set_sample_count(timing.histogram.iter().sum());
+        histogram.set_sample_sum(timing.lateness_sum_ns as f64 * 1e-9);
+        self.add(name, help, MetricType::HISTOGRAM, labels).set_histogram(histogram);
+    }
+
+    fn add(
+        &mut self,
+        name: &'static str,
+        help: &'static str,
+        kind: MetricType,
+        labels: &[(&str, &str)],
+    ) -> &mut Metric {
+        let family = self.0.entry(name).or_insert_with(|| {
+            let mut family = MetricFamily::default();
+            family.set_name(format!("kort_{name}"));
+            family.set_help(help.to_owned());
+            family.set_field_type(kind);
+            family
+        });
+        let pairs = labels.iter().map(|(name, value)| {
+            let mut pair = LabelPair::default();
+            pair.set_name((*name).to_owned());
+            pair.set_value((*value).to_owned());
+            pair
+        });
+        let metrics = family.mut_metric();
+        metrics.push(Metric::from_label(pairs.collect()));
+        metrics.last_mut().expect("just pushed")
+    }
+
+    fn into_families(self) -> Vec<MetricFamily> {
+        self.0.into_values().collect()
+    }
+}

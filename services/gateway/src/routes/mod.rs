@@ -1,0 +1,98 @@
+//! The routes, a file per resource. Adding one: write `routes/<name>.rs`, register it here.
+
+mod arming;
+mod console;
+mod controller;
+mod docs;
+mod faults;
+mod health;
+mod lease;
+mod metrics;
+mod recordings;
+mod setpoint;
+mod stream;
+mod thrusters;
+
+pub use controller::{ControllerRequest, ControllerView, LawParameter};
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::Router;
+use axum::extract::{DefaultBodyLimit, Request, State};
+use axum::http::{StatusCode, header};
+use axum::middleware::{self, Next};
+use axum::response::{IntoResponse, Response};
+use tower_http::timeout::TimeoutLayer;
+use utoipa_axum::router::OpenApiRouter;
+
+use crate::problem::{Kind, Problem};
+use crate::{App, BODY_BYTES_MAX, openapi};
+
+/// Everything the gateway answers.
+pub fn router(app: Arc<App>) -> Router {
+    let (routes, mut document) = OpenApiRouter::with_openapi(openapi::opening())
+        .merge(thrusters::routes())
+        .merge(lease::routes())
+        .merge(arming::routes())
+        .merge(setpoint::routes())
+        .merge(controller::routes())
+        .merge(stream::routes())
+        .merge(recordings::routes())
+        .merge(faults::routes())
+        .merge(metrics::routes())
+        .merge(health::routes())
+        .merge(console::routes())
+        .split_for_parts();
+    openapi::finish(&mut document, &app);
+    routes
+        .merge(docs::routes(document))
+        .fallback(unknown_route)
+        .layer(DefaultBodyLimit::max(BODY_BYTES_MAX))
+        .layer(TimeoutLayer::with_status_code(StatusCode::REQUEST_TIMEOUT, Duration::from_secs(10)))
+        .layer(middleware::from_fn_with_state(Arc::clone(&app), problems_only))
+        .with_state(app)
+}
+
+async fn unknown_route(request: Request) -> Problem {
+    Problem::new(Kind::UnknownRoute, format!("there is no route {}", request.uri().path()))
+        .hint("GET /openapi.json lists every route; /docs shows them")
+}
+
+/// Errors that axum or a layer answers by itself (405, time-out, a missing page of the docs) become
+/// problem documents too; their headers, `Allow` above all, stay.
+async fn problems_only(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
+    let (method, path) = (request.method().clone(), request.uri().path().to_owned());
+    let response = next.run(request).await;
+    let status = response.status();
+    app.count_answer(status.as_u16());
+    if !(status.is_client_error() || status.is_server_error())
+        || response.headers().get(header::CONTENT_TYPE).is_some_and(|kind| kind == "application/problem+json")
+    {
+        return response;
+    }
+    let allow = response.headers().get(header::ALLOW).cloned();
+    let problem = match status {
+        StatusCode::METHOD_NOT_ALLOWED => {
+            let allowed = allow.as_ref().and_then(|value| value.to_str().ok()).unwrap_or("");
+            Problem::new(Kind::MethodNotAllowed, format!("{path} does not take {method}"))
+                .allowed(allowed.split(',').map(str::trim).filter(|method| !method.is_empty()))
+        }
+        StatusCode::REQUEST_TIMEOUT => {
+            Problem::new(Kind::RequestTimeout, format!("{method} {path} took over 10 s"))
+        }
+        StatusCode::NOT_FOUND => Problem::new(Kind::UnknownRoute, format!("there is nothing at {path}")),
+        StatusCode::PAYLOAD_TOO_LARGE => {
+            Problem::new(Kind::BodyTooLarge, format!("the body is larger than {BODY_BYTES_MAX} bytes"))
+        }
+        status if status.is_client_error() => {
+            Problem::new(Kind::MalformedBody, format!("{method} {path} was refused with {status}"))
+        }
+        _ => Problem::new(Kind::Internal, format!("{method} {path} ended with {status}")),
+    };
+    let mut answer = problem.into_response();
+    if let Some(allow) = allow {
+        answer.headers_mut().insert(header::ALLOW, allow);
+    }
+    answer
+}

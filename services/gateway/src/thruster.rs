@@ -1,0 +1,436 @@
+//! One thruster as the gateway sees it: what it asks (the desk) and what it last heard.
+
+use std::sync::{Mutex, MutexGuard, PoisonError, mpsc};
+use std::time::{Duration, Instant};
+
+use axum::body::Bytes;
+use kort_proto::faults::Fault;
+use kort_proto::limits::Limit;
+use kort_proto::messages::{
+    ControllerState, Outcome, PARAMETERS, Parameter, Process, Reply, Request, RequestKind, Telemetry,
+};
+use kort_proto::signals::Kind as SignalKind;
+use kort_proto::text::Text;
+use tokio::sync::oneshot;
+
+use crate::desk::{Desk, check_range};
+use crate::lease::Lease;
+use crate::problem::{Kind, Problem};
+use crate::routes::{ControllerRequest, ControllerView, LawParameter};
+use crate::view::{
+    Estimated, FaultView, LeaseView, LimitView, ParameterEstimate, Setpoint, SetpointRange, ThrusterState,
+    Values,
+};
+
+/// A process not heard for this long is away.
+pub const AWAY_AFTER: Duration = Duration::from_millis(300);
+/// Servo and controller answer a request within this time, or are taken to be away.
+pub const ANSWER_WITHIN: Duration = Duration::from_millis(700);
+
+/// Last word of servo and controller.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Heard {
+    /// Counts up with every sample.
+    pub version: u64,
+    /// The servo's last telemetry and when it came.
+    pub servo: Option<(Instant, Telemetry)>,
+    /// The controller's last state and when it came.
+    pub controller: Option<(Instant, ControllerState)>,
+}
+
+impl Heard {
+    fn telemetry(&self, now: Instant) -> Option<&Telemetry> {
+        self.servo
+            .as_ref()
+            .filter(|(at, _)| now.saturating_duration_since(*at) < AWAY_AFTER)
+            .map(|(_, heard)| heard)
+    }
+
+    fn controller(&self, now: Instant) -> Option<&ControllerState> {
+        self.controller
+            .as_ref()
+            .filter(|(at, _)| now.saturating_duration_since(*at) < AWAY_AFTER)
+            .map(|(_, heard)| heard)
+    }
+
+    /// Latched faults of both processes, as a bitset.
+    pub fn faults(&self, now: Instant) -> u64 {
+        self.telemetry(now).map_or(0, |t| t.faults) | self.controller(now).map_or(0, |c| c.faults)
+    }
+
+    /// Limits in force in both processes, as a bitset.
+    pub fn limits(&self, now: Instant) -> u64 {
+        self.telemetry(now).map_or(0, |t| t.limits) | self.controller(now).map_or(0, |c| c.limits)
+    }
+
+    /// Is the drive armed, as far as is known?
+    pub fn armed(&self, now: Instant) -> bool {
+        self.telemetry(now).is_some_and(|t| t.armed != 0)
+    }
+
+    /// Is the servo (the controller) heard?
+    pub fn alive(&self, now: Instant) -> (bool, bool) {
+        (self.telemetry(now).is_some(), self.controller(now).is_some())
+    }
+}
+
+/// A request on its way to servo and controller.
+#[derive(Debug)]
+pub struct Ask {
+    /// The message; the bus numbers it.
+    pub request: Request,
+    /// Who must answer.
+    pub expects: Vec<Process>,
+    /// Where the answers go; fewer than expected if time ran out.
+    pub answer: oneshot::Sender<Vec<Reply>>,
+}
+
+/// One thruster; shared by routes and bus.
+#[derive(Debug)]
+pub struct Thruster {
+    /// Name in the configuration.
+    pub id: String,
+    /// Largest setpoints.
+    pub range: SetpointRange,
+    desk: Mutex<Desk>,
+    heard: Mutex<Heard>,
+    asks: mpsc::SyncSender<Ask>,
+    rendered: Mutex<((u64, u64), Bytes)>,
+}
+
+/// A poisoned lock holds plain data that is still whole: no update here can stop half-way.
+pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Thruster {
+    /// A thruster nobody commands; the receiver belongs to the bus.
+    pub fn new(id: &str, range: SetpointRange) -> (Thruster, mpsc::Receiver<Ask>) {
+        let (asks, inbox) = mpsc::sync_channel(64);
+        let thruster = Thruster {
+            id: id.to_owned(),
+            range,
+            desk: Mutex::new(Desk::new(id)),
+            heard: Mutex::default(),
+            asks,
+            rendered: Mutex::new(((u64::MAX, u64::MAX), Bytes::new())),
+        };
+        (thruster, inbox)
+    }
+
+    /// The desk, for the bus and the metrics.
+    pub fn desk(&self) -> MutexGuard<'_, Desk> {
+        lock(&self.desk)
+    }
+
+    /// What was heard last.
+    pub fn heard(&self) -> Heard {
+        *lock(&self.heard)
+    }
+
+    /// The bus heard something.
+    pub fn hear(&self, update: impl FnOnce(&mut Heard)) {
+        let mut heard = lock(&self.heard);
+        update(&mut heard);
+        heard.version += 1;
+    }
+
+    /// Are servo and controller heard?
+    pub fn ready(&self) -> Result<(), Problem> {
+        let away = match self.heard().alive(Instant::now()) {
+            (true, true) => return Ok(()),
+            (false, true) => "the servo is",
+            (true, false) => "the controller is",
+            (false, false) => "servo and controller are",
+        };
+        Err(Problem::new(Kind::NotReady, format!("{away} not heard for thruster {}", self.id))
+            .hint("`kort up` restarts a process that died; its log says why it did"))
+    }
+
+    /// Takes command.
+    pub fn take_lease(&self, holder: &str, ttl_ms: u64) -> Result<(Lease, Instant), Problem> {
+        let now = Instant::now();
+        self.desk().take(holder, ttl_ms, now).map(|lease| (lease, now))
+    }
+
+    /// Renews the lease.
+    pub fn renew_lease(&self, id: Option<&str>) -> Result<(Lease, Instant), Problem> {
+        let now = Instant::now();
+        self.desk().renew(id, now).map(|lease| (lease, now))
+    }
+
+    /// Gives command up.
+    pub fn give_lease(&self, id: Option<&str>) -> Result<(), Problem> {
+        self.desk().give(id, Instant::now())
+    }
+
+    /// Puts a setpoint in force.
+    pub fn command(&self, lease: Option<&str>, setpoint: Setpoint) -> Result<(Lease, Instant), Problem> {
+        check_range(setpoint, self.range)?;
+        let now = Instant::now();
+        let heard = self.heard();
+        let mut desk = self.desk();
+        desk.renew(lease, now)?;
+        self.ready()?;
+        if let Some(fault) = Fault::in_set(heard.faults(now)).next() {
+            return Err(latched(fault));
+        }
+        if !heard.armed(now) {
+            return Err(Problem::new(
+                Kind::NotArmed,
+                format!("thruster {} is disarmed and takes no setpoint", self.id),
+            )
+            .hint(format!("POST /v1/thrusters/{}/arm first", self.id)));
+        }
+        desk.command(lease, setpoint, now).map(|lease| (lease, now))
+    }
+
+    /// Arms, at rest.
+    pub async fn arm(&self, lease: Option<&str>) -> Result<(), Problem> {
+        let now = Instant::now();
+        self.desk().may(lease, now)?;
+        self.ready()?;
+        if let Some(fault) = Fault::in_set(self.heard().faults(now)).next() {
+            return Err(latched(fault));
+        }
+        if !self.heard().armed(now) {
+            self.desk().rest();
+        }
+        self.ask(request(RequestKind::Arm), &[Process::Servo], Kind::Refused).await?;
+        self.settle(|heard, now| heard.armed(now)).await;
+        Ok(())
+    }
+
+    /// Disarms; the controller need not be there.
+    pub async fn disarm(&self) -> Result<(), Problem> {
+        self.desk().rest();
+        self.ask(request(RequestKind::Disarm), &[Process::Servo], Kind::Refused).await?;
+        self.settle(|heard, now| !heard.armed(now)).await;
+        self.desk().rest();
+        Ok(())
+    }
+
+    /// Clears latched faults.
+    pub async fn clear_faults(&self, lease: Option<&str>) -> Result<(), Problem> {
+        self.desk().may(lease, Instant::now())?;
+        self.ready()?;
+        self.ask(
+            request(RequestKind::ClearFaults),
+            &[Process::Servo, Process::Controller],
+            Kind::FaultLatched,
+        )
+        .await?;
+        self.settle(|heard, now| heard.faults(now) == 0).await;
+        Ok(())
+    }
+
+    /// The control law that runs.
+    pub fn controller(&self) -> Result<ControllerView, Problem> {
+        let heard = self.heard();
+        let Some(state) = heard.controller(Instant::now()) else {
+            return Err(Problem::new(Kind::NotReady, format!("the controller of {} is not heard", self.id)));
+        };
+        Ok(ControllerView {
+            controller: state.law.as_str().to_owned(),
+            observer: state.observer.as_str().to_owned(),
+            estimator: state.estimator.as_str().to_owned(),
+            parameters: (0..state.law_parameter_count as usize)
+                .filter_map(|index| state.law_parameters.get(index))
+                .map(|p| LawParameter {
+                    name: p.name.as_str().to_owned(),
+                    value: finite(p.value),
+                    unit: p.unit.as_str().to_owned(),
+                    low: finite(p.low),
+                    high: finite(p.high),
+                })
+                .collect(),
+            available: state
+                .laws
+                .iter()
+                .take(state.law_count as usize)
+                .map(|law| law.as_str().to_owned())
+                .collect(),
+        })
+    }
+
+    /// Switches the control law, or changes its parameters.
+    pub async fn set_controller(
+        &self,
+        lease: Option<&str>,
+        wanted: &ControllerRequest,
+    ) -> Result<(), Problem> {
+        self.desk().may(lease, Instant::now())?;
+        let now = self.controller()?;
+        if let Some(name) = &wanted.controller
+            && !now.available.contains(name)
+        {
+            return Err(Problem::new(Kind::UnknownController, format!("there is no control law {name:?}"))
+                .hint(format!("choose one of {}", now.available.join(", ")))
+                .allowed(now.available));
+        }
+        if wanted.parameters.len() > PARAMETERS {
+            return Err(Problem::new(
+                Kind::OutOfRange,
+                format!(
+                    "parameters has {} entries; at most {PARAMETERS} are allowed",
+                    wanted.parameters.len()
+                ),
+            ));
+        }
+        let mut message = request(RequestKind::SetController);
+        for (field, slot, name) in [
+            ("controller", &mut message.law, &wanted.controller),
+            ("observer", &mut message.observer, &wanted.observer),
+            ("estimator", &mut message.estimator, &wanted.estimator),
+        ] {
+            let Some(name) = name else { continue };
+            *slot = Text::new(name);
+            if name.is_empty() || slot.as_str() != name {
+                return Err(Problem::new(
+                    Kind::OutOfRange,
+                    format!("{field} = {name:?} must have 1 to 32 bytes"),
+                )
+                .hint("leave it out to keep the present one"));
+            }
+        }
+        message.parameter_count = wanted.parameters.len() as u32;
+        for (slot, (name, value)) in message.parameters.iter_mut().zip(&wanted.parameters) {
+            if Text::<32>::new(name).as_str() != name {
+                return Err(Problem::new(
+                    Kind::InvalidField,
+                    format!("parameters names {name:?}, which no law has"),
+                ));
+            }
+            *slot = Parameter { name: Text::new(name), value: *value, ..Parameter::default() };
+        }
+        self.ask(message, &[Process::Controller], Kind::Refused).await?;
+        let law = wanted.controller.clone().unwrap_or(now.controller);
+        self.settle(|heard, now| heard.controller(now).is_some_and(|state| state.law.as_str() == law)).await;
+        Ok(())
+    }
+
+    /// The thruster's state, rendered at most once for each sample heard.
+    pub fn state_json(&self) -> Bytes {
+        let now = Instant::now();
+        let heard = self.heard_version();
+        let mut rendered = lock(&self.rendered);
+        let key = {
+            let mut desk = self.desk();
+            desk.expire(now);
+            (heard, desk.version())
+        };
+        if rendered.0 != key {
+            *rendered = (key, serde_json::to_vec(&self.state(now)).unwrap_or_default().into());
+        }
+        rendered.1.clone()
+    }
+
+    fn heard_version(&self) -> u64 {
+        lock(&self.heard).version
+    }
+
+    fn state(&self, now: Instant) -> ThrusterState {
+        let heard = self.heard();
+        let (telemetry, controller) = (heard.telemetry(now), heard.controller(now));
+        let signals = telemetry.map(|t| t.signals).unwrap_or_default();
+        let desk = self.desk();
+        ThrusterState {
+            id: self.id.clone(),
+            armed: heard.armed(now),
+            controller: controller.map(|c| c.law.as_str().to_owned()).unwrap_or_default(),
+            observer: controller.map(|c| c.observer.as_str().to_owned()).filter(|name| !name.is_empty()),
+            estimator: controller.map(|c| c.estimator.as_str().to_owned()).filter(|name| !name.is_empty()),
+            estimator_frozen: controller.is_some_and(|c| c.estimator_frozen != 0),
+            setpoint: desk.setpoint().unwrap_or(Setpoint::ThrustN(0.0)),
+            range: self.range,
+            commanded: Values::of_signals(SignalKind::Command, &signals),
+            measured: Values::of_signals(SignalKind::Measured, &signals),
+            estimated: Estimated {
+                values: Values::of_estimates(&controller.map(|c| c.estimates).unwrap_or_default()),
+                parameters: controller.map(estimates).unwrap_or_default(),
+            },
+            faults: Fault::in_set(heard.faults(now))
+                .map(|fault| FaultView { code: fault.code(), name: fault.name(), help: fault.help() })
+                .collect(),
+            limits: Limit::in_set(heard.limits(now))
+                .map(|limit| LimitView {
+                    name: limit.name(),
+                    meaning: limit.meaning(),
+                    setting: limit.setting(),
+                })
+                .collect(),
+            lease: desk.lease.current(now).map(|lease| LeaseView {
+                holder: lease.holder.clone(),
+                expires_in_ms: lease.expires_in_ms(now),
+            }),
+            time_s: heard.servo.map_or(0.0, |(_, t)| t.time_ns as f64 * 1e-9),
+        }
+    }
+
+    /// Sends a request and waits for everybody's answer.
+    async fn ask(&self, request: Request, expects: &[Process], refused: Kind) -> Result<(), Problem> {
+        let (answer, answers) = oneshot::channel();
+        let ask = Ask { request, expects: expects.to_vec(), answer };
+        let replies = match self.asks.try_send(ask) {
+            Ok(()) => answers.await.unwrap_or_default(),
+            Err(_) => Vec::new(),
+        };
+        if let Some(reply) = replies.iter().find(|reply| reply.outcome != Outcome::Done as u32) {
+            let kind = if reply.outcome == Outcome::Invalid as u32 { Kind::InvalidField } else { refused };
+            let (detail, hint) = match reply.message.as_str().split_once("hint:") {
+                Some((detail, hint)) => (detail.trim().to_owned(), Some(hint.trim().to_owned())),
+                None => (reply.message.as_str().to_owned(), None),
+            };
+            let problem = Problem::new(kind, detail);
+            return Err(match hint {
+                Some(hint) => problem.hint(hint),
+                None => problem,
+            });
+        }
+        match expects.iter().find(|process| !replies.iter().any(|reply| reply.from == **process as u32)) {
+            None => Ok(()),
+            Some(silent) => Err(Problem::new(
+                Kind::NotReady,
+                format!("the {} did not answer within {} ms", silent.name(), ANSWER_WITHIN.as_millis()),
+            )
+            .hint("GET /readyz says whether it is there")),
+        }
+    }
+
+    /// Waits a moment until what was done shows in the state too.
+    async fn settle(&self, done: impl Fn(&Heard, Instant) -> bool) {
+        for _ in 0..100 {
+            if done(&self.heard(), Instant::now()) {
+                return;
+            }
+            tokio::time::sleep(Duration::from_millis(2)).await;
+        }
+    }
+}
+
+fn request(kind: RequestKind) -> Request {
+    Request { kind: kind as u32, ..Request::default() }
+}
+
+fn latched(fault: Fault) -> Problem {
+    Problem::new(
+        Kind::FaultLatched,
+        format!("fault {} {} is latched: {}", fault.code(), fault.name(), fault.help()),
+    )
+    .hint("POST …/clear-faults once the cause is gone, then …/arm")
+}
+
+fn finite(value: f64) -> Option<f64> {
+    value.is_finite().then_some(value)
+}
+
+fn estimates(state: &ControllerState) -> Vec<ParameterEstimate> {
+    (state.parameters.iter().take(state.parameter_count as usize))
+        .map(|p| ParameterEstimate {
+            name: p.name.as_str().to_owned(),
+            value: finite(p.value),
+            unit: p.unit.as_str().to_owned(),
+            std_error: finite(p.std_error),
+        })
+        .collect()
+}

@@ -1,0 +1,197 @@
+//! What the interface shows of a thruster: the JSON documents and their schemas.
+
+use kort_proto::signals::{ESTIMATES, Estimates, Kind, SIGNALS, Signals};
+use serde::ser::SerializeMap;
+use serde::{Deserialize, Serialize, Serializer};
+use utoipa::openapi::RefOr;
+use utoipa::openapi::schema::{ObjectBuilder, Schema, SchemaType, Type};
+use utoipa::{PartialSchema, ToSchema};
+
+/// Everything known of one thruster at one instant.
+#[derive(Clone, Debug, Serialize, ToSchema)]
+pub struct ThrusterState {
+    /// Name of the thruster in the configuration.
+    #[schema(example = "t1")]
+    pub id: String,
+    /// Is the drive armed? Disarmed means zero torque.
+    pub armed: bool,
+    /// Control law that runs.
+    #[schema(example = "velocity_servo")]
+    pub controller: String,
+    /// Observer that runs beside it; null while the controller is away.
+    #[schema(example = "ekf")]
+    pub observer: Option<String>,
+    /// Estimator that runs beside it; null while the controller is away.
+    pub estimator: Option<String>,
+    /// Is the estimator frozen for want of excitation?
+    pub estimator_frozen: bool,
+    /// Setpoint in force.
+    pub setpoint: Setpoint,
+    /// Largest magnitude a setpoint may have.
+    pub range: SetpointRange,
+    /// Commands on their way to the drive; null where this control law gives none.
+    #[schema(schema_with = commanded_schema)]
+    pub commanded: Values,
+    /// What the sensors show; null where it is not measured.
+    #[schema(schema_with = measured_schema)]
+    pub measured: Values,
+    /// What observer and estimator believe.
+    pub estimated: Estimated,
+    /// Latched faults.
+    pub faults: Vec<FaultView>,
+    /// Limits in force: no faults, they say what holds the thruster back now.
+    pub limits: Vec<LimitView>,
+    /// Who has command; null if nobody.
+    pub lease: Option<LeaseView>,
+    /// The servo's monotonic time of the measurements, s.
+    pub time_s: f64,
+}
+
+/// What is commanded: exactly one of the two.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+#[schema(example = json!({"thrust_n": 25.0}))]
+pub enum Setpoint {
+    /// Thrust, N; positive pushes ahead.
+    ThrustN(f64),
+    /// Shaft speed, rad/s; positive turns ahead.
+    SpeedRadS(f64),
+}
+
+/// Largest magnitude of each kind of setpoint.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, ToSchema)]
+pub struct SetpointRange {
+    /// Largest thrust either way, N.
+    pub thrust_n: f64,
+    /// Largest shaft speed either way, rad/s.
+    pub speed_rad_s: f64,
+}
+
+/// Beliefs of observer and estimator.
+#[derive(Clone, Debug, Serialize)]
+pub struct Estimated {
+    /// Estimated signals, by name.
+    #[serde(flatten)]
+    pub values: Values,
+    /// Estimated parameters.
+    pub parameters: Vec<ParameterEstimate>,
+}
+
+/// An estimated parameter.
+#[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
+pub struct ParameterEstimate {
+    /// Name.
+    #[schema(example = "lift_max")]
+    pub name: String,
+    /// Estimate.
+    pub value: Option<f64>,
+    /// SI unit.
+    pub unit: String,
+    /// Standard error; null if the estimator has none.
+    pub std_error: Option<f64>,
+}
+
+/// A latched fault.
+#[derive(Clone, Debug, Serialize, ToSchema)]
+pub struct FaultView {
+    /// Stable code.
+    #[schema(example = 4)]
+    pub code: u32,
+    /// Name.
+    #[schema(example = "command_timeout")]
+    pub name: &'static str,
+    /// What to do, in a line; `GET /v1/faults/{code}` tells it all.
+    pub help: &'static str,
+}
+
+/// A limit in force.
+#[derive(Clone, Debug, Serialize, ToSchema)]
+pub struct LimitView {
+    /// Name.
+    #[schema(example = "current")]
+    pub name: &'static str,
+    /// What it does.
+    pub meaning: &'static str,
+    /// The setting that holds it.
+    pub setting: &'static str,
+}
+
+/// Who has command.
+#[derive(Clone, Debug, Serialize, ToSchema)]
+pub struct LeaseView {
+    /// Name the holder gave itself.
+    #[schema(example = "bench")]
+    pub holder: String,
+    /// Life left, ms.
+    #[schema(minimum = 0, maximum = 60000)]
+    pub expires_in_ms: u64,
+}
+
+/// Signals by name, null where not measured; which ones is said by `proto/src/signals.rs`.
+#[derive(Clone, Debug, Default)]
+pub struct Values(Vec<(&'static str, f64)>);
+
+impl Values {
+    /// The signals of one kind.
+    pub fn of_signals(kind: Kind, signals: &Signals) -> Values {
+        Values(
+            SIGNALS.iter().filter(|row| row.kind == kind).map(|row| (row.name, (row.get)(signals))).collect(),
+        )
+    }
+
+    /// All estimates.
+    pub fn of_estimates(estimates: &Estimates) -> Values {
+        Values(ESTIMATES.iter().map(|row| (row.name, (row.get)(estimates))).collect())
+    }
+}
+
+impl Serialize for Values {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(Some(self.0.len()))?;
+        for (name, value) in &self.0 {
+            map.serialize_entry(name, &value.is_finite().then_some(value))?;
+        }
+        map.end()
+    }
+}
+
+fn values_object(rows: impl Iterator<Item = (&'static str, String)>) -> ObjectBuilder {
+    rows.fold(ObjectBuilder::new(), |object, (name, description)| {
+        object.property(name, nullable_number(&description)).required(name)
+    })
+}
+
+fn nullable_number(description: &str) -> RefOr<Schema> {
+    ObjectBuilder::new()
+        .schema_type(SchemaType::from_iter([Type::Number, Type::Null]))
+        .description(Some(description))
+        .into()
+}
+
+fn signals_schema(kind: Kind) -> RefOr<Schema> {
+    let rows = SIGNALS.iter().filter(|row| row.kind == kind);
+    values_object(rows.map(|row| (row.name, format!("{} Unit: {}.", row.meaning, row.unit)))).into()
+}
+
+fn commanded_schema() -> RefOr<Schema> {
+    signals_schema(Kind::Command)
+}
+
+fn measured_schema() -> RefOr<Schema> {
+    signals_schema(Kind::Measured)
+}
+
+impl PartialSchema for Estimated {
+    fn schema() -> RefOr<Schema> {
+        values_object(ESTIMATES.iter().map(|row| (row.name, format!("{} Unit: {}.", row.meaning, row.unit))))
+            .property("parameters", <Vec<ParameterEstimate>>::schema())
+            .required("parameters")
+            .into()
+    }
+}
+
+impl ToSchema for Estimated {
+    fn schemas(schemas: &mut Vec<(String, RefOr<Schema>)>) {
+        schemas.push((ParameterEstimate::name().into(), ParameterEstimate::schema()));
+    }
+}

@@ -1,0 +1,45 @@
+#!/usr/bin/env bash
+# Every test of kort. On a bare machine (Rust, a C compiler, root on Debian) it fetches what is missing:
+#   prometheus (real scrapes, promtool), chromium (the console), schemathesis (the API against its own OpenAPI).
+# Without root nothing is installed; what is absent is then left out, and the last lines say so.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+tools="${KORT_TEST_TOOLS:-$PWD/target/test-tools}"
+skipped=()
+
+say() { printf '\n== %s\n' "$*"; }
+
+# install PACKAGE…: with apt, when we are root on Debian.
+install() {
+  [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null || return 0
+  say "installing $*"
+  [ -n "${apt_updated:-}" ] || { apt-get update -qq || true; apt_updated=1; }
+  DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@" >/dev/null || true
+}
+
+# need COMMAND PACKAGE…: install when COMMAND is missing.
+need() {
+  local command=$1; shift
+  command -v "$command" >/dev/null || install "$@"
+  command -v "$command" >/dev/null || skipped+=("$command is not installed (Debian: $*)")
+}
+
+need cc build-essential
+need promtool prometheus
+need chromium chromium fonts-dejavu-core
+need python3 python3 python3-venv
+
+schemathesis="$tools/schemathesis/bin/schemathesis"
+if command -v python3 >/dev/null && [ ! -x "$schemathesis" ]; then
+  say "installing schemathesis into $tools"
+  python3 -m venv "$tools/schemathesis" >/dev/null 2>&1 ||
+    { install python3-venv; python3 -m venv "$tools/schemathesis" || true; }
+  "$tools/schemathesis/bin/pip" install -q 'schemathesis>=4,<5' || true
+fi
+if [ -x "$schemathesis" ]; then export KORT_SCHEMATHESIS="$schemathesis"; else skipped+=("schemathesis is not installed"); fi
+
+say "cargo test --workspace"
+cargo test --workspace --no-fail-fast
+
+say "all tests passed"
+for line in ${skipped[@]+"${skipped[@]}"}; do echo "not run: $line"; done
