@@ -5,8 +5,10 @@
 //! the residual looks like, what it is confused with, and what separates it; `kort explain`
 //! prints just that.
 
+use crate::blade::Inflow;
+use crate::parameters::Parameters;
 use crate::plant::{Balance, Drive, Foil, Local, Sensed, Tick};
-use crate::{blade::Inflow, parameters::Parameters, rig::Rig};
+use crate::rig::{AmplifierKind, Rig};
 
 /// Where an effect enters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
@@ -78,17 +80,24 @@ pub struct Spec {
     /// A shape parameter does nothing alone; the effect vanishes when all its strength
     /// parameters are zero.
     pub shape: bool,
+    /// Not to be fitted: a whole number or a grid. The starts try its values, a fit holds them.
+    pub held: bool,
 }
 
 impl Spec {
     /// A strength: the effect vanishes at zero.
     pub const fn strength(name: &'static str, unit: &'static str, start: f64, low: f64, high: f64) -> Self {
-        Self { name, unit, start, low, high, shape: false }
+        Self { name, unit, start, low, high, shape: false, held: false }
     }
 
     /// A shape: where, how fast, how sharp.
     pub const fn shape(name: &'static str, unit: &'static str, start: f64, low: f64, high: f64) -> Self {
-        Self { name, unit, start, low, high, shape: true }
+        Self { name, unit, start, low, high, shape: true, held: false }
+    }
+
+    /// A shape that a fit holds at its start.
+    pub const fn held(name: &'static str, unit: &'static str, start: f64, low: f64, high: f64) -> Self {
+        Self { name, unit, start, low, high, shape: true, held: true }
     }
 }
 
@@ -218,13 +227,60 @@ pub fn wet(rig: &Rig, _: &Available) -> Result<(), &'static str> {
 }
 
 /// Needs the shaft's torque balance: the shaft must be driven by current, voltage or torque.
-pub fn free_shaft(_: &Rig, available: &Available) -> Result<(), &'static str> {
+pub fn free_shaft(rig: &Rig, available: &Available) -> Result<(), &'static str> {
     if available.shaft_prescribed {
         Err("the recorded shaft speed drives the model, so the shaft's torque balance is not seen")
+    } else if rig.amplifier.kind == AmplifierKind::Speed && !available.current_prescribed {
+        Err(
+            "a speed drive holds the shaft and its current is not recorded, so the torque balance is not seen",
+        )
     } else {
         Ok(())
     }
 }
+
+/// Needs a command: a recorded current or speed that drives the model has the drive behind it.
+pub fn commanded(_: &Rig, available: &Available) -> Result<(), &'static str> {
+    if available.current_prescribed || available.shaft_prescribed {
+        Err(
+            "a recorded response drives the model, so what lies between command and that response is not seen",
+        )
+    } else {
+        Ok(())
+    }
+}
+
+/// Needs a measured thrust.
+pub fn thrust_measured(_: &Rig, available: &Available) -> Result<(), &'static str> {
+    if available.has("thrust_n") { Ok(()) } else { Err("thrust is not recorded") }
+}
+
+/// Needs a measured axial flow.
+pub fn flow_measured(_: &Rig, available: &Available) -> Result<(), &'static str> {
+    if available.has("flow_m_s") { Ok(()) } else { Err("axial flow is not recorded") }
+}
+
+/// Needs a measured shaft speed as a response.
+pub fn speed_measured(_: &Rig, available: &Available) -> Result<(), &'static str> {
+    if available.shaft_prescribed {
+        Err("the recorded shaft speed drives the model and is no response")
+    } else if !available.has("shaft_speed_rad_s") {
+        Err("shaft speed is not recorded")
+    } else {
+        Ok(())
+    }
+}
+
+/// Needs the recorded shaft angle: an integrated model speed loses the phase within seconds.
+pub fn angle_recorded(_: &Rig, available: &Available) -> Result<(), &'static str> {
+    if available.has("shaft_angle_rad") {
+        Ok(())
+    } else {
+        Err("the shaft angle is not recorded, so what follows the angle cannot be kept in phase")
+    }
+}
+
+mod memory;
 
 macro_rules! catalogue {
     ($($name:ident),* $(,)?) => {
@@ -235,10 +291,35 @@ macro_rules! catalogue {
 }
 
 catalogue! {
+    // C1: shaft friction and load
     coulomb_friction,
+    viscous_friction,
+    windage_drag,
+    rotor_inertia_error,
+    entrained_water_inertia,
+    // C2: drive and motor
+    amplifier_lag,
     transport_delay,
+    current_saturation,
+    torque_constant_saturation,
+    thermal_drift_kt,
+    voltage_limit_backemf,
+    supply_sag,
+    torque_ripple_cogging,
+    command_dead_band,
+    gear_backlash,
+    // C3: axial flow
+    ambient_axial_flow,
+    inertia_added_mass_error,
+    // C4: blades
     rotational_flow,
+    nonsinusoidal_lift_drag,
+    forward_reverse_asymmetry,
+    // C5: sensors and structure
     thrust_bias_gain_hysteresis,
+    thrust_sensor_lag,
+    flowmeter_offset_lag_location,
+    torque_channel_bias,
 }
 
 /// The effect with this identifier.

@@ -1,8 +1,7 @@
 //! Errors of the force sensor: zero, gain, drift, hysteresis.
 
-use super::{Available, Descriptor, Effect, Hooks, Path, Scale, Spec, one_start};
+use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, one_start, thrust_measured};
 use crate::plant::{Sensed, Tick};
-use crate::rig::Rig;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -29,11 +28,6 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
         Spec::strength("hysteresis_n", "N", 0.005 * t, 0.0, 0.2 * t),
         Spec::shape("hysteresis_width_n", "N", 0.1 * t, 0.01 * t, 0.5 * t),
     ]
-}
-
-/// Needs a measured thrust.
-pub(super) fn thrust_measured(_: &Rig, available: &Available) -> Result<(), &'static str> {
-    if available.has("thrust_n") { Ok(()) } else { Err("thrust is not recorded") }
 }
 
 struct ThrustSensor {

@@ -1,8 +1,8 @@
 //! A dead time between command and drive: bus, scheduler, serial line.
 
-use super::{Available, Descriptor, Effect, Hooks, Path, Scale, Spec, one_start};
+use super::memory::History;
+use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, commanded, one_start};
 use crate::plant::{Drive, Tick};
-use crate::rig::Rig;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -17,26 +17,16 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: one_start,
     needs: commanded,
-    build: |values, context| Box::new(TransportDelay { delay_s: values[0].max(0.0), tick_s: context.tick_s, past: Vec::new() }),
+    build: |values, context| Box::new(TransportDelay { delay_s: values[0], past: History::new(values[0], context.tick_s) }),
 };
 
 fn parameters(scale: &Scale) -> Vec<Spec> {
     vec![Spec::strength("delay_s", "s", 2.0 * scale.tick_s, 0.0, 0.2)]
 }
 
-/// Needs a command: a recorded current or speed that drives the model has the delay behind it.
-pub(super) fn commanded(_: &Rig, available: &Available) -> Result<(), &'static str> {
-    if available.current_prescribed || available.shaft_prescribed {
-        Err("a recorded response drives the model, so what lies between command and that response is not seen")
-    } else {
-        Ok(())
-    }
-}
-
 struct TransportDelay {
     delay_s: f64,
-    tick_s: f64,
-    past: Vec<f64>,
+    past: History,
 }
 
 impl Effect for TransportDelay {
@@ -44,17 +34,8 @@ impl Effect for TransportDelay {
         Hooks::DRIVE
     }
 
-    /// The delay is rounded up to ticks by mixing the two neighbours, so that the response is
-    /// continuous in the delay.
     fn drive(&mut self, _: &Tick, drive: &mut Drive) {
-        let ticks = self.delay_s / self.tick_s;
-        let whole = ticks.floor() as usize;
-        if self.past.is_empty() {
-            self.past = vec![drive.command; whole + 2];
-        }
-        self.past.rotate_right(1);
-        self.past[0] = drive.command;
-        let part = ticks - whole as f64;
-        drive.command = self.past[whole] * (1.0 - part) + self.past[whole + 1] * part;
+        self.past.push(drive.command);
+        drive.command = self.past.ago(self.delay_s);
     }
 }

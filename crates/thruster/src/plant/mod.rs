@@ -168,8 +168,8 @@ impl Plant {
         self.filters.speed_rad_s = shaft_speed_rad_s;
         self.at = self.local(0.0, &Tick::default());
         let (_, balance) = self.rates(&self.x, &self.at);
-        self.filters.last_thrust_n = balance.thrust_n;
-        self.filters.thrust_n = balance.thrust_n;
+        self.filters.last_thrust_n = balance.thrust_n + balance.stand_n;
+        self.filters.thrust_n = balance.thrust_n + balance.stand_n;
         self.filters.last_torque_n_m = balance.blade_torque_n_m;
         self.filters.torque_n_m = balance.blade_torque_n_m;
         self.observe(&Tick { time_s, ..Tick::default() }, &balance, false);
@@ -409,6 +409,7 @@ impl Plant {
             hooked.effect.foil(at, &x[hooked.own.clone()], &mut foil);
         }
         let q = foil.density_kg_m3 * c.half_area_m2 * foil.speed_m_s;
+        balance.foil = foil;
         balance.thrust_n = q * (foil.lift * ut - foil.drag * vp);
         balance.blade_torque_n_m = c.lever_m * q * (foil.lift * vp + foil.drag * ut);
     }
@@ -432,7 +433,8 @@ impl Plant {
                 _ => self.x[SPEED],
             };
             f.last_angle_rad = angle;
-            f.thrust_n = first_order(f.thrust_n, f.last_thrust_n, balance.thrust_n, dt, s.thrust_filter_hz);
+            let stand = balance.thrust_n + balance.stand_n;
+            f.thrust_n = first_order(f.thrust_n, f.last_thrust_n, stand, dt, s.thrust_filter_hz);
             f.torque_n_m = first_order(
                 f.torque_n_m,
                 f.last_torque_n_m,
@@ -440,7 +442,7 @@ impl Plant {
                 dt,
                 s.torque_filter_hz,
             );
-            f.last_thrust_n = balance.thrust_n;
+            f.last_thrust_n = stand;
             f.last_torque_n_m = balance.blade_torque_n_m;
         }
         let axial = match self.model {

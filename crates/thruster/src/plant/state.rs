@@ -106,7 +106,7 @@ pub struct Local {
 }
 
 /// The blade section at work.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Foil {
     /// Resultant speed `V`, m/s.
     pub speed_m_s: f64,
@@ -158,6 +158,10 @@ pub struct Balance {
     pub flux_kg_m: f64,
     /// Ambient axial flow, m/s.
     pub ambient_m_s: f64,
+    /// Force on the stand beyond the blades' thrust, N: seen by the force sensor, not by the water.
+    pub stand_n: f64,
+    /// The blade section these loads come from; all zero where the model has none or nothing moves.
+    pub foil: Foil,
 }
 
 /// What the sensors show, without noise; names are the recording's columns.

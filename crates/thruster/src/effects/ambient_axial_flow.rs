@@ -1,0 +1,50 @@
+//! The water already moves: current, towing, vehicle speed.
+
+use super::{Available, Descriptor, Effect, Hooks, Path, Scale, Spec, wet};
+use crate::plant::{Balance, Local};
+use crate::rig::Rig;
+
+/// Catalogue entry.
+pub const DESCRIPTOR: Descriptor = Descriptor {
+    id: "ambient_axial_flow",
+    path: Path::Flow,
+    what: "a steady current, towing or vehicle speed along the axis that the model takes as still water",
+    equation: "T = m vp' + dbeta rho a (vp - va)|vp|; va [m/s], positive when it feeds the propeller ahead",
+    signature: "thrust at a given speed is low one way and high the other, the more the lower the thrust: the deviation \
+                falls as 1/Om, while an asymmetry of the blades is a constant percentage",
+    confused_with: &["forward_reverse_asymmetry", "torque_channel_bias", "thrust_bias_gain_hysteresis", "tank_recirculation"],
+    separated_by: "a staircase in both directions; a towed run; a force bias leaves shaft speed alone",
+    reference: "equation (6a), derived from (4); physics.md C3",
+    parameters,
+    starts: |scale| vec![vec![-0.03 * scale.flow_m_s], vec![0.2 * scale.flow_m_s], vec![-0.2 * scale.flow_m_s]],
+    needs,
+    build: |values, _| Box::new(AmbientAxialFlow { ambient_m_s: values[0] }),
+};
+
+fn parameters(scale: &Scale) -> Vec<Spec> {
+    let full = scale.flow_m_s;
+    vec![Spec::strength("ambient_m_s", "m/s", 0.03 * full, -1.5 * full, 1.5 * full)]
+}
+
+pub(super) fn needs(rig: &Rig, available: &Available) -> Result<(), &'static str> {
+    wet(rig, available)?;
+    if available.has("ambient_m_s") {
+        Err("the ambient flow is recorded and already drives the model")
+    } else {
+        Ok(())
+    }
+}
+
+struct AmbientAxialFlow {
+    ambient_m_s: f64,
+}
+
+impl Effect for AmbientAxialFlow {
+    fn hooks(&self) -> Hooks {
+        Hooks::BALANCE
+    }
+
+    fn balance(&self, _: &Local, _: &[f64], balance: &mut Balance, _: &mut [f64]) {
+        balance.ambient_m_s += self.ambient_m_s;
+    }
+}

@@ -1,0 +1,40 @@
+//! The drive follows its command more slowly than stated.
+
+use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, commanded};
+use crate::plant::{Drive, Tick};
+
+/// Catalogue entry.
+pub const DESCRIPTOR: Descriptor = Descriptor {
+    id: "amplifier_lag",
+    path: Path::Drive,
+    what: "the current loop, or a speed controller's firmware, follows the command with a longer first-order lag than stated",
+    equation: "im' = (sat(i*) - im)/(ta + e); ta stated, e [s]",
+    signature: "every response to a command is late and rounded by a fixed time, at all amplitudes and speeds; \
+                a recorded current shows the lag itself",
+    confused_with: &["transport_delay", "encoder_filter_lag", "entrained_water_inertia", "clock_skew"],
+    separated_by: "a chirp: phase slope against roll-off; the recorded current",
+    reference: "physics.md C2",
+    parameters,
+    starts: |scale| [0.005_f64, 0.015, 0.05].iter().map(|lag| vec![lag.max(scale.tick_s)]).collect(),
+    needs: commanded,
+    build: |values, _| Box::new(AmplifierLag { extra_s: values[0] }),
+};
+
+/// Negative where the drive is faster than stated; a tenth of the stated lag stays.
+fn parameters(scale: &Scale) -> Vec<Spec> {
+    vec![Spec::strength("extra_lag_s", "s", 2.0 * scale.tick_s, -0.9 * scale.tick_s, 0.5)]
+}
+
+struct AmplifierLag {
+    extra_s: f64,
+}
+
+impl Effect for AmplifierLag {
+    fn hooks(&self) -> Hooks {
+        Hooks::DRIVE
+    }
+
+    fn drive(&mut self, _: &Tick, drive: &mut Drive) {
+        drive.time_constant_s = (drive.time_constant_s + self.extra_s).max(0.1 * drive.time_constant_s);
+    }
+}

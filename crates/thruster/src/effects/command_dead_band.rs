@@ -1,0 +1,58 @@
+//! The drive ignores small commands.
+
+use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, commanded};
+use crate::plant::{Drive, Tick};
+
+/// Catalogue entry.
+pub const DESCRIPTOR: Descriptor = Descriptor {
+    id: "command_dead_band",
+    path: Path::Drive,
+    what: "the drive ignores commands near its neutral, as speed controllers for brushless motors do",
+    equation: "u* = u - clamp(u - u0, -d, d) (1 - k s(|u - u0|/d)); d, u0 in the command's unit, k = 0: shifted by d \
+               beyond the band, k = 1: passed on as it is",
+    signature: "no current and no motion for small commands, the same way up and down (no hysteresis); large commands \
+                are off by d or not at all",
+    confused_with: &["coulomb_friction", "torque_channel_bias", "gear_backlash"],
+    separated_by: "a slow ramp through zero with current recorded: with dry friction current flows and nothing moves",
+    reference: "physics.md C2; ArduSub's simulated ESC 1475-1525 us",
+    parameters,
+    starts: |scale| {
+        let full = scale.command;
+        [(0.02, 1.0), (0.06, 0.0), (0.06, 1.0), (0.15, 1.0)].iter().map(|(d, kept)| vec![d * full, 0.0, *kept]).collect()
+    },
+    needs: commanded,
+    build: |values, _| Box::new(CommandDeadBand { half_width: values[0], centre: values[1], kept: values[2] }),
+};
+
+fn parameters(scale: &Scale) -> Vec<Spec> {
+    let full = scale.command;
+    vec![
+        Spec::strength("half_width", "of the command", 0.02 * full, 0.0, 0.5 * full),
+        Spec::shape("centre", "of the command", 0.0, -0.2 * full, 0.2 * full),
+        Spec::shape("kept_outside", "1", 0.0, 0.0, 1.0),
+    ]
+}
+
+struct CommandDeadBand {
+    half_width: f64,
+    centre: f64,
+    kept: f64,
+}
+
+impl Effect for CommandDeadBand {
+    fn hooks(&self) -> Hooks {
+        Hooks::DRIVE
+    }
+
+    /// Beyond the band the passed-on form returns to the command over a quarter of the band.
+    fn drive(&mut self, _: &Tick, drive: &mut Drive) {
+        let d = self.half_width;
+        if d <= 0.0 {
+            return;
+        }
+        let u = drive.command - self.centre;
+        let out = ((u.abs() - d) / (0.25 * d)).clamp(0.0, 1.0);
+        let smooth = out * out * (3.0 - 2.0 * out);
+        drive.command -= u.clamp(-d, d) * (1.0 - self.kept * smooth);
+    }
+}

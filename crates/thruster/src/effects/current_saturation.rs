@@ -1,0 +1,47 @@
+//! The drive limits its current below the stated limit.
+
+use super::{Available, Descriptor, Effect, Hooks, Path, Scale, Spec, commanded};
+use crate::plant::{Drive, Tick};
+use crate::rig::Rig;
+
+/// Catalogue entry.
+pub const DESCRIPTOR: Descriptor = Descriptor {
+    id: "current_saturation",
+    path: Path::Drive,
+    what: "the drive limits its current below the stated limit",
+    equation: "|im| <= (1 - c) Imax; Imax stated [A], c [1]",
+    signature: "large commands alone are off: the current's top is flat and the shaft accelerates at a clipped rate; \
+                small commands fit",
+    confused_with: &["voltage_limit_backemf", "torque_constant_saturation", "cavitation"],
+    separated_by: "steps of rising size; the supply voltage varied (a current limit stays)",
+    reference: "physics.md C2",
+    parameters,
+    starts: |_| [0.02, 0.2, 0.3, 0.45, 0.6].iter().map(|cut| vec![*cut]).collect(),
+    needs,
+    build: |values, _| Box::new(CurrentSaturation { cut: values[0] }),
+};
+
+/// The limit is sharp, as a drive's is; a recording's response is still smooth in it, since each
+/// sample crosses it at another time.
+fn parameters(_: &Scale) -> Vec<Spec> {
+    vec![Spec::strength("limit_cut", "1", 0.1, 0.0, 0.9)]
+}
+
+fn needs(rig: &Rig, available: &Available) -> Result<(), &'static str> {
+    commanded(rig, available)?;
+    if rig.amplifier.current_limit_a.is_finite() { Ok(()) } else { Err("the rig states no current limit") }
+}
+
+struct CurrentSaturation {
+    cut: f64,
+}
+
+impl Effect for CurrentSaturation {
+    fn hooks(&self) -> Hooks {
+        Hooks::DRIVE
+    }
+
+    fn drive(&mut self, _: &Tick, drive: &mut Drive) {
+        drive.current_limit_a *= 1.0 - self.cut;
+    }
+}

@@ -1,0 +1,65 @@
+//! Blades, hub and duct work differently astern.
+
+use super::{Context, Descriptor, Effect, Hooks, Path, Scale, Spec, one_start, wet};
+use crate::parameters::Parameter as P;
+use crate::plant::{Balance, Foil, Local};
+
+/// Catalogue entry.
+pub const DESCRIPTOR: Descriptor = Descriptor {
+    id: "forward_reverse_asymmetry",
+    path: Path::Blade,
+    what: "cambered blades, the hub or the duct give another lift, drag or flux coefficient when turning astern",
+    equation: "astern: CL (1 + el), CD (1 + ed), dbeta (1 + ef); el, ed, ef [1]",
+    signature: "thrust over speed squared differs between the directions by the same percentage at all speeds",
+    confused_with: &["ambient_axial_flow", "thrust_bias_gain_hysteresis", "torque_channel_bias"],
+    separated_by: "a staircase in both directions; the thruster turned end for end on the stand",
+    reference: "physics.md C4; rev/fwd 0.75-0.785 for a T200-size unit",
+    parameters,
+    starts: one_start,
+    needs: wet,
+    build,
+};
+
+fn parameters(_: &Scale) -> Vec<Spec> {
+    vec![
+        Spec::strength("reverse_lift_error", "1", -0.04, -0.8, 1.0),
+        Spec::strength("reverse_drag_error", "1", 0.0, -0.8, 2.0),
+        Spec::strength("reverse_flux_error", "1", 0.0, -0.8, 2.0),
+    ]
+}
+
+fn build(values: &[f64], context: &Context) -> Box<dyn Effect> {
+    let p = context.parameters;
+    Box::new(Asymmetry {
+        lift: values[0],
+        drag: values[1],
+        flux_kg_m: values[2] * p.get(P::FluxCoefficient) * p.get(P::DensityKgM3) * p.area_m2(),
+    })
+}
+
+struct Asymmetry {
+    lift: f64,
+    drag: f64,
+    flux_kg_m: f64,
+}
+
+impl Effect for Asymmetry {
+    fn hooks(&self) -> Hooks {
+        Hooks { foil: true, balance: true, ..Hooks::NONE }
+    }
+
+    /// Goes over smoothly as the flow along the chord turns round: 0 ahead, 1 astern.
+    fn foil(&self, _: &Local, _: &[f64], foil: &mut Foil) {
+        let along = foil.chordwise_m_s / foil.speed_m_s;
+        let astern = 0.5 - 0.25 * along * (3.0 - along * along);
+        foil.lift *= 1.0 + self.lift * astern;
+        foil.drag *= 1.0 + self.drag * astern;
+    }
+
+    /// The flux itself vanishes where the flow turns round.
+    fn balance(&self, at: &Local, _: &[f64], balance: &mut Balance, _: &mut [f64]) {
+        if at.axial_m_s < 0.0 {
+            balance.flux_kg_m += self.flux_kg_m;
+        }
+    }
+}

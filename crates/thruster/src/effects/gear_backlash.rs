@@ -1,0 +1,115 @@
+//! Play between motor gear and propeller shaft.
+
+use super::{Available, Context, Descriptor, Effect, Hooks, Path, Scale, Spec, free_shaft, one_start};
+use crate::parameters::Parameter as P;
+use crate::plant::{Balance, Drive, Local, Sensed, Tick};
+use crate::rig::Rig;
+
+/// Catalogue entry.
+pub const DESCRIPTOR: Descriptor = Descriptor {
+    id: "gear_backlash",
+    path: Path::Drive,
+    what: "play in the gear: when torque reverses the motor crosses the gap alone, then strikes the other flank",
+    equation: "in the gap: f I w' = kt im, x' = w, no torque on the propeller; at x = b the motor's momentum f I w passes \
+               to the shaft; b [rad], f motor's share of the inertia [1]",
+    signature: "lost motion, then a blow, at each reversal of torque; a limit cycle about zero under a speed loop",
+    confused_with: &["coulomb_friction", "transport_delay", "command_dead_band"],
+    separated_by: "an encoder on the load side; slow reversals of torque",
+    reference: "physics.md C2; inelastic contact in place of a stiff tooth spring",
+    parameters,
+    starts: one_start,
+    needs,
+    build,
+};
+
+fn parameters(_: &Scale) -> Vec<Spec> {
+    vec![
+        Spec::strength("backlash_rad", "rad", 0.01, 0.0, 0.2),
+        Spec::shape("motor_inertia_share", "1", 0.4, 0.05, 0.95),
+    ]
+}
+
+fn needs(rig: &Rig, available: &Available) -> Result<(), &'static str> {
+    free_shaft(rig, available)?;
+    if rig.class.to_lowercase().contains("gear") { Ok(()) } else { Err("the rig is direct drive: its class names no gear") }
+}
+
+fn build(values: &[f64], context: &Context) -> Box<dyn Effect> {
+    Box::new(GearBacklash {
+        gap_rad: values[0],
+        motor_inertia_kg_m2: values[1] * context.parameters.get(P::InertiaKgM2),
+        torque_constant_nm_a: context.parameters.get(P::TorqueConstantNmA),
+        tick_s: context.tick_s,
+        side: 0.0,
+        crossed_rad: 0.0,
+        relative_rad_s: 0.0,
+        blow_n_m: 0.0,
+        later_n_m: 0.0,
+        passed: 1.0,
+    })
+}
+
+struct GearBacklash {
+    gap_rad: f64,
+    motor_inertia_kg_m2: f64,
+    torque_constant_nm_a: f64,
+    tick_s: f64,
+    /// Flank in contact: the sign of the torque it carries; 0 before the first torque.
+    side: f64,
+    crossed_rad: f64,
+    relative_rad_s: f64,
+    /// Torque of the blow in this tick and what is left of it for the next.
+    blow_n_m: f64,
+    later_n_m: f64,
+    /// Share of motor torque that reaches the propeller in this tick.
+    passed: f64,
+}
+
+impl Effect for GearBacklash {
+    fn hooks(&self) -> Hooks {
+        Hooks { drive: true, balance: true, sense: true, ..Hooks::NONE }
+    }
+
+    fn drive(&mut self, _: &Tick, drive: &mut Drive) {
+        let (dt, torque) = (self.tick_s, self.torque_constant_nm_a * drive.current_a);
+        (self.blow_n_m, self.later_n_m, self.passed) = (self.later_n_m, 0.0, 1.0);
+        if self.side == 0.0 {
+            self.side = if torque == 0.0 { 0.0 } else { torque.signum() };
+        }
+        let in_gap = self.crossed_rad > 0.0 || torque * self.side < 0.0;
+        if self.gap_rad <= 0.0 || !in_gap {
+            return;
+        }
+        // Counted positive away from the flank that was in contact.
+        let push = -torque * self.side / self.motor_inertia_kg_m2;
+        let before = self.crossed_rad;
+        let left_rad_s = self.relative_rad_s;
+        let after = before + dt * (left_rad_s + 0.5 * dt * push);
+        self.relative_rad_s = left_rad_s + dt * push;
+        self.passed = 0.0;
+        if after >= self.gap_rad {
+            // Strikes a part of the way through the tick: that part of the blow falls into the next.
+            let part = (self.gap_rad - before) / (after - before);
+            let speed_rad_s = left_rad_s + part * dt * push;
+            self.side = -self.side;
+            let blow = self.side * self.motor_inertia_kg_m2 * speed_rad_s / dt;
+            self.blow_n_m += blow * (1.0 - part);
+            self.later_n_m = blow * part;
+            self.passed = 1.0 - part;
+            (self.crossed_rad, self.relative_rad_s) = (0.0, 0.0);
+        } else if after <= 0.0 {
+            (self.crossed_rad, self.relative_rad_s) = (0.0, 0.0);
+        } else {
+            self.crossed_rad = after;
+        }
+    }
+
+    fn balance(&self, _: &Local, _: &[f64], balance: &mut Balance, _: &mut [f64]) {
+        balance.motor_torque_n_m = balance.motor_torque_n_m * self.passed + self.blow_n_m;
+    }
+
+    /// The encoder sits on the motor.
+    fn sense(&mut self, _: &Tick, sensed: &mut Sensed) {
+        sensed.shaft_speed_rad_s -= self.side * self.relative_rad_s;
+    }
+}

@@ -1,0 +1,48 @@
+//! Lift and drag are not plain sinusoids of the angle of attack.
+
+use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, wet};
+use crate::plant::{Foil, Local};
+
+/// Catalogue entry.
+pub const DESCRIPTOR: Descriptor = Descriptor {
+    id: "nonsinusoidal_lift_drag",
+    path: Path::Blade,
+    what: "lift and drag against angle of attack have a profile drag and higher harmonics beyond the model's sinusoids",
+    equation: "CD = cd0 + CDmax (1 - cos 2a) + c4 (1 - cos 4a); CL = CLmax sin 2a + b4 sin 4a; all [1]",
+    signature: "nothing in steady bollard pull after a refit (one angle of attack); thrust overshoots after a torque step \
+                and is off at other advance",
+    confused_with: &["rotational_flow", "blade_stall", "inertia_added_mass_error", "windage_drag"],
+    separated_by: "steps of shaft speed, towed runs: whatever sweeps the angle of attack",
+    reference: "Bachmayer, Whitcomb, Grosenbaugh 2000 (IEEE JOE 25:146); physics.md C4",
+    parameters,
+    starts: |_| vec![vec![0.02, 0.0, 0.0], vec![0.0, 0.1, 0.0], vec![0.0, 0.0, 0.05], vec![0.0, 0.0, -0.05]],
+    needs: wet,
+    build: |values, _| Box::new(NonsinusoidalLiftDrag { profile_drag: values[0], drag_4: values[1], lift_4: values[2] }),
+};
+
+fn parameters(_: &Scale) -> Vec<Spec> {
+    vec![
+        Spec::strength("profile_drag", "1", 0.01, -0.1, 0.5),
+        Spec::strength("drag_harmonic", "1", 0.02, -1.0, 1.0),
+        Spec::strength("lift_harmonic", "1", 0.01, -1.0, 1.0),
+    ]
+}
+
+struct NonsinusoidalLiftDrag {
+    profile_drag: f64,
+    drag_4: f64,
+    lift_4: f64,
+}
+
+impl Effect for NonsinusoidalLiftDrag {
+    fn hooks(&self) -> Hooks {
+        Hooks::FOIL
+    }
+
+    /// sin 4a = 2 sin 2a cos 2a; 1 - cos 4a = 2 sin^2 2a.
+    fn foil(&self, _: &Local, _: &[f64], foil: &mut Foil) {
+        let (sin, cos) = (foil.sin_2a, 1.0 - foil.one_minus_cos_2a);
+        foil.drag += self.profile_drag + self.drag_4 * 2.0 * sin * sin;
+        foil.lift += self.lift_4 * 2.0 * sin * cos;
+    }
+}

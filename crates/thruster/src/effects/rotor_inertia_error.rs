@@ -1,0 +1,39 @@
+//! The stated inertia is wrong.
+
+use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, free_shaft, one_start};
+use crate::plant::{Balance, Local};
+
+/// Catalogue entry.
+pub const DESCRIPTOR: Descriptor = Descriptor {
+    id: "rotor_inertia_error",
+    path: Path::Shaft,
+    what: "the stated inertia of motor, shaft and propeller is off, beyond its tolerance and in either direction",
+    equation: "I (1 + e) Om' = ...; e [1]",
+    signature: "shaft speed rises and falls more slowly (or faster) than modelled; the torque residual follows Om'; \
+                steady states fit",
+    confused_with: &["entrained_water_inertia", "inertia_added_mass_error", "amplifier_lag", "rotational_flow"],
+    separated_by: "small fast variations of torque about zero speed; a coast-down in air against one in water",
+    reference: "physics.md C1; equation (10)",
+    parameters,
+    starts: one_start,
+    needs: free_shaft,
+    build: |values, _| Box::new(RotorInertiaError { factor: 1.0 + values[0] }),
+};
+
+fn parameters(_: &Scale) -> Vec<Spec> {
+    vec![Spec::strength("inertia_error", "1", 0.15, -0.8, 5.0)]
+}
+
+struct RotorInertiaError {
+    factor: f64,
+}
+
+impl Effect for RotorInertiaError {
+    fn hooks(&self) -> Hooks {
+        Hooks::BALANCE
+    }
+
+    fn balance(&self, _: &Local, _: &[f64], balance: &mut Balance, _: &mut [f64]) {
+        balance.inertia_kg_m2 *= self.factor;
+    }
+}

@@ -1,0 +1,73 @@
+//! The supply sags under the thruster's own load.
+
+use super::memory::FirstOrder;
+use super::{Descriptor, Effect, Hooks, Path, Scale, Spec};
+use crate::plant::{Drive, Tick};
+
+/// Catalogue entry.
+pub const DESCRIPTOR: Descriptor = Descriptor {
+    id: "supply_sag",
+    path: Path::Drive,
+    what: "the bus voltage falls under load through the resistance of cable and battery, and recovers with a lag",
+    equation: "Vbus = V0 - lag(Rs Ibus), Ibus = |im| |R im + ke Om|/V0; Rs [ohm], lag [s]. A voltage drive's output \
+               falls in proportion; a current drive meets its voltage limit sooner",
+    signature: "on a voltage drive thrust grows more slowly than command; on a current drive only the top is capped; \
+                other loads on the bus show through; thrust over speed squared is unchanged",
+    confused_with: &["voltage_limit_backemf", "thermal_drift_kt", "viscous_friction"],
+    separated_by: "the recorded bus voltage; the supply voltage varied",
+    reference: "physics.md C2",
+    parameters,
+    starts: |scale| [0.2, 0.4].iter().map(|share| vec![share * source_ohm(scale), 0.01]).collect(),
+    needs: super::voltage_limit_backemf::needs,
+    build: |values, context| {
+        Box::new(SupplySag {
+            source_ohm: values[0],
+            recovery_s: values[1],
+            voltage_drive: context.rig.amplifier.kind == crate::rig::AmplifierKind::Voltage,
+            tick_s: context.tick_s,
+            sag: FirstOrder::default(),
+        })
+    },
+};
+
+/// The source resistance that would take the whole supply at full power.
+fn source_ohm(scale: &Scale) -> f64 {
+    let bus_a = scale.torque_n_m * scale.shaft_speed_rad_s / scale.supply_v.max(1e-3);
+    scale.supply_v.max(1e-3) / bus_a
+}
+
+fn parameters(scale: &Scale) -> Vec<Spec> {
+    let full = source_ohm(scale);
+    vec![
+        Spec::strength("source_resistance_ohm", "ohm", 0.05 * full, 0.0, 2.0 * full),
+        Spec::shape("recovery_s", "s", 0.01, 0.0, 20.0),
+    ]
+}
+
+struct SupplySag {
+    source_ohm: f64,
+    recovery_s: f64,
+    voltage_drive: bool,
+    tick_s: f64,
+    sag: FirstOrder,
+}
+
+impl Effect for SupplySag {
+    fn hooks(&self) -> Hooks {
+        Hooks::DRIVE
+    }
+
+    fn drive(&mut self, _: &Tick, drive: &mut Drive) {
+        let winding_v = drive.resistance_ohm * drive.current_a + drive.back_emf_v;
+        // Bus and winding exchange power; a braking drive does not lift the bus here.
+        let bus_a = (drive.current_a * winding_v).max(0.0) / drive.supply_v;
+        let lost_v = self.sag.step(self.source_ohm * bus_a, self.recovery_s, self.tick_s);
+        let left = 1.0 / (1.0 + lost_v / drive.supply_v);
+        drive.supply_v *= left;
+        if self.voltage_drive {
+            drive.command *= left;
+        } else {
+            drive.voltage_limited = true;
+        }
+    }
+}

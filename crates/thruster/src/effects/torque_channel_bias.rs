@@ -1,0 +1,56 @@
+//! Constant offsets of torque and current: drive zero, current sensor, torque transducer.
+
+use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, always};
+use crate::plant::{Balance, Local, Sensed, Tick};
+
+/// Catalogue entry.
+pub const DESCRIPTOR: Descriptor = Descriptor {
+    id: "torque_channel_bias",
+    path: Path::Sensor,
+    what: "torque is off by a constant: the zero of the drive's torque or current measurement, or of the torque transducer",
+    equation: "shaft: kt im + b; measured: im + c, Q + d; b, d [N m], c [A]",
+    signature: "a constant in the torque balance with the same sign in both directions (dry friction changes sign); a \
+                measured current or torque is off also at rest",
+    confused_with: &["coulomb_friction", "ambient_axial_flow", "command_dead_band", "forward_reverse_asymmetry"],
+    separated_by: "a staircase in both directions; the zeros before and after the run",
+    reference: "physics.md C5",
+    parameters,
+    starts: |scale| {
+        let (torque, current) = (0.02 * scale.torque_n_m, 0.02 * scale.current_a);
+        vec![vec![-torque, 0.0, 0.0], vec![0.0, current, 0.0], vec![0.0, 0.0, torque]]
+    },
+    needs: always,
+    build: |values, _| Box::new(TorqueChannelBias { shaft_n_m: values[0], current_a: values[1], transducer_n_m: values[2] }),
+};
+
+fn parameters(scale: &Scale) -> Vec<Spec> {
+    let (torque, current) = (scale.torque_n_m, scale.current_a);
+    vec![
+        Spec::strength("shaft_torque_bias_n_m", "N m", 0.02 * torque, -0.5 * torque, 0.5 * torque),
+        Spec::strength("current_offset_a", "A", 0.0, -0.5 * current, 0.5 * current),
+        Spec::strength("transducer_offset_n_m", "N m", 0.0, -0.5 * torque, 0.5 * torque),
+    ]
+}
+
+struct TorqueChannelBias {
+    shaft_n_m: f64,
+    current_a: f64,
+    transducer_n_m: f64,
+}
+
+impl Effect for TorqueChannelBias {
+    fn hooks(&self) -> Hooks {
+        Hooks { balance: true, sense: true, ..Hooks::NONE }
+    }
+
+    /// A drive that regulates a current measured with a wrong zero does give this torque; where a
+    /// recorded current drives the model, its wrong zero appears as one.
+    fn balance(&self, _: &Local, _: &[f64], balance: &mut Balance, _: &mut [f64]) {
+        balance.shaft_torque_n_m += self.shaft_n_m;
+    }
+
+    fn sense(&mut self, _: &Tick, sensed: &mut Sensed) {
+        sensed.current_a += self.current_a;
+        sensed.torque_n_m += self.transducer_n_m;
+    }
+}

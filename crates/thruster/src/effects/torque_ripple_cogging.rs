@@ -1,0 +1,61 @@
+//! Torque that varies with the angle of the rotor.
+
+use super::{Available, Descriptor, Effect, Hooks, Path, Scale, Spec, angle_recorded, free_shaft};
+use crate::plant::{Balance, Local};
+use crate::rig::Rig;
+
+/// Catalogue entry.
+pub const DESCRIPTOR: Descriptor = Descriptor {
+    id: "torque_ripple_cogging",
+    path: Path::Drive,
+    what: "magnets and slots make torque vary with rotor angle: cogging (always there) and ripple (in proportion to current)",
+    equation: "tau += (As + Bs im) sin(k q) + (Ac + Bc im) cos(k q); k whole, A [N m], B [N m/A], q shaft angle [rad]",
+    signature: "a line at order k of shaft angle in speed and torque, its frequency follows the shaft; largest at creep speed",
+    confused_with: &["encoder_eccentricity", "coulomb_friction"],
+    separated_by: "a slow creep over full turns, averaged over angle; cogging stays with the current off; a resolver's \
+                   error shows in speed but not in thrust",
+    reference: "physics.md C2",
+    parameters,
+    starts: |scale| {
+        let cogging = 0.02 * scale.torque_n_m;
+        [2, 3, 4, 6, 7, 8, 12, 14, 18, 21, 24, 36, 42].iter().map(|k| vec![f64::from(*k), cogging, 0.0, 0.0, 0.0]).collect()
+    },
+    needs,
+    build: |values, _| {
+        Box::new(TorqueRipple { order: values[0].round(), cogging_n_m: [values[1], values[2]], ripple_nm_a: [values[3], values[4]] })
+    },
+};
+
+fn parameters(scale: &Scale) -> Vec<Spec> {
+    let (torque, per_a) = (scale.torque_n_m, scale.torque_n_m / scale.current_a);
+    vec![
+        Spec::held("order", "1", 1.0, 1.0, 144.0),
+        Spec::strength("cogging_sin_n_m", "N m", 0.02 * torque, -0.5 * torque, 0.5 * torque),
+        Spec::strength("cogging_cos_n_m", "N m", 0.0, -0.5 * torque, 0.5 * torque),
+        Spec::strength("ripple_sin_nm_a", "N m/A", 0.0, -0.5 * per_a, 0.5 * per_a),
+        Spec::strength("ripple_cos_nm_a", "N m/A", 0.0, -0.5 * per_a, 0.5 * per_a),
+    ]
+}
+
+fn needs(rig: &Rig, available: &Available) -> Result<(), &'static str> {
+    free_shaft(rig, available)?;
+    angle_recorded(rig, available)
+}
+
+struct TorqueRipple {
+    order: f64,
+    cogging_n_m: [f64; 2],
+    ripple_nm_a: [f64; 2],
+}
+
+impl Effect for TorqueRipple {
+    fn hooks(&self) -> Hooks {
+        Hooks::BALANCE
+    }
+
+    fn balance(&self, at: &Local, _: &[f64], balance: &mut Balance, _: &mut [f64]) {
+        let (sin, cos) = (self.order * at.shaft_angle_rad).sin_cos();
+        let amplitude = |i: usize| self.cogging_n_m[i] + self.ripple_nm_a[i] * at.current_a;
+        balance.shaft_torque_n_m += amplitude(0) * sin + amplitude(1) * cos;
+    }
+}

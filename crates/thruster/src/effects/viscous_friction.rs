@@ -1,0 +1,41 @@
+//! Friction in proportion to shaft speed: oil, seals, sheared water.
+
+use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, free_shaft, one_start};
+use crate::plant::{Balance, Local};
+
+/// Catalogue entry.
+pub const DESCRIPTOR: Descriptor = Descriptor {
+    id: "viscous_friction",
+    path: Path::Shaft,
+    what: "friction in proportion to shaft speed, beyond the stated one: oil-filled housing, seals, sheared water",
+    equation: "I Om' = ... - kf Om; kf [N m s]",
+    signature: "an offset in the shaft's torque balance that grows linearly with speed; thrust over speed squared is \
+                unchanged; the loss in thrust per torque falls as 1/Om and shrinks as the unit warms",
+    confused_with: &["coulomb_friction", "windage_drag", "voltage_limit_backemf", "supply_sag"],
+    separated_by: "a staircase over a 10:1 range of speeds; a dry spin",
+    reference: "physics.md C1; equation (10)",
+    parameters,
+    starts: one_start,
+    needs: free_shaft,
+    build: |values, _| Box::new(ViscousFriction { viscous_nm_s: values[0] }),
+};
+
+/// A negative value says that less friction acts than the rig states.
+fn parameters(scale: &Scale) -> Vec<Spec> {
+    let full = scale.torque_n_m / scale.shaft_speed_rad_s;
+    vec![Spec::strength("viscous_friction_nm_s", "N m s", 0.02 * full, -0.2 * full, full)]
+}
+
+struct ViscousFriction {
+    viscous_nm_s: f64,
+}
+
+impl Effect for ViscousFriction {
+    fn hooks(&self) -> Hooks {
+        Hooks::BALANCE
+    }
+
+    fn balance(&self, at: &Local, _: &[f64], balance: &mut Balance, _: &mut [f64]) {
+        balance.shaft_torque_n_m -= self.viscous_nm_s * at.shaft_speed_rad_s;
+    }
+}

@@ -1,0 +1,40 @@
+//! Drag of hub and rotor, in proportion to the square of shaft speed.
+
+use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, free_shaft, one_start};
+use crate::plant::{Balance, Local};
+
+/// Catalogue entry.
+pub const DESCRIPTOR: Descriptor = Descriptor {
+    id: "windage_drag",
+    path: Path::Shaft,
+    what: "drag of hub, shaft or a flooded rotor as a disk in water: a torque that grows with the square of shaft speed",
+    equation: "I Om' = ... - kw Om|Om|; kw [N m s^2]",
+    signature: "thrust per torque is lower by the same percentage at all speeds; thrust over speed squared is unchanged",
+    confused_with: &["torque_constant_saturation", "nonsinusoidal_lift_drag", "viscous_friction", "water_density"],
+    separated_by: "a spin with the blades off (windage stays); an error of the torque constant shows at standstill too",
+    reference: "physics.md C1; disk drag, Daily & Nece 1960 (J. Basic Eng. 82:217)",
+    parameters,
+    starts: one_start,
+    needs: free_shaft,
+    build: |values, _| Box::new(WindageDrag { drag_nm_s2: values[0] }),
+};
+
+fn parameters(scale: &Scale) -> Vec<Spec> {
+    let full = scale.torque_n_m / scale.shaft_speed_rad_s.powi(2);
+    vec![Spec::strength("windage_nm_s2", "N m s^2", 0.03 * full, 0.0, full)]
+}
+
+struct WindageDrag {
+    drag_nm_s2: f64,
+}
+
+impl Effect for WindageDrag {
+    fn hooks(&self) -> Hooks {
+        Hooks::BALANCE
+    }
+
+    fn balance(&self, at: &Local, _: &[f64], balance: &mut Balance, _: &mut [f64]) {
+        let speed = at.shaft_speed_rad_s;
+        balance.shaft_torque_n_m -= self.drag_nm_s2 * speed * speed.abs();
+    }
+}
