@@ -17,7 +17,7 @@ const TILES = [
   ["thrust", "N", (s) => s.measured.thrust_n, 1], ["thrust, estimated", "N", (s) => s.estimated.thrust_n, 1],
   ["shaft speed", "rad/s", (s) => s.measured.shaft_speed_rad_s, 1], ["shaft speed", "rpm", (s) => scaled(s.measured.shaft_speed_rad_s, 30 / Math.PI), 0],
   ["motor current", "A", (s) => s.measured.current_a, 2], ["supply", "V", (s) => s.measured.supply_v, 1],
-  ["axial flow, estimated", "m/s", (s) => s.estimated.flow_m_s, 2], ["ambient, estimated", "m/s", (s) => s.estimated.ambient_m_s, 2],
+  ["flow, estimated", "m/s", (s) => s.estimated.flow_m_s, 2], ["ambient, estimated", "m/s", (s) => s.estimated.ambient_m_s, 2],
 ];
 const scaled = (value, factor) => (value === null || value === undefined ? null : value * factor);
 const text = (value, digits) => (value === null || value === undefined ? "–" : value.toFixed(digits));
@@ -111,7 +111,7 @@ function showState(s, live) {
   $("faults").replaceChildren(...(s.faults.length ? s.faults.map(faultItem) : [none("No fault is latched.")]));
   $("limits").textContent = s.limits.length ? `limit in force: ${s.limits.map((limit) => limit.name ?? limit).join(", ")}` : "No limit is in force.";
   if (document.activeElement !== $("controller") && $("controller").dataset.running !== s.controller) loadController().catch(() => {});
-  $("estimator-text").textContent = s.estimator ? `${s.estimator}` : "no estimator is running";
+  $("estimator-text").textContent = `observer ${s.observer ?? "–"} · estimator ${s.estimator ?? "–"}${s.estimator_frozen ? ", frozen for want of excitation" : ""}`;
   $("parameters").replaceChildren(...s.estimated.parameters.map((p) => cells([p.name, text(p.value, 4), text(p.std_error, 4), p.unit])));
 }
 

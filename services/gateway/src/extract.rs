@@ -43,7 +43,7 @@ impl<S: Sync> FromRequestParts<S> for LeaseId {
     }
 }
 
-/// A JSON body that may be left out altogether.
+/// A JSON body that may be left out altogether, or be `null`.
 pub struct OptionalJson<T>(pub Option<T>);
 
 impl<S: Send + Sync, T: serde::de::DeserializeOwned> FromRequest<S> for OptionalJson<T> {
@@ -56,6 +56,6 @@ impl<S: Send + Sync, T: serde::de::DeserializeOwned> FromRequest<S> for Optional
             return Ok(OptionalJson(None));
         }
         let Json(value) = Json::from_request(Request::from_parts(parts, Body::from(bytes)), state).await?;
-        Ok(OptionalJson(Some(value)))
+        Ok(OptionalJson(value))
     }
 }

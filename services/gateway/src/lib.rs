@@ -19,16 +19,18 @@ mod windows;
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
+use axum::body::Bytes;
 use kort_proto::config::{Config, ConfigError};
 use kort_proto::transport::Deployment;
 use thiserror::Error;
 use tokio::net::TcpListener;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::watch;
+use utoipa::openapi::OpenApi;
 
 use problem::{Kind, Problem};
 use record::Recorder;
@@ -77,6 +79,7 @@ pub(crate) struct App {
     recorder: Arc<Recorder>,
     answers: [AtomicU64; 4],
     stopping: watch::Receiver<bool>,
+    document: OnceLock<Bytes>,
 }
 
 impl App {
@@ -102,6 +105,15 @@ impl App {
 
     fn stopping(&self) -> watch::Receiver<bool> {
         self.stopping.clone()
+    }
+
+    /// The OpenAPI document, once the routes are known.
+    fn publish(&self, document: &OpenApi) {
+        let _ = self.document.set(serde_json::to_vec_pretty(document).unwrap_or_default().into());
+    }
+
+    fn document(&self) -> Bytes {
+        self.document.get().cloned().unwrap_or_default()
     }
 
     fn count_answer(&self, status: u16) {
@@ -151,6 +163,7 @@ async fn serve(
         recorder: Arc::clone(&recorder),
         answers: Default::default(),
         stopping,
+        document: OnceLock::new(),
     };
     let mut links = Vec::new();
     for Deployed { id, range, heartbeat } in &thrusters {

@@ -1,6 +1,6 @@
 //! The frame of the OpenAPI document; the routes fill it in from their own code.
 
-use utoipa::openapi::schema::Schema;
+use utoipa::openapi::schema::{AdditionalProperties, Schema};
 use utoipa::openapi::{Info, OpenApi, OpenApiBuilder, RefOr, tag::TagBuilder};
 
 use crate::App;
@@ -53,6 +53,7 @@ pub fn finish(document: &mut OpenApi, app: &App) {
             if let Some(RefOr::T(Schema::Object(number))) = object.properties.get_mut(name) {
                 number.minimum = Some(utoipa::Number::Float(-bound));
                 number.maximum = Some(utoipa::Number::Float(bound));
+                object.additional_properties = Some(Box::new(AdditionalProperties::FreeForm(false)));
             }
         }
     }

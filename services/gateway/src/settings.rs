@@ -71,12 +71,19 @@ pub fn thrusters(config: &Config) -> Result<Vec<Deployed>, ConfigError> {
                 .and_then(|v| v.as_float().or(v.as_integer().map(|v| v as f64)));
             let model = ControlModel::from_rig(&rig, heartbeat.as_secs_f64());
             let range = SetpointRange {
-                thrust_n: model.as_ref().map_or(0.0, |model| model.thrust_max_n),
-                speed_rad_s: speed_limit
-                    .unwrap_or(f64::MAX)
-                    .min(model.map_or(f64::MAX, |model| model.speed_max_rad_s)),
+                thrust_n: hundredths(model.as_ref().map_or(0.0, |model| model.thrust_max_n)),
+                speed_rad_s: hundredths(
+                    speed_limit
+                        .unwrap_or(f64::MAX)
+                        .min(model.map_or(f64::MAX, |model| model.speed_max_rad_s)),
+                ),
             };
             Ok(Deployed { id: id.clone(), range, heartbeat })
         })
         .collect()
+}
+
+/// Rounded towards zero, so that a message can print it and it can still be asked for.
+fn hundredths(value: f64) -> f64 {
+    (value * 100.0).floor() / 100.0
 }

@@ -19,7 +19,7 @@ pub fn routes() -> OpenApiRouter<Arc<App>> {
 /// Arms the drive, at zero: only a setpoint that comes after moves it. A `Lease-Id`, if sent, must be in force.
 #[utoipa::path(post, path = "/v1/thrusters/{id}/arm", tag = "command",
     params(("id" = String, Path, description = "Name of the thruster", example = "t1"),
-           ("Lease-Id" = Option<String>, Header, description = "The lease_id, for a commander who holds one")),
+           ("Lease-Id" = Option<String>, Header, pattern = "^[!-~]+$", description = "The lease_id, for a commander who holds one")),
     responses(
         (status = 200, description = "Armed", body = ThrusterState),
         (status = 400, description = "`malformed-header`", body = Problem, content_type = "application/problem+json"),
@@ -52,7 +52,7 @@ async fn disarm(State(app): State<Arc<App>>, Path(id): Path<String>) -> Result<R
 /// Clears latched faults whose cause is gone. The thruster stays disarmed.
 #[utoipa::path(post, path = "/v1/thrusters/{id}/clear-faults", tag = "command",
     params(("id" = String, Path, description = "Name of the thruster", example = "t1"),
-           ("Lease-Id" = Option<String>, Header, description = "The lease_id, for a commander who holds one")),
+           ("Lease-Id" = Option<String>, Header, pattern = "^[!-~]+$", description = "The lease_id, for a commander who holds one")),
     responses(
         (status = 200, description = "No fault is latched", body = ThrusterState),
         (status = 400, description = "`malformed-header`", body = Problem, content_type = "application/problem+json"),

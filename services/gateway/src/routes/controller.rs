@@ -4,8 +4,11 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use axum::extract::State;
+use kort_control::{EstimatorKind, LawKind, ObserverKind, TUNABLES};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
+use utoipa::openapi::RefOr;
+use utoipa::openapi::schema::{AdditionalProperties, ObjectBuilder, Schema, Type};
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 use crate::App;
@@ -54,19 +57,51 @@ pub struct LawParameter {
 pub struct ControllerRequest {
     /// Law to switch to; left out keeps the present one.
     #[serde(default, alias = "name")]
-    #[schema(min_length = 1, max_length = 32)]
+    #[schema(schema_with = law_schema)]
     pub controller: Option<String>,
     /// Observer to switch to; left out keeps the present one.
     #[serde(default)]
-    #[schema(min_length = 1, max_length = 32)]
+    #[schema(schema_with = observer_schema)]
     pub observer: Option<String>,
     /// Estimator to switch to; left out keeps the present one.
     #[serde(default)]
-    #[schema(min_length = 1, max_length = 32)]
+    #[schema(schema_with = estimator_schema)]
     pub estimator: Option<String>,
     /// Parameters to change, by name; the others keep their value.
     #[serde(default)]
+    #[schema(schema_with = parameters_schema)]
     pub parameters: BTreeMap<String, f64>,
+}
+
+fn names_schema(names: impl Iterator<Item = &'static str>) -> RefOr<Schema> {
+    ObjectBuilder::new().schema_type(Type::String).enum_values(Some(names)).into()
+}
+
+fn law_schema() -> RefOr<Schema> {
+    names_schema(LawKind::ALL.into_iter().map(LawKind::name))
+}
+
+fn observer_schema() -> RefOr<Schema> {
+    names_schema(ObserverKind::ALL.into_iter().map(ObserverKind::name))
+}
+
+fn estimator_schema() -> RefOr<Schema> {
+    names_schema(EstimatorKind::ALL.into_iter().map(EstimatorKind::name))
+}
+
+fn parameters_schema() -> RefOr<Schema> {
+    let none = ObjectBuilder::new().additional_properties(Some(AdditionalProperties::FreeForm(false)));
+    TUNABLES
+        .iter()
+        .fold(none, |object, tunable| {
+            let number = ObjectBuilder::new()
+                .schema_type(Type::Number)
+                .description(Some(format!("{} Unit: {}.", tunable.what, tunable.unit)))
+                .minimum(Some(tunable.least))
+                .maximum(Some(tunable.most));
+            object.property(tunable.name, number)
+        })
+        .into()
 }
 
 /// Which control law runs, its parameters, and the laws to choose from.
@@ -86,7 +121,7 @@ async fn get(
 /// Switches the control law, bumpless, also under way. A `Lease-Id`, if sent, must be in force.
 #[utoipa::path(put, path = "/v1/thrusters/{id}/controller", tag = "command", request_body = ControllerRequest,
     params(("id" = String, Path, description = "Name of the thruster", example = "t1"),
-           ("Lease-Id" = Option<String>, Header, description = "The lease_id, for a commander who holds one")),
+           ("Lease-Id" = Option<String>, Header, pattern = "^[!-~]+$", description = "The lease_id, for a commander who holds one")),
     responses(
         (status = 200, description = "The law that runs now", body = ControllerView),
         (status = 400, description = "`malformed-json`, `malformed-body`, `malformed-header`", body = Problem, content_type = "application/problem+json"),

@@ -93,7 +93,7 @@ async fn take(
 /// Renews the lease without commanding anything.
 #[utoipa::path(put, path = "/v1/thrusters/{id}/lease", tag = "command",
     params(("id" = String, Path, description = "Name of the thruster", example = "t1"),
-           ("Lease-Id" = String, Header, description = "The lease_id of the lease in force")),
+           ("Lease-Id" = String, Header, pattern = "^[!-~]+$", description = "The lease_id of the lease in force")),
     responses(
         (status = 200, description = "The lease lives on", body = LeaseGrant),
         (status = 400, description = "`malformed-header`", body = Problem, content_type = "application/problem+json"),
@@ -112,7 +112,7 @@ async fn renew(
 /// Gives command up; thrust is ramped to zero.
 #[utoipa::path(delete, path = "/v1/thrusters/{id}/lease", tag = "command",
     params(("id" = String, Path, description = "Name of the thruster", example = "t1"),
-           ("Lease-Id" = String, Header, description = "The lease_id of the lease in force")),
+           ("Lease-Id" = String, Header, pattern = "^[!-~]+$", description = "The lease_id of the lease in force")),
     responses(
         (status = 204, description = "Nobody has command now"),
         (status = 400, description = "`malformed-header`", body = Problem, content_type = "application/problem+json"),

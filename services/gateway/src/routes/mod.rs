@@ -43,10 +43,12 @@ pub fn router(app: Arc<App>) -> Router {
         .merge(metrics::routes())
         .merge(health::routes())
         .merge(console::routes())
+        .merge(docs::routes())
         .split_for_parts();
     openapi::finish(&mut document, &app);
+    app.publish(&document);
     routes
-        .merge(docs::routes(document))
+        .merge(docs::pages())
         .fallback(unknown_route)
         .layer(DefaultBodyLimit::max(BODY_BYTES_MAX))
         .layer(TimeoutLayer::with_status_code(StatusCode::REQUEST_TIMEOUT, Duration::from_secs(10)))
@@ -74,9 +76,8 @@ async fn problems_only(State(app): State<Arc<App>>, request: Request, next: Next
     let allow = response.headers().get(header::ALLOW).cloned();
     let problem = match status {
         StatusCode::METHOD_NOT_ALLOWED => {
-            let allowed = allow.as_ref().and_then(|value| value.to_str().ok()).unwrap_or("");
             Problem::new(Kind::MethodNotAllowed, format!("{path} does not take {method}"))
-                .allowed(allowed.split(',').map(str::trim).filter(|method| !method.is_empty()))
+                .hint("the header Allow lists the methods it takes")
         }
         StatusCode::REQUEST_TIMEOUT => {
             Problem::new(Kind::RequestTimeout, format!("{method} {path} took over 10 s"))

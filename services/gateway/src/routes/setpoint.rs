@@ -29,7 +29,7 @@ struct Accepted {
 /// Commands thrust or shaft speed, and renews the lease. The thruster must be armed.
 #[utoipa::path(put, path = "/v1/thrusters/{id}/setpoint", tag = "command", request_body = Setpoint,
     params(("id" = String, Path, description = "Name of the thruster", example = "t1"),
-           ("Lease-Id" = String, Header, description = "The lease_id of the lease in force")),
+           ("Lease-Id" = String, Header, pattern = "^[!-~]+$", description = "The lease_id of the lease in force")),
     responses(
         (status = 200, description = "In force", body = Accepted),
         (status = 400, description = "`malformed-json`, `malformed-body`, `malformed-header`", body = Problem, content_type = "application/problem+json"),
