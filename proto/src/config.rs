@@ -17,6 +17,12 @@ pub const DEFAULT_PATH: &str = "config/kort.toml";
 /// The deployment and the rig it names, built in: a moved program still starts.
 const BUILT_IN: &str = include_str!("../../config/kort.toml");
 
+/// Rig descriptions built in, by the path that a deployment names them with.
+const BUILT_IN_RIGS: &[(&str, &str)] = &[(
+    "thrusters/whitcomb-yoerger-1999.toml",
+    include_str!("../../config/thrusters/whitcomb-yoerger-1999.toml"),
+)];
+
 /// Why a configuration cannot be used; the message names file, key, value and what is allowed.
 #[derive(Debug, Error)]
 #[error("{file}: {message}")]
@@ -220,6 +226,14 @@ impl Config {
         table.clone().try_into().map_err(|e: toml::de::Error| {
             self.error(with_hint(&format!("section [{name}]: {}", e.to_string().trim_end())))
         })
+    }
+
+    /// Name and text of a thruster's rig description.
+    ///
+    /// # Errors
+    /// [`ConfigError`] if the file is not there.
+    pub fn rig_text(&self, id: &str, thruster: &Thruster) -> Result<(String, String), ConfigError> {
+        self.text_of(&format!("thrusters.{id}.rig"), &thruster.rig, BUILT_IN_RIGS)
     }
 
     /// A file that the deployment names, relative to itself; where it is not found, the one of

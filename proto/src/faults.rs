@@ -134,6 +134,20 @@ impl Fault {
     }
 }
 
+/// The names of the faults in a bitset, with their codes, for people; allocates nothing.
+#[derive(Clone, Copy, Debug)]
+pub struct Names(pub u64);
+
+impl std::fmt::Display for Names {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        for (i, fault) in Fault::in_set(self.0).enumerate() {
+            let comma = if i == 0 { "" } else { ", " };
+            write!(f, "{comma}{} (code {})", fault.name(), fault.code())?;
+        }
+        Ok(())
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -388,6 +388,21 @@ message! { "kort.Reply",
     }
 }
 
+impl Reply {
+    /// An answer to a request; the words are cut at 240 bytes. Allocates nothing.
+    pub fn to(request: &Request, from: Process, outcome: Outcome, words: std::fmt::Arguments) -> Self {
+        let mut reply = Self {
+            to_session: request.header.session,
+            id: request.id,
+            from: from as u32,
+            outcome: outcome as u32,
+            ..Self::default()
+        };
+        let _ = std::fmt::Write::write_fmt(&mut reply.message, words);
+        reply
+    }
+}
+
 /// A message with its header in front.
 pub trait Message: Copy + Default + std::fmt::Debug + 'static {
     /// Its header.

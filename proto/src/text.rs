@@ -39,6 +39,21 @@ impl<const N: usize> Text<N> {
     }
 }
 
+/// Formats without allocation; what does not fit is cut.
+impl<const N: usize> std::fmt::Write for Text<N> {
+    fn write_str(&mut self, more: &str) -> std::fmt::Result {
+        let used = self.0.iter().position(|b| *b == 0).unwrap_or(N);
+        let mut end = more.len().min(N - used);
+        while !more.is_char_boundary(end) {
+            end -= 1;
+        }
+        if let (Some(room), Some(bytes)) = (self.0.get_mut(used..used + end), more.as_bytes().get(..end)) {
+            room.copy_from_slice(bytes);
+        }
+        Ok(())
+    }
+}
+
 impl<const N: usize> Default for Text<N> {
     fn default() -> Self {
         Self::EMPTY

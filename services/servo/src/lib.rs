@@ -1,1 +1,19 @@
-//! The servo: the amplifier loop, real or simulated.
+//! The servo: the loop between controller and drive.
+//!
+//! ```text
+//! deadline -> requests, newest command -> measure -> tick (guard) -> drive -> telemetry
+//! ```
+//!
+//! [`tick`] is the pure step, [`guard`] holds limits and trips, [`amplifier`] the drives; the
+//! process (feature `process`) adds the clock, real-time scheduling and shared memory. Once the
+//! loop runs it allocates nothing, takes no lock and has no path that panics.
+
+pub mod amplifier;
+pub mod guard;
+#[cfg(feature = "process")]
+mod process;
+pub mod settings;
+pub mod tick;
+
+#[cfg(feature = "process")]
+pub use process::{ServoError, run};

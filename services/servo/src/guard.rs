@@ -1,0 +1,333 @@
+//! What stands between any command and the drive: limits, which only hold back, and trips, which
+//! latch a fault.
+
+use kort_proto::faults::Fault;
+use kort_proto::limits::Limit;
+use kort_proto::messages::DriveKind;
+use kort_proto::signals::Signals;
+
+use crate::settings::Limits;
+
+/// Ticks a measured value must be bad in a row before it trips.
+const OVER_TICKS: u32 = 2;
+const MISSING_TICKS: u32 = 3;
+const SUPPLY_TICKS: u32 = 10;
+/// Spikes within [`SPIKE_WINDOW`] ticks that trip.
+const SPIKES: u32 = 3;
+const SPIKE_WINDOW: u32 = 100;
+
+/// State of the guard.
+#[derive(Clone, Copy, Debug)]
+pub struct Guard {
+    limits: Limits,
+    dt_s: f64,
+    over_current: u32,
+    over_speed: u32,
+    missing: u32,
+    supply: u32,
+    spikes: u32,
+    since_spike: u32,
+    still_s: f64,
+    last_angle_rad: f64,
+    last_speed_rad_s: f64,
+    held_speed_rad_s: f64,
+    held_current_a: f64,
+    thermal_load: f64,
+    active: u64,
+}
+
+impl Guard {
+    /// A guard for a cold motor at rest; `dt_s` is the period of the loop.
+    pub fn new(limits: Limits, dt_s: f64) -> Self {
+        Self {
+            limits,
+            dt_s,
+            over_current: 0,
+            over_speed: 0,
+            missing: 0,
+            supply: 0,
+            spikes: 0,
+            since_spike: SPIKE_WINDOW,
+            still_s: 0.0,
+            last_angle_rad: f64::NAN,
+            last_speed_rad_s: f64::NAN,
+            held_speed_rad_s: 0.0,
+            held_current_a: 0.0,
+            thermal_load: 0.0,
+            active: 0,
+        }
+    }
+
+    /// Limits and checks in force.
+    pub fn limits(&self) -> &Limits {
+        &self.limits
+    }
+
+    /// Share of the I2t budget in use.
+    pub fn thermal_load(&self) -> f64 {
+        self.thermal_load
+    }
+
+    /// Faults whose cause is there now, whatever is latched.
+    pub fn active(&self) -> u64 {
+        self.active
+    }
+
+    /// Looks at the measurements of a tick under the drive that acted until now. Returns the
+    /// faults whose cause is there now, bits of [`Fault`]. `ticks` is how many periods passed.
+    pub fn inspect(&mut self, measured: &Signals, drive: f64, ticks: u64) -> u64 {
+        let dt = self.dt_s * ticks.max(1) as f64;
+        let l = self.limits;
+        let mut active = 0;
+        let mut trip = |fault: Fault, on: bool| {
+            if on {
+                active |= fault.bit();
+            }
+        };
+
+        // Needed sensors: hold the last value over a short gap.
+        let finite = measured.current_a.is_finite() && measured.shaft_speed_rad_s.is_finite();
+        self.missing = if finite { 0 } else { self.missing.saturating_add(1) };
+        trip(Fault::SensorNotFinite, self.missing >= MISSING_TICKS);
+        if measured.current_a.is_finite() {
+            self.held_current_a = measured.current_a;
+        }
+
+        // A jump that the shaft cannot make is left out; several within a short time trip.
+        let speed = measured.shaft_speed_rad_s;
+        let jump = (speed - self.last_speed_rad_s).abs() > l.spike_rad_s * ticks.max(1) as f64;
+        self.since_spike = self.since_spike.saturating_add(1);
+        if jump {
+            self.spikes = if self.since_spike < SPIKE_WINDOW { self.spikes.saturating_add(1) } else { 1 };
+            self.since_spike = 0;
+        } else if speed.is_finite() {
+            self.held_speed_rad_s = speed;
+        }
+        trip(Fault::SensorSpike, self.spikes >= SPIKES && self.since_spike < SPIKE_WINDOW);
+
+        // A shaft that shows no motion at all while the motor pulls.
+        let angle = measured.shaft_angle_rad;
+        let same_angle = angle == self.last_angle_rad || angle.is_nan();
+        let pulls = drive.abs() > l.drive_max / 3.0;
+        self.still_s =
+            if pulls && same_angle && speed == self.last_speed_rad_s { self.still_s + dt } else { 0.0 };
+        trip(Fault::SensorFrozen, self.still_s > l.frozen_s);
+        if angle.is_finite() {
+            self.last_angle_rad = angle;
+        }
+        if speed.is_finite() {
+            self.last_speed_rad_s = speed;
+        }
+
+        let count = |counter: &mut u32, on: bool| {
+            *counter = if on { counter.saturating_add(1) } else { 0 };
+            *counter
+        };
+        let n = count(&mut self.over_current, measured.current_a.abs() > l.trip_current_a);
+        trip(Fault::OverCurrent, n >= OVER_TICKS);
+        let n = count(&mut self.over_speed, self.held_speed_rad_s.abs() > l.trip_speed_rad_s);
+        trip(Fault::OverSpeed, n >= OVER_TICKS);
+        let (low, high) = l.supply_v;
+        let n = count(&mut self.supply, measured.supply_v < low || measured.supply_v > high);
+        trip(Fault::SupplyOutOfRange, n >= SUPPLY_TICKS);
+        trip(Fault::OverTemperature, measured.temperature_c > l.temperature_c);
+
+        // First-order I2t: 1 is the temperature that the continuous current reaches in the end.
+        let heat = (self.held_current_a / l.continuous_current_a).powi(2);
+        self.thermal_load += (heat - self.thermal_load) * (dt / l.thermal_time_constant_s).min(1.0);
+        trip(Fault::ThermalOverload, self.thermal_load > 1.1);
+
+        self.active = active;
+        active
+    }
+
+    /// The drive that may act, given what is wanted and what acted last, and the limits in force.
+    pub fn limit(&self, wanted: f64, last: f64) -> (f64, u64) {
+        let l = &self.limits;
+        let mut in_force = 0;
+
+        // Current: peak until the thermal budget nears its end, then down to continuous.
+        let spare = ((1.0 - self.thermal_load) / 0.1).clamp(0.0, 1.0);
+        let current = l.continuous_current_a.min(l.current_a);
+        let current = current + (l.current_a - current) * spare;
+        let (low, high) = match l.kind {
+            DriveKind::Current => (-current, current),
+            DriveKind::Voltage => {
+                // R i + ke Om: the voltage that drives just this current at this speed.
+                let (resistance, ke) = l.winding;
+                let back = ke * self.held_speed_rad_s;
+                (
+                    (back - resistance * current).max(-l.drive_max),
+                    (back + resistance * current).min(l.drive_max),
+                )
+            }
+            DriveKind::Duty | DriveKind::Speed => (-l.drive_max, l.drive_max),
+        };
+        let wanted = if wanted.is_finite() { wanted } else { 0.0 };
+        let mut drive = wanted.max(low.min(high)).min(high.max(low));
+        if drive != wanted {
+            let thermal = spare < 1.0 && wanted.abs() <= l.drive_max;
+            in_force |= if thermal { Limit::Thermal.bit() } else { Limit::DriveRange.bit() };
+        }
+
+        // Speed: from the limit on, driving torque fades out over a tenth of it; braking stays.
+        let speed = self.held_speed_rad_s;
+        if l.kind != DriveKind::Speed && drive * speed > 0.0 && speed.abs() > l.speed_rad_s {
+            drive *= (1.0 - (speed.abs() / l.speed_rad_s - 1.0) / 0.1).clamp(0.0, 1.0);
+            in_force |= Limit::DriveSpeed.bit();
+        }
+
+        let most = l.drive_max * self.dt_s / l.full_drive_s;
+        if (drive - last).abs() > most * (1.0 + 1e-9) {
+            drive = last + most.copysign(drive - last);
+            in_force |= Limit::DriveSlew.bit();
+        }
+        // Nothing above can make a finite command infinite; this is the last line all the same.
+        if drive.is_finite() { (drive, in_force) } else { (0.0, in_force) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    pub(crate) fn limits() -> Limits {
+        Limits {
+            kind: DriveKind::Current,
+            drive_max: 9.0,
+            current_a: 9.0,
+            trip_current_a: 11.0,
+            continuous_current_a: 6.0,
+            thermal_time_constant_s: 2.0,
+            speed_rad_s: 80.0,
+            trip_speed_rad_s: 95.0,
+            full_drive_s: 0.01,
+            supply_v: (90.0, 140.0),
+            temperature_c: 100.0,
+            frozen_s: 0.2,
+            spike_rad_s: 20.0,
+            winding: (f64::NAN, 1.2),
+        }
+    }
+
+    fn turning(i: u32) -> Signals {
+        Signals {
+            current_a: 1.0,
+            shaft_speed_rad_s: 10.0,
+            shaft_angle_rad: f64::from(i) * 0.01,
+            supply_v: 120.0,
+            ..Signals::UNKNOWN
+        }
+    }
+
+    fn after(change: impl Fn(u32, &mut Signals), ticks: u32, drive: f64) -> u64 {
+        let mut guard = Guard::new(limits(), 1e-3);
+        let mut seen = 0;
+        for i in 0..ticks {
+            let mut s = turning(i);
+            change(i, &mut s);
+            seen |= guard.inspect(&s, drive, 1);
+        }
+        seen
+    }
+
+    #[test]
+    fn a_healthy_thruster_trips_nothing() {
+        assert_eq!(after(|_, _| {}, 2000, 5.0), 0);
+        // A shaft at rest without drive, and one bad sample of each kind, are no faults.
+        assert_eq!(after(|_, s| s.shaft_angle_rad = 1.0, 2000, 0.0), 0);
+        assert_eq!(
+            after(
+                |i, s| if i == 7 {
+                    s.shaft_speed_rad_s = f64::NAN
+                },
+                100,
+                5.0
+            ),
+            0
+        );
+        assert_eq!(
+            after(
+                |i, s| if i == 7 {
+                    s.current_a = 50.0
+                },
+                100,
+                5.0
+            ),
+            0
+        );
+        assert_eq!(
+            after(
+                |i, s| if i == 7 {
+                    s.supply_v = 0.0
+                },
+                100,
+                5.0
+            ),
+            0
+        );
+    }
+
+    #[test]
+    fn each_cause_trips_its_own_fault() {
+        assert_eq!(after(|_, s| s.current_a = 11.5, 10, 5.0), Fault::OverCurrent.bit());
+        assert_eq!(after(|_, s| s.shaft_speed_rad_s = -96.0, 10, 5.0), Fault::OverSpeed.bit());
+        assert_eq!(
+            after(|_, s| s.current_a = f64::INFINITY, 10, 0.0) & Fault::SensorNotFinite.bit(),
+            Fault::SensorNotFinite.bit()
+        );
+        assert_eq!(after(|_, s| s.shaft_speed_rad_s = f64::NAN, 10, 0.0), Fault::SensorNotFinite.bit());
+        assert_eq!(after(|_, s| s.shaft_angle_rad = 1.0, 300, 5.0), Fault::SensorFrozen.bit());
+        assert_eq!(after(|_, s| s.supply_v = 50.0, 20, 0.0), Fault::SupplyOutOfRange.bit());
+        assert_eq!(after(|_, s| s.temperature_c = 150.0, 3, 0.0), Fault::OverTemperature.bit());
+        assert_eq!(after(|_, s| s.current_a = 9.0, 5000, 5.0), Fault::ThermalOverload.bit());
+        let spiky = |i: u32, s: &mut Signals| {
+            if i % 20 == 10 {
+                s.shaft_speed_rad_s = 70.0
+            }
+        };
+        assert_eq!(after(spiky, 200, 5.0), Fault::SensorSpike.bit());
+    }
+
+    #[test]
+    fn the_thermal_budget_folds_back_before_it_trips() {
+        let mut guard = Guard::new(limits(), 1e-3);
+        let mut drive = 0.0;
+        for i in 0..20_000 {
+            let faults = guard.inspect(&Signals { current_a: drive, ..turning(i) }, drive, 1);
+            assert_eq!(faults, 0, "tick {i}, load {}", guard.thermal_load());
+            drive = guard.limit(9.0, drive).0;
+        }
+        let (held, in_force) = guard.limit(9.0, drive);
+        assert!((6.0..6.5).contains(&held), "{held}");
+        assert_eq!(in_force, Limit::Thermal.bit());
+    }
+
+    proptest! {
+        #[test]
+        fn no_wish_leaves_the_limits(
+            wanted in prop_oneof![Just(f64::NAN), Just(f64::INFINITY), Just(f64::NEG_INFINITY), -1e300..1e300],
+            last in -9.0..9.0f64,
+            speed in -200.0..200.0f64,
+            current in -30.0..30.0f64,
+            kind in prop_oneof![Just(DriveKind::Current), Just(DriveKind::Speed), Just(DriveKind::Duty)],
+        ) {
+            let mut guard = Guard::new(Limits { kind, ..limits() }, 1e-3);
+            guard.inspect(&Signals { current_a: current, shaft_speed_rad_s: speed, ..turning(0) }, last, 1);
+            let (drive, _) = guard.limit(wanted, last);
+            prop_assert!(drive.is_finite() && drive.abs() <= 9.0 + 1e-9);
+            prop_assert!((drive - last).abs() <= 0.9 + 1e-9, "slew");
+        }
+
+        #[test]
+        fn a_voltage_drive_keeps_the_current_limit(wanted in -500.0..500.0f64, speed in -80.0..80.0f64) {
+            let l = Limits { kind: DriveKind::Voltage, drive_max: 120.0, winding: (2.0, 1.2), full_drive_s: 1e-9, ..limits() };
+            let mut guard = Guard::new(l, 1e-3);
+            guard.inspect(&Signals { shaft_speed_rad_s: speed, ..turning(0) }, 0.0, 1);
+            let (volts, _) = guard.limit(wanted, 0.0);
+            let current = (volts - 1.2 * speed) / 2.0;
+            prop_assert!(current.abs() <= 9.0 + 1e-9, "{current} A");
+        }
+    }
+}

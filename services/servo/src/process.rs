@@ -1,0 +1,163 @@
+//! The servo's process: clock, real-time scheduling, shared memory around the pure tick.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use kort_proto::config::{Config, ConfigError};
+use kort_proto::messages::Request;
+use kort_proto::signals::Signals;
+use kort_proto::transport::{Deployment, ServoPorts, Ticker, TransportError, monotonic_ns, realtime};
+use kort_thruster::rig::Rig;
+use thiserror::Error;
+use tracing::{info, warn};
+
+use crate::amplifier::{self, Amplifier};
+use crate::settings::Settings;
+use crate::tick::{Inputs, Servo};
+
+/// Most requests read in one tick; the rest waits.
+const REQUESTS_PER_TICK: usize = 4;
+
+/// Why the servo cannot run.
+#[derive(Debug, Error)]
+pub enum ServoError {
+    /// The configuration.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// The rig description.
+    #[error("{file}: {error}")]
+    Rig {
+        /// The rig's file.
+        file: String,
+        /// What is wrong with it.
+        error: kort_thruster::rig::RigError,
+    },
+    /// Shared memory.
+    #[error(transparent)]
+    Transport(#[from] TransportError),
+    /// Signals cannot be watched.
+    #[error("signals cannot be watched: {0}")]
+    Signals(#[from] std::io::Error),
+}
+
+/// Runs the servo of one thruster until SIGTERM or SIGINT. With `join` another process owns the
+/// shared memory; without, this one creates it.
+///
+/// # Errors
+/// [`ServoError`] before the loop starts; the loop itself only ends by a signal.
+pub fn run(config: &Config, deployment: &Deployment, id: &str, join: bool) -> Result<(), ServoError> {
+    let thruster = config.thruster(id)?;
+    let (file, text) = config.rig_text(id, thruster)?;
+    let rig = Rig::from_toml(&text).map_err(|error| ServoError::Rig { file, error })?;
+    let settings = Settings::new(config, id, thruster, &rig)?;
+    let mut amplifier = amplifier::build(config, id, thruster, &rig)?;
+    let stop = Arc::new(AtomicBool::new(false));
+    for signal in [signal_hook::consts::SIGTERM, signal_hook::consts::SIGINT] {
+        signal_hook::flag::register(signal, Arc::clone(&stop))?;
+    }
+    let owner = if join { None } else { Some(own(config, deployment, &stop)?) };
+    deployment.wait_for_generation(Duration::from_secs(10))?;
+    let mut ports = ServoPorts::open(deployment, id)?;
+    if thruster.servo.priority > 0 {
+        for missing in realtime(thruster.servo.priority, true) {
+            warn!("{missing}");
+        }
+    }
+    info!(
+        thruster = id,
+        rate_hz = thruster.servo.rate_hz,
+        amplifier = thruster.amplifier,
+        "servo runs, disarmed"
+    );
+    let servo = Servo::new(settings, monotonic_ns());
+    tick_until_stopped(servo, amplifier.as_mut(), &mut ports, settings.period_ns, &stop);
+    info!(thruster = id, "servo ends, drive off");
+    drop(ports);
+    if let Some(owner) = owner {
+        let _ = owner.join();
+    }
+    Ok(())
+}
+
+/// The loop. From here on nothing allocates, waits for another process or panics.
+fn tick_until_stopped(
+    mut servo: Servo,
+    amplifier: &mut dyn Amplifier,
+    ports: &mut ServoPorts,
+    period_ns: u64,
+    stop: &AtomicBool,
+) {
+    let mut ticker = Ticker::new(period_ns);
+    loop {
+        let (deadline_ns, missed) = ticker.wait();
+        let woke_ns = monotonic_ns();
+        if stop.load(Ordering::Relaxed) {
+            servo.stop();
+        }
+        let mut measured = Signals::UNKNOWN;
+        let well = amplifier.measure(1 + missed, &mut measured).is_ok();
+        let command = ports.command.latest();
+        let inputs = Inputs {
+            now_ns: woke_ns,
+            ticks: 1 + missed,
+            command: command.as_ref(),
+            measured: &measured,
+            amplifier_well: well,
+        };
+        for _ in 0..REQUESTS_PER_TICK {
+            let Some(request): Option<Request> = ports.request.next() else { break };
+            if let Some(reply) = servo.request(&request, woke_ns) {
+                let _ = ports.reply.send(reply);
+            }
+        }
+        amplifier.drive(servo.tick(&inputs));
+        let mut telemetry = servo.telemetry(deadline_ns, &measured);
+        telemetry.timing = ticker.timing;
+        // A sample that cannot be sent is missed by its readers, who watch for that.
+        let _ = ports.telemetry.send(telemetry);
+        ports.waker.wake();
+        ticker.worked(woke_ns);
+        if stop.load(Ordering::Relaxed) {
+            amplifier.drive(None);
+            return;
+        }
+    }
+}
+
+/// Owns the shared memory on a thread of its own: clearing up after dead peers takes tens of
+/// milliseconds.
+fn own(
+    config: &Config,
+    deployment: &Deployment,
+    stop: &Arc<AtomicBool>,
+) -> Result<std::thread::JoinHandle<()>, ServoError> {
+    let ids: Vec<String> = config.thrusters.keys().cloned().collect();
+    let (deployment, stop) = (deployment.clone(), Arc::clone(stop));
+    let (tell, told) = std::sync::mpsc::channel();
+    let thread = std::thread::Builder::new().name("owner".into()).spawn(move || {
+        let created = deployment.own().and_then(|mut owner| {
+            owner.create(&ids.iter().map(String::as_str).collect::<Vec<_>>())?;
+            Ok(owner)
+        });
+        let owner = match created {
+            Ok(owner) => {
+                let _ = tell.send(Ok(()));
+                owner
+            }
+            Err(e) => {
+                let _ = tell.send(Err(e));
+                return;
+            }
+        };
+        while !stop.load(Ordering::Relaxed) {
+            std::thread::sleep(Duration::from_millis(200));
+            owner.clear_up_after_the_dead();
+        }
+    })?;
+    match told.recv() {
+        Ok(created) => created?,
+        Err(_) => return Err(ServoError::Signals(std::io::Error::other("the owner's thread ended"))),
+    }
+    Ok(thread)
+}

@@ -1,0 +1,168 @@
+//! The servo's settings: what `kort.toml` says, with what it leaves out taken from the rig.
+
+use kort_proto::config::{Config, ConfigError, Thruster};
+use kort_proto::messages::DriveKind;
+use kort_thruster::rig::{AmplifierKind, Rig};
+use serde::Deserialize;
+
+/// Section `limits` as written.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct LimitKeys {
+    current_a: Option<f64>,
+    trip_current_a: Option<f64>,
+    continuous_current_a: Option<f64>,
+    thermal_time_constant_s: Option<f64>,
+    speed_rad_s: Option<f64>,
+    trip_speed_rad_s: Option<f64>,
+    full_drive_s: Option<f64>,
+    supply_low_v: Option<f64>,
+    supply_high_v: Option<f64>,
+    temperature_c: Option<f64>,
+}
+
+/// Section `checks` as written.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct CheckKeys {
+    frozen_s: Option<f64>,
+    spike_rad_s: Option<f64>,
+}
+
+/// Limits and checks in force; every value finite or plus infinity.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// Unit of the drive.
+    pub kind: DriveKind,
+    /// Largest drive, in the unit of the drive.
+    pub drive_max: f64,
+    /// Largest motor current, A.
+    pub current_a: f64,
+    /// Measured current that trips, A.
+    pub trip_current_a: f64,
+    /// Current the motor bears for ever, A.
+    pub continuous_current_a: f64,
+    /// Time constant of the I2t budget, s.
+    pub thermal_time_constant_s: f64,
+    /// Shaft speed from which drive is taken away, rad/s.
+    pub speed_rad_s: f64,
+    /// Measured shaft speed that trips, rad/s.
+    pub trip_speed_rad_s: f64,
+    /// Shortest time from zero to full drive, s.
+    pub full_drive_s: f64,
+    /// Band of the supply, V.
+    pub supply_v: (f64, f64),
+    /// Motor temperature that trips, deg C.
+    pub temperature_c: f64,
+    /// Longest time the shaft sensor may stand still while the motor pulls, s.
+    pub frozen_s: f64,
+    /// Largest believable change of shaft speed in one tick, rad/s.
+    pub spike_rad_s: f64,
+    /// Winding resistance, ohm, and back-EMF constant, V s: a voltage drive's current limit.
+    pub winding: (f64, f64),
+}
+
+/// Everything the pure servo needs to know.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Period of the loop, ns.
+    pub period_ns: u64,
+    /// Age of the newest command at which the servo trips, ns.
+    pub command_timeout_ns: u64,
+    /// Limits and checks.
+    pub limits: Limits,
+}
+
+impl Settings {
+    /// Reads the settings of a thruster.
+    ///
+    /// # Errors
+    /// [`ConfigError`] names file, key, value and what is allowed.
+    pub fn new(config: &Config, id: &str, thruster: &Thruster, rig: &Rig) -> Result<Self, ConfigError> {
+        let section = |part: &str| format!("thrusters.{id}.{part}");
+        let keys: LimitKeys = config.section(&section("limits"), &thruster.limits)?;
+        let checks: CheckKeys = config.section(&section("checks"), &thruster.checks)?;
+        let positive = |key: &str, value: f64| {
+            if value > 0.0 {
+                return Ok(value);
+            }
+            Err(config.error(format!(
+                "`thrusters.{id}.{key}` = {value} is not above zero\nhint: leave it out to take the rig's"
+            )))
+        };
+        let need = |key: &str, value: Option<f64>, instead: &str| {
+            value.filter(|v| v.is_finite()).ok_or_else(|| {
+                config.error(format!(
+                    "`thrusters.{id}.{key}` is missing\nhint: set it, or state {instead} in the rig"
+                ))
+            })
+        };
+        let period_s = thruster.servo_period_ns() as f64 * 1e-9;
+        let kt = rig.motor.torque_constant_nm_a.value;
+        let current_a = positive(
+            "limits.current_a",
+            need(
+                "limits.current_a",
+                keys.current_a.or(Some(rig.amplifier.current_limit_a)),
+                "amplifier.current_limit_a",
+            )?,
+        )?;
+        let speed_rad_s = positive("limits.speed_rad_s", keys.speed_rad_s.unwrap_or(f64::INFINITY))?;
+        let (kind, drive_max) = match rig.amplifier.kind {
+            AmplifierKind::Current => (DriveKind::Current, current_a),
+            AmplifierKind::Voltage => {
+                (DriveKind::Voltage, need("limits.supply", rig.amplifier.supply_v, "amplifier.supply_v")?)
+            }
+            AmplifierKind::Speed => {
+                (DriveKind::Speed, need("limits.speed_rad_s", Some(speed_rad_s), "no speed")?)
+            }
+        };
+        // Fastest honest change in one tick: full torque reversed on the bare inertia, tenfold,
+        // and some counts of the encoder.
+        let fastest = 2.0 * kt * current_a / rig.motor.inertia_kg_m2.value * period_s;
+        let count = rig.sensors.encoder_counts_per_rev.map_or(0.0, |n| std::f64::consts::TAU / n / period_s);
+        let limits = Limits {
+            kind,
+            drive_max,
+            current_a,
+            trip_current_a: positive(
+                "limits.trip_current_a",
+                keys.trip_current_a.unwrap_or(1.25 * current_a),
+            )?,
+            continuous_current_a: positive(
+                "limits.continuous_current_a",
+                keys.continuous_current_a.unwrap_or(current_a),
+            )?,
+            thermal_time_constant_s: positive(
+                "limits.thermal_time_constant_s",
+                keys.thermal_time_constant_s.unwrap_or(60.0),
+            )?,
+            speed_rad_s,
+            trip_speed_rad_s: positive(
+                "limits.trip_speed_rad_s",
+                keys.trip_speed_rad_s.unwrap_or(1.15 * speed_rad_s),
+            )?,
+            full_drive_s: positive("limits.full_drive_s", keys.full_drive_s.unwrap_or(0.005))?,
+            supply_v: (
+                keys.supply_low_v.unwrap_or(f64::NEG_INFINITY),
+                keys.supply_high_v.unwrap_or(f64::INFINITY),
+            ),
+            temperature_c: keys.temperature_c.unwrap_or(f64::INFINITY),
+            frozen_s: positive("checks.frozen_s", checks.frozen_s.unwrap_or(0.5))?,
+            spike_rad_s: positive(
+                "checks.spike_rad_s",
+                checks.spike_rad_s.unwrap_or(10.0 * fastest + 4.0 * count),
+            )?,
+            winding: (rig.motor.winding_resistance_ohm.map_or(f64::NAN, |r| r.value), kt),
+        };
+        if limits.trip_current_a < current_a {
+            return Err(config.error(format!(
+                "`thrusters.{id}.limits.trip_current_a` = {} is below current_a = {current_a}\nhint: 1.25 times current_a",
+                limits.trip_current_a
+            )));
+        }
+        // 3.5 of the controller's periods, so that zero torque is reached within five.
+        let command_timeout_ns = thruster.controller_period_ns() * 7 / 2;
+        Ok(Self { period_ns: thruster.servo_period_ns(), command_timeout_ns, limits })
+    }
+}

@@ -1,0 +1,439 @@
+//! The servo's pure step: newest command and measurements in, drive and telemetry out.
+
+use kort_proto::faults::{Fault, Names};
+use kort_proto::messages::{
+    Command, DriveKind, Fresh, Freshness, Outcome, Process, REQUEST_LIFE_NS, Reply, Request, RequestKind,
+    Telemetry,
+};
+use kort_proto::signals::Signals;
+
+use crate::guard::Guard;
+use crate::settings::Settings;
+
+/// State of the servo. Starts disarmed at zero.
+#[derive(Clone, Copy, Debug)]
+pub struct Servo {
+    settings: Settings,
+    guard: Guard,
+    started_ns: u64,
+    fresh: Freshness,
+    command: Command,
+    armed: bool,
+    armed_at_ns: u64,
+    latched: u64,
+    limits: u64,
+    drive: f64,
+    invalid: u64,
+    stale: u64,
+}
+
+/// What one tick sees.
+#[derive(Clone, Copy, Debug)]
+pub struct Inputs<'a> {
+    /// The tick's instant on CLOCK_MONOTONIC, ns.
+    pub now_ns: u64,
+    /// Periods since the last tick: one, and more after missed ones.
+    pub ticks: u64,
+    /// Newest command received since the last tick.
+    pub command: Option<&'a Command>,
+    /// What the sensors show.
+    pub measured: &'a Signals,
+    /// The drive answers and reports no fault of its own.
+    pub amplifier_well: bool,
+}
+
+impl Servo {
+    /// A servo at rest; `started_ns` is now on CLOCK_MONOTONIC: nothing sent before counts.
+    pub fn new(settings: Settings, started_ns: u64) -> Self {
+        Self {
+            settings,
+            guard: Guard::new(settings.limits, settings.period_ns as f64 * 1e-9),
+            started_ns,
+            fresh: Freshness::default(),
+            command: Command::default(),
+            armed: false,
+            armed_at_ns: 0,
+            latched: 0,
+            limits: 0,
+            drive: 0.0,
+            invalid: 0,
+            stale: 0,
+        }
+    }
+
+    /// Is the drive's output on?
+    pub fn armed(&self) -> bool {
+        self.armed
+    }
+
+    /// Latched faults.
+    pub fn faults(&self) -> u64 {
+        self.latched
+    }
+
+    /// One tick. Returns the drive for the amplifier; `None` means output stage off.
+    pub fn tick(&mut self, inputs: &Inputs) -> Option<f64> {
+        let mut faults = self.guard.inspect(inputs.measured, self.drive, inputs.ticks);
+        if !inputs.amplifier_well {
+            faults |= Fault::AmplifierFault.bit();
+        }
+        if let Some(command) = inputs.command {
+            faults |= self.take(command, inputs.now_ns);
+        }
+        // The following are faults only while the drive is on.
+        if self.armed {
+            if inputs.ticks.saturating_mul(self.settings.period_ns) > self.settings.command_timeout_ns {
+                faults |= Fault::LoopStalled.bit();
+            }
+            if inputs.now_ns.saturating_sub(self.command.header.stamp_ns) > self.settings.command_timeout_ns {
+                faults |= Fault::CommandTimeout.bit();
+            }
+        }
+        self.latched |= faults;
+        if self.latched != 0 || self.command.stop != 0 {
+            self.armed = false;
+        }
+        if !self.armed {
+            self.drive = 0.0;
+            self.limits = 0;
+            return None;
+        }
+        (self.drive, self.limits) = self.guard.limit(self.command.drive, self.drive);
+        Some(self.drive)
+    }
+
+    /// Zero and disarmed at once; the process is about to end.
+    pub fn stop(&mut self) {
+        self.armed = false;
+        self.drive = 0.0;
+    }
+
+    /// Takes a command if it is new and sound. Returns the faults it raises.
+    fn take(&mut self, command: &Command, now_ns: u64) -> u64 {
+        let sender = self.fresh.check(&command.header, now_ns, self.settings.command_timeout_ns);
+        if sender == Fresh::No {
+            self.stale = self.stale.wrapping_add(1);
+            return 0;
+        }
+        let sound = command.drive.is_finite()
+            && command.drive.abs() <= self.guard.limits().drive_max * (1.0 + 1e-9)
+            && DriveKind::from_u32(command.kind) == Some(self.guard.limits().kind);
+        if !sound {
+            self.invalid = self.invalid.wrapping_add(1);
+            return if self.armed { Fault::CommandInvalid.bit() } else { 0 };
+        }
+        self.command = *command;
+        if sender == Fresh::NewSession && self.armed { Fault::ControllerRestarted.bit() } else { 0 }
+    }
+
+    /// Acts on a request; `None` if it is not for the servo, or too old to be meant for now.
+    pub fn request(&mut self, request: &Request, now_ns: u64) -> Option<Reply> {
+        let sent = request.header.stamp_ns;
+        if sent < self.started_ns || now_ns.saturating_sub(sent) > REQUEST_LIFE_NS {
+            return None;
+        }
+        let answer =
+            |outcome, words: std::fmt::Arguments| Some(Reply::to(request, Process::Servo, outcome, words));
+        match RequestKind::from_u32(request.kind)? {
+            RequestKind::Arm if self.armed => answer(Outcome::Done, format_args!("armed already")),
+            RequestKind::Arm if self.latched != 0 => answer(
+                Outcome::Refused,
+                format_args!(
+                    "faults are latched: {}; hint: remove the cause, then clear-faults",
+                    Names(self.latched)
+                ),
+            ),
+            RequestKind::Arm
+                if now_ns.saturating_sub(self.command.header.stamp_ns) > self.settings.command_timeout_ns =>
+            {
+                answer(
+                    Outcome::Refused,
+                    format_args!("no controller sends commands; hint: see the controller's log"),
+                )
+            }
+            RequestKind::Arm if self.command.stop != 0 => answer(
+                Outcome::Refused,
+                format_args!("the controller says stop; hint: see its faults, then clear-faults"),
+            ),
+            RequestKind::Arm if self.command.drive != 0.0 => answer(
+                Outcome::Refused,
+                format_args!("the controller does not ask for zero; hint: set the setpoint to zero first"),
+            ),
+            RequestKind::Arm => {
+                self.armed = true;
+                self.armed_at_ns = now_ns;
+                answer(Outcome::Done, format_args!("armed"))
+            }
+            RequestKind::Disarm => {
+                self.stop();
+                answer(Outcome::Done, format_args!("disarmed"))
+            }
+            RequestKind::ClearFaults => {
+                // What is latched and still there stays.
+                self.latched &= self.guard.active();
+                if self.latched == 0 {
+                    answer(Outcome::Done, format_args!("no faults"))
+                } else {
+                    answer(
+                        Outcome::Refused,
+                        format_args!("the cause is still there: {}", Names(self.latched)),
+                    )
+                }
+            }
+            RequestKind::SetController => None,
+        }
+    }
+
+    /// The tick's telemetry, without header and timing: measured signals with the commands that
+    /// act from this tick on.
+    pub fn telemetry(&self, time_ns: u64, measured: &Signals) -> Telemetry {
+        let kind = self.guard.limits().kind;
+        let commanded = |k: DriveKind| if k == kind { self.drive } else { f64::NAN };
+        let asked = |value: f64| if self.armed { value } else { f64::NAN };
+        let signals = Signals {
+            current_cmd_a: commanded(DriveKind::Current),
+            voltage_cmd_v: commanded(DriveKind::Voltage),
+            duty_cmd: commanded(DriveKind::Duty),
+            speed_cmd_rad_s: if kind == DriveKind::Speed {
+                self.drive
+            } else {
+                asked(self.command.speed_cmd_rad_s)
+            },
+            thrust_cmd_n: asked(self.command.thrust_cmd_n),
+            ..*measured
+        };
+        Telemetry {
+            time_ns,
+            signals,
+            faults: self.latched,
+            limits: self.limits,
+            armed: u32::from(self.armed),
+            drive_kind: kind as u32,
+            armed_at_ns: self.armed_at_ns,
+            command_sequence: self.command.header.sequence,
+            command_stamp_ns: self.command.header.stamp_ns,
+            command_telemetry_stamp_ns: self.command.telemetry_stamp_ns,
+            commands_invalid: self.invalid,
+            commands_stale: self.stale,
+            thermal_load: self.guard.thermal_load(),
+            ..Telemetry::default()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::Limits;
+    use kort_proto::messages::Header;
+    use proptest::prelude::*;
+
+    const MS: u64 = 1_000_000;
+
+    fn settings() -> Settings {
+        Settings {
+            period_ns: MS,
+            command_timeout_ns: 14 * MS,
+            limits: Limits {
+                kind: DriveKind::Current,
+                drive_max: 9.0,
+                current_a: 9.0,
+                trip_current_a: 11.0,
+                continuous_current_a: 9.0,
+                thermal_time_constant_s: 60.0,
+                speed_rad_s: 80.0,
+                trip_speed_rad_s: 95.0,
+                full_drive_s: 0.001,
+                supply_v: (f64::NEG_INFINITY, f64::INFINITY),
+                temperature_c: f64::INFINITY,
+                frozen_s: 10.0,
+                spike_rad_s: 1e9,
+                winding: (f64::NAN, 1.2),
+            },
+        }
+    }
+
+    /// A servo with a controller that repeats itself every tick.
+    struct Bench {
+        servo: Servo,
+        now_ns: u64,
+        sequence: u64,
+        session: u64,
+    }
+
+    impl Bench {
+        fn new() -> Self {
+            Self {
+                servo: Servo::new(settings(), 1000 * MS),
+                now_ns: 1000 * MS,
+                sequence: 0,
+                session: 900 * MS,
+            }
+        }
+
+        fn command(&mut self, drive: f64) -> Command {
+            self.sequence += 1;
+            Command {
+                header: Header { sequence: self.sequence, stamp_ns: self.now_ns, session: self.session },
+                drive,
+                ..Command::default()
+            }
+        }
+
+        fn tick(&mut self, command: Option<&Command>) -> Option<f64> {
+            self.now_ns += MS;
+            let measured = Signals { current_a: 0.0, shaft_speed_rad_s: 0.0, ..Signals::UNKNOWN };
+            self.servo.tick(&Inputs {
+                now_ns: self.now_ns,
+                ticks: 1,
+                command,
+                measured: &measured,
+                amplifier_well: true,
+            })
+        }
+
+        fn drive(&mut self, drive: f64) -> Option<f64> {
+            let command = self.command(drive);
+            self.tick(Some(&command))
+        }
+
+        fn ask(&mut self, kind: RequestKind) -> Outcome {
+            let header = Header { sequence: 1, stamp_ns: self.now_ns, session: 950 * MS };
+            let request = Request { header, kind: kind as u32, ..Request::default() };
+            Outcome::from_u32(self.servo.request(&request, self.now_ns).unwrap().outcome).unwrap()
+        }
+
+        fn armed() -> Self {
+            let mut bench = Self::new();
+            bench.drive(0.0);
+            assert_eq!(bench.ask(RequestKind::Arm), Outcome::Done);
+            bench
+        }
+    }
+
+    #[test]
+    fn starts_disarmed_at_zero_and_needs_a_controller_at_zero_to_arm() {
+        let mut bench = Bench::new();
+        assert_eq!(bench.tick(None), None);
+        assert_eq!(bench.ask(RequestKind::Arm), Outcome::Refused, "no controller");
+        assert_eq!(bench.drive(3.0), None, "a command before arming");
+        assert_eq!(bench.ask(RequestKind::Arm), Outcome::Refused, "controller not at zero");
+        bench.drive(0.0);
+        assert_eq!(bench.ask(RequestKind::Arm), Outcome::Done);
+        assert_eq!(bench.drive(3.0), Some(3.0));
+    }
+
+    #[test]
+    fn silence_and_repeats_end_at_zero_and_are_latched() {
+        for repeat in [false, true] {
+            let mut bench = Bench::armed();
+            let last = bench.command(3.0);
+            assert_eq!(bench.tick(Some(&last)), Some(3.0));
+            let mut ticks = 0;
+            while bench.tick(repeat.then_some(&last)).is_some() {
+                ticks += 1;
+                assert!(ticks < 20, "never stopped");
+            }
+            assert!(ticks >= 10, "stopped after {ticks} ms already");
+            assert_eq!(bench.servo.faults(), Fault::CommandTimeout.bit());
+            assert_eq!(bench.drive(3.0), None, "a controller that comes back");
+            assert_eq!(bench.ask(RequestKind::Arm), Outcome::Refused);
+            assert_eq!(bench.ask(RequestKind::ClearFaults), Outcome::Done);
+            assert_eq!(bench.drive(3.0), None, "cleared, but not armed");
+        }
+    }
+
+    #[test]
+    fn another_controller_process_is_not_followed() {
+        let mut bench = Bench::armed();
+        bench.drive(3.0);
+        bench.session = bench.now_ns;
+        assert_eq!(bench.drive(3.0), None);
+        assert_eq!(bench.servo.faults(), Fault::ControllerRestarted.bit());
+    }
+
+    #[test]
+    fn stop_disarms_without_a_fault() {
+        let mut bench = Bench::armed();
+        bench.drive(3.0);
+        let stop = Command { stop: 1, ..bench.command(3.0) };
+        assert_eq!(bench.tick(Some(&stop)), None);
+        assert_eq!(bench.servo.faults(), 0);
+        assert_eq!(bench.drive(3.0), None);
+    }
+
+    #[test]
+    fn a_stalled_loop_and_a_sick_drive_trip() {
+        let mut bench = Bench::armed();
+        let measured = Signals { current_a: 0.0, shaft_speed_rad_s: 0.0, ..Signals::UNKNOWN };
+        bench.now_ns += 30 * MS;
+        let command = bench.command(3.0);
+        let inputs = Inputs {
+            now_ns: bench.now_ns,
+            ticks: 30,
+            command: Some(&command),
+            measured: &measured,
+            amplifier_well: true,
+        };
+        assert_eq!(bench.servo.tick(&inputs), None);
+        assert_eq!(bench.servo.faults(), Fault::LoopStalled.bit());
+        let mut bench = Bench::armed();
+        let inputs = Inputs {
+            now_ns: bench.now_ns,
+            ticks: 1,
+            command: None,
+            measured: &measured,
+            amplifier_well: false,
+        };
+        assert_eq!(bench.servo.tick(&inputs), None);
+        assert_eq!(bench.servo.faults(), Fault::AmplifierFault.bit());
+    }
+
+    #[test]
+    fn an_old_request_is_not_acted_upon() {
+        let mut bench = Bench::new();
+        bench.drive(0.0);
+        for stamp_ns in [999 * MS, bench.now_ns - REQUEST_LIFE_NS - 1] {
+            let header = Header { sequence: 1, stamp_ns, session: 1 };
+            let request = Request { header, kind: RequestKind::Arm as u32, ..Request::default() };
+            assert!(bench.servo.request(&request, bench.now_ns).is_none());
+        }
+        assert!(!bench.servo.armed());
+    }
+
+    fn any_command() -> impl Strategy<Value = (f64, u32, u64, i64, u32)> {
+        let drive = prop_oneof![
+            Just(f64::NAN),
+            Just(f64::INFINITY),
+            Just(f64::NEG_INFINITY),
+            Just(9.0),
+            -20.0..20.0f64,
+            -1e300..1e300
+        ];
+        (drive, 0u32..6, 0u64..50, -100i64..100, 0u32..2)
+    }
+
+    proptest! {
+        #[test]
+        fn no_stream_of_commands_drives_beyond_the_limits(
+            stream in prop::collection::vec(any_command(), 1..100), arm_at in 0usize..50
+        ) {
+            let mut bench = Bench::new();
+            for (i, (drive, kind, sequence, offset_ms, stop)) in stream.into_iter().enumerate() {
+                if i == arm_at {
+                    bench.drive(0.0);
+                    bench.ask(RequestKind::Arm);
+                }
+                let stamp_ns = bench.now_ns.saturating_add_signed(offset_ms * MS as i64);
+                let header = Header { sequence: bench.sequence + sequence, stamp_ns, session: bench.session };
+                let command = Command { header, drive, kind, stop, ..Command::default() };
+                if let Some(out) = bench.tick(Some(&command)) {
+                    prop_assert!(out.is_finite() && out.abs() <= 9.0);
+                    // What acts is a command that was sound and new when it came.
+                    prop_assert!(out == 0.0 || i > arm_at || i == arm_at);
+                }
+                bench.sequence += sequence;
+            }
+        }
+    }
+}
