@@ -223,9 +223,11 @@ message! { "kort.Setpoint",
     Setpoint {
         /// Sequence, stamp, session of the gateway.
         header: Header,
-        /// Counts accepted operator commands of this gateway session. A controller that has
-        /// zeroed itself waits for a larger one.
+        /// Counts accepted operator commands of this gateway session.
         generation: u64,
+        /// When the operator's command was accepted, on CLOCK_MONOTONIC, ns. Only one given
+        /// after the servo was armed counts: an old setpoint is never resumed.
+        given_at_ns: u64,
         /// End of the lease on CLOCK_MONOTONIC, ns; zero without a lease.
         lease_until_ns: u64,
         /// [`SetpointKind`]
@@ -288,6 +290,8 @@ message! { "kort.Telemetry",
         commands_stale: u64,
         /// Share of the I2t budget in use, 0 to 1.
         thermal_load: f64,
+        /// Largest drive the servo takes, in the unit of the drive.
+        drive_max: f64,
         /// The loop's timing.
         timing: Timing,
     }
@@ -314,10 +318,14 @@ message! { "kort.ControllerState",
         setpoint_value: f64,
         /// Setpoint as accepted, before ramps and limits.
         setpoint_accepted: f64,
-        /// Gateway session and generation of the setpoint in force.
+        /// Gateway session of the setpoint in force.
         setpoint_session: u64,
         /// Generation of the setpoint in force.
         setpoint_generation: u64,
+        /// Largest thrust the controller takes, N.
+        thrust_max_n: f64,
+        /// Largest shaft speed the controller takes, rad/s.
+        speed_max_rad_s: f64,
         /// Setpoints refused since start: not finite, out of range, unknown kind.
         setpoints_invalid: u64,
         /// What the observer believes.

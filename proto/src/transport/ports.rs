@@ -271,8 +271,8 @@ ports! {
     ControllerPorts, "controller";
     /// From the gateway.
     setpoint: Inbox<Setpoint> = |o| o.inbox(Stream::Setpoint, 1)?;
-    /// From the servo, latest value.
-    telemetry: Inbox<Telemetry> = |o| o.inbox(Stream::Telemetry, 1)?;
+    /// From the servo; some samples deep, so that slow sensors' values between two ticks count.
+    telemetry: Inbox<Telemetry> = |o| o.inbox(Stream::Telemetry, 64)?;
     /// From gateway and supervisor.
     request: Inbox<Request> = |o| o.inbox(Stream::Request, Stream::Request.depth())?;
     /// To the servo.

@@ -1,1 +1,12 @@
-//! The controller: observer, estimator and control law between setpoint and servo.
+//! The controller: setpoint and telemetry in, drive command out.
+//!
+//! [`tick`] is the pure step: which setpoint counts, what a loss leads to, and the control law of
+//! `kort-control` under it. The process (feature `process`) adds clock and shared memory; it wakes
+//! when the servo has sent telemetry.
+
+#[cfg(feature = "process")]
+mod process;
+pub mod tick;
+
+#[cfg(feature = "process")]
+pub use process::{ControllerError, run};

@@ -216,6 +216,7 @@ impl Servo {
             commands_invalid: self.invalid,
             commands_stale: self.stale,
             thermal_load: self.guard.thermal_load(),
+            drive_max: self.guard.limits().drive_max,
             ..Telemetry::default()
         }
     }

@@ -1,0 +1,180 @@
+//! The controller's process: wakes with the servo's telemetry, ticks, sends.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use kort_control::{ControllerConfig, LawKind, ModelError};
+use kort_proto::config::{Config, ConfigError, Thruster};
+use kort_proto::messages::{Command, Timing};
+use kort_proto::transport::{ControllerPorts, Deployment, TransportError, monotonic_ns, realtime};
+use kort_thruster::rig::Rig;
+use thiserror::Error;
+use tracing::{info, warn};
+
+use crate::tick::Tick;
+
+/// Telemetry samples read at one wake-up at most.
+const SAMPLES: usize = 64;
+/// Requests read in one tick at most.
+const REQUESTS: usize = 4;
+
+/// Why the controller cannot run.
+#[derive(Debug, Error)]
+pub enum ControllerError {
+    /// The deployment.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// The rig description.
+    #[error("{file}: {error}")]
+    Rig {
+        /// The rig's file.
+        file: String,
+        /// What is wrong with it.
+        error: kort_thruster::rig::RigError,
+    },
+    /// The file of law, observer and estimator.
+    #[error("{file}: {error}")]
+    Law {
+        /// The controller's file.
+        file: String,
+        /// What is wrong with it.
+        error: kort_control::ConfigError,
+    },
+    /// No controller for this rig.
+    #[error("{file}: {error}")]
+    Model {
+        /// The rig's file.
+        file: String,
+        /// Why not.
+        error: ModelError,
+    },
+    /// Shared memory.
+    #[error(transparent)]
+    Transport(#[from] TransportError),
+    /// Signals cannot be watched.
+    #[error("signals cannot be watched: {0}")]
+    Signals(#[from] std::io::Error),
+}
+
+/// Runs the controller of one thruster until SIGTERM or SIGINT.
+///
+/// # Errors
+/// [`ControllerError`] if the configuration or shared memory cannot be used.
+pub fn run(config: &Config, deployment: &Deployment, id: &str) -> Result<(), ControllerError> {
+    let thruster = config.thruster(id)?;
+    let (file, text) = config.rig_text(id, thruster)?;
+    let rig = Rig::from_toml(&text).map_err(|error| ControllerError::Rig { file: file.clone(), error })?;
+    let law = law(config, id, thruster)?;
+    let period_ns = thruster.controller_period_ns();
+    let stop = Arc::new(AtomicBool::new(false));
+    for signal in [signal_hook::consts::SIGTERM, signal_hook::consts::SIGINT] {
+        signal_hook::flag::register(signal, Arc::clone(&stop))?;
+    }
+    if thruster.controller.priority > 0 {
+        for missing in realtime(thruster.controller.priority, false) {
+            warn!("{missing}");
+        }
+    }
+    // Outer loop: a new owner of the shared memory begins a new generation; start afresh in it.
+    while !stop.load(Ordering::Relaxed) {
+        if deployment.wait_for_generation(Duration::from_secs(1)).is_err() {
+            continue;
+        }
+        let mut ports = ControllerPorts::open(deployment, id)?;
+        let tick = Tick::new(&rig, &law, period_ns, monotonic_ns())
+            .map_err(|error| ControllerError::Model { file: file.clone(), error })?;
+        info!(
+            thruster = id,
+            law = law.law.name(),
+            rate_hz = 1e9 / period_ns as f64,
+            "controller runs, at zero"
+        );
+        serve(tick, &mut ports, thruster, deployment, &stop);
+    }
+    info!(thruster = id, "controller ends, servo stopped");
+    Ok(())
+}
+
+/// Law, observer, estimator and options as the deployment says.
+fn law(config: &Config, id: &str, thruster: &Thruster) -> Result<ControllerConfig, ControllerError> {
+    let keys = &thruster.controller;
+    let mut law = if keys.file == Path::new("") {
+        ControllerConfig::default()
+    } else {
+        let (file, text) = config.text_of(&format!("thrusters.{id}.controller.file"), &keys.file, &[])?;
+        ControllerConfig::from_toml(&text).map_err(|error| ControllerError::Law { file, error })?
+    };
+    if !keys.law.is_empty() {
+        law.law = LawKind::from_name(&keys.law).ok_or_else(|| {
+            config.error(format!(
+                "`thrusters.{id}.controller.law` = \"{}\" is no control law\nhint: known are {}",
+                keys.law,
+                LawKind::ALL.map(LawKind::name).join(", ")
+            ))
+        })?;
+    }
+    Ok(law)
+}
+
+/// Ticks until told to stop or the shared memory has a new generation.
+fn serve(
+    mut tick: Tick,
+    ports: &mut ControllerPorts,
+    thruster: &Thruster,
+    deployment: &Deployment,
+    stop: &AtomicBool,
+) {
+    let period_ns = thruster.controller_period_ns();
+    let slack_ns = thruster.servo_period_ns() / 2;
+    let mut timing = Timing { period_ns, ..Timing::default() };
+    let mut last_ns = monotonic_ns();
+    let mut looked_ns = last_ns;
+    loop {
+        let woken = ports.ticks.wait(Duration::from_nanos(period_ns + slack_ns));
+        let woke_ns = monotonic_ns();
+        let mut sent_ns = woke_ns;
+        for _ in 0..SAMPLES {
+            let Some(telemetry) = ports.telemetry.next() else { break };
+            tick.take_telemetry(&telemetry, woke_ns);
+            sent_ns = telemetry.header.stamp_ns;
+        }
+        let stopping = stop.load(Ordering::Relaxed);
+        let due = woke_ns.saturating_sub(last_ns) + slack_ns >= period_ns;
+        if !due && !stopping {
+            continue;
+        }
+        let elapsed = woke_ns.saturating_sub(last_ns);
+        timing.overruns += (elapsed + slack_ns).checked_div(period_ns).unwrap_or(1).saturating_sub(1);
+        last_ns = woke_ns;
+        timing.count(woke_ns.saturating_sub(sent_ns));
+        if let Some(setpoint) = ports.setpoint.latest() {
+            tick.take_setpoint(&setpoint, woke_ns);
+        }
+        for _ in 0..REQUESTS {
+            let Some(request) = ports.request.next() else { break };
+            if let Some(reply) = tick.request(&request, woke_ns) {
+                let _ = ports.reply.send(reply);
+            }
+        }
+        let command = tick.tick(woke_ns);
+        let command = if stopping { Command { drive: 0.0, stop: 1, ..command } } else { command };
+        // What cannot be sent is missed by its reader, who watches for that.
+        let _ = ports.command.send(command);
+        let mut state = tick.state();
+        state.timing = timing;
+        let _ = ports.state.send(state);
+        timing.busy_ns = monotonic_ns().saturating_sub(woke_ns);
+        if stopping {
+            return;
+        }
+        // The servo is silent: perhaps its shared memory has been replaced.
+        if !woken && woke_ns.saturating_sub(looked_ns) > 200_000_000 {
+            looked_ns = woke_ns;
+            if deployment.generation() != Some(ports.generation) {
+                return;
+            }
+        }
+    }
+}

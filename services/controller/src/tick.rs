@@ -1,0 +1,413 @@
+//! The controller's pure step: which setpoint counts, what a loss leads to, and the law under it.
+
+use kort_control::limits::LimitSet;
+use kort_control::{
+    Controller, ControllerConfig, EstimatorKind, LawKind, Measurement, ModelError, ObserverKind, Output,
+    Reference, TUNABLES,
+};
+use kort_proto::faults::Fault;
+use kort_proto::limits::{FIRST_OF_CONTROL, Limit};
+use kort_proto::messages::{
+    Command, ControllerState, DriveKind, Fresh, Freshness, LAWS, Outcome, Parameter, Process,
+    REQUEST_LIFE_NS, Reply, Request, RequestKind, Setpoint, SetpointKind, Telemetry,
+};
+use kort_proto::signals::{Estimates, Signals};
+use kort_proto::text::Text;
+use kort_thruster::rig::{AmplifierKind, Rig};
+
+/// After the lease's end the setpoint falls to zero in this time, then the servo is stopped: all
+/// within 500 ms.
+const LEASE_RAMP_NS: u64 = 400_000_000;
+/// Silent controller periods after which a peer counts as lost.
+const GATEWAY_PERIODS: u64 = 3;
+const SERVO_PERIODS: u64 = 10;
+
+/// State of the controller between setpoint and law. Starts at zero.
+#[derive(Clone, Copy, Debug)]
+pub struct Tick {
+    controller: Controller,
+    config: ControllerConfig,
+    kind: DriveKind,
+    period_ns: u64,
+    started_ns: u64,
+    gateway: Freshness,
+    gateway_stamp_ns: u64,
+    servo: Freshness,
+    servo_stamp_ns: u64,
+    lease_until_ns: u64,
+    setpoint: Option<Accepted>,
+    lease_ended_ns: Option<u64>,
+    armed: bool,
+    armed_at_ns: u64,
+    drive_max: f64,
+    measured: Signals,
+    last_ns: u64,
+    latched: u64,
+    limits: u64,
+    invalid: u64,
+    output: Output,
+    in_force: f64,
+}
+
+/// A setpoint that counts.
+#[derive(Clone, Copy, Debug)]
+struct Accepted {
+    kind: SetpointKind,
+    value: f64,
+    session: u64,
+    generation: u64,
+}
+
+impl Tick {
+    /// A controller at rest. `started_ns` is now on CLOCK_MONOTONIC: nothing sent before counts.
+    ///
+    /// # Errors
+    /// [`ModelError`] if no controller can be built for the rig.
+    pub fn new(
+        rig: &Rig,
+        config: &ControllerConfig,
+        period_ns: u64,
+        started_ns: u64,
+    ) -> Result<Self, ModelError> {
+        Ok(Self {
+            controller: Controller::new(rig, config, period_ns as f64 * 1e-9)?,
+            config: *config,
+            kind: match rig.amplifier.kind {
+                AmplifierKind::Current => DriveKind::Current,
+                AmplifierKind::Voltage => DriveKind::Voltage,
+                AmplifierKind::Speed => DriveKind::Speed,
+            },
+            period_ns,
+            started_ns,
+            gateway: Freshness::default(),
+            gateway_stamp_ns: 0,
+            servo: Freshness::default(),
+            servo_stamp_ns: 0,
+            lease_until_ns: 0,
+            setpoint: None,
+            lease_ended_ns: None,
+            armed: false,
+            armed_at_ns: 0,
+            drive_max: 0.0,
+            measured: Signals::UNKNOWN,
+            last_ns: started_ns,
+            latched: 0,
+            limits: 0,
+            invalid: 0,
+            output: Output::default(),
+            in_force: 0.0,
+        })
+    }
+
+    /// Takes a telemetry sample; call for every one, oldest first.
+    pub fn take_telemetry(&mut self, telemetry: &Telemetry, now_ns: u64) {
+        let life_ns = SERVO_PERIODS * self.period_ns;
+        let sender = self.servo.check(&telemetry.header, now_ns, life_ns);
+        if sender == Fresh::No {
+            return;
+        }
+        self.servo_stamp_ns = telemetry.header.stamp_ns;
+        let armed = telemetry.armed != 0;
+        if !armed || sender == Fresh::NewSession || telemetry.armed_at_ns != self.armed_at_ns {
+            self.forget();
+        }
+        self.armed = armed;
+        self.armed_at_ns = telemetry.armed_at_ns;
+        self.drive_max = if telemetry.drive_max.is_finite() { telemetry.drive_max.max(0.0) } else { 0.0 };
+        // A slow sensor shows a value only on some ticks: keep the newest of each.
+        for row in kort_proto::signals::SIGNALS {
+            let value = (row.get)(&telemetry.signals);
+            if value.is_finite() {
+                (row.set)(&mut self.measured, value);
+            }
+        }
+        // A needed sensor that is gone must not look alive.
+        if !telemetry.signals.shaft_speed_rad_s.is_finite() {
+            self.measured.shaft_speed_rad_s = f64::NAN;
+        }
+    }
+
+    /// Takes the newest setpoint message.
+    pub fn take_setpoint(&mut self, message: &Setpoint, now_ns: u64) {
+        let sender = self.gateway.check(&message.header, now_ns, self.gateway_timeout_ns());
+        if sender == Fresh::No {
+            return;
+        }
+        if sender == Fresh::NewSession && self.armed {
+            self.trip(Fault::GatewayRestarted);
+        }
+        self.gateway_stamp_ns = message.header.stamp_ns;
+        self.lease_until_ns = message.lease_until_ns;
+        // Only a setpoint given under a living lease, after the arming, before any end of lease.
+        let counts = self.armed
+            && self.lease_ended_ns.is_none()
+            && message.given_at_ns > self.armed_at_ns
+            && message.given_at_ns <= message.header.stamp_ns
+            && now_ns < message.lease_until_ns;
+        if !counts || self.setpoint.is_some_and(|s| s.generation == message.generation) {
+            return;
+        }
+        let kind = SetpointKind::from_u32(message.kind);
+        let model = self.controller.model();
+        let largest = match kind {
+            Some(SetpointKind::Thrust) => model.thrust_max_n * (1.0 + 1e-9),
+            Some(SetpointKind::Speed) => model.speed_max_rad_s * (1.0 + 1e-9),
+            Some(SetpointKind::Zero) => f64::INFINITY,
+            None => f64::NAN,
+        };
+        let value = if kind == Some(SetpointKind::Zero) { 0.0 } else { message.value };
+        // Written so that a NaN on either side is refused; the setpoint before stays in force.
+        match kind {
+            Some(kind) if value.is_finite() && value.abs() <= largest => {
+                let session = message.header.session;
+                self.setpoint = Some(Accepted { kind, value, session, generation: message.generation });
+            }
+            _ => self.invalid = self.invalid.wrapping_add(1),
+        }
+    }
+
+    /// One tick: the command for the servo. Its header is the sender's business.
+    pub fn tick(&mut self, now_ns: u64) -> Command {
+        let dt_s = now_ns.saturating_sub(self.last_ns) as f64 * 1e-9;
+        self.last_ns = now_ns;
+        if self.armed {
+            if now_ns.saturating_sub(self.servo_stamp_ns) > SERVO_PERIODS * self.period_ns {
+                self.trip(Fault::ServoLost);
+            }
+            // A gateway that has not spoken since the arming is given as long as one that went silent.
+            let last_word = self.gateway_stamp_ns.max(self.armed_at_ns);
+            if now_ns.saturating_sub(last_word) > self.gateway_timeout_ns() {
+                self.trip(Fault::GatewayLost);
+            }
+            if self.lease_ended_ns.is_none()
+                && now_ns >= self.lease_until_ns.max(self.armed_at_ns + self.gateway_timeout_ns())
+            {
+                self.lease_ended_ns = Some(now_ns);
+            }
+        }
+        let (reference, stop) = self.reference(now_ns);
+        self.output = self.controller.tick(&self.measurement(), reference, dt_s);
+        let mut drive = match self.kind {
+            DriveKind::Current => self.output.command.current_a,
+            DriveKind::Voltage => self.output.command.voltage_v.unwrap_or(0.0),
+            DriveKind::Speed => self.output.command.speed_rad_s.unwrap_or(0.0),
+            DriveKind::Duty => 0.0,
+        };
+        self.limits |= bits(self.output.limits);
+        if !drive.is_finite() {
+            self.trip(Fault::ControlNotFinite);
+            drive = 0.0;
+        }
+        if drive.abs() > self.drive_max {
+            self.limits |= Limit::Current.bit();
+            drive = drive.clamp(-self.drive_max, self.drive_max);
+        }
+        let stop = stop || self.latched != 0;
+        if stop || reference == Reference::Off {
+            drive = 0.0;
+        }
+        Command {
+            telemetry_stamp_ns: self.servo_stamp_ns,
+            drive,
+            thrust_cmd_n: if let Reference::Thrust(n) = reference { n } else { f64::NAN },
+            speed_cmd_rad_s: if let Reference::Speed(w) = reference { w } else { f64::NAN },
+            kind: self.kind as u32,
+            stop: u32::from(stop),
+            ..Command::default()
+        }
+    }
+
+    /// What the law is asked for now, and whether the servo must stop.
+    fn reference(&mut self, now_ns: u64) -> (Reference, bool) {
+        self.limits = 0;
+        self.in_force = 0.0;
+        if !self.armed || self.latched != 0 {
+            return (Reference::Off, false);
+        }
+        let mut share = 1.0;
+        if let Some(ended_ns) = self.lease_ended_ns {
+            let since = now_ns.saturating_sub(ended_ns);
+            let nothing = self.setpoint.is_none_or(|s| s.value == 0.0);
+            if nothing || since >= LEASE_RAMP_NS {
+                return (Reference::Off, true);
+            }
+            self.limits |= Limit::LeaseRamp.bit();
+            share = 1.0 - since as f64 / LEASE_RAMP_NS as f64;
+        }
+        let Some(setpoint) = self.setpoint else { return (Reference::Off, false) };
+        self.in_force = setpoint.value * share;
+        let reference = match setpoint.kind {
+            SetpointKind::Zero => Reference::Off,
+            SetpointKind::Thrust => Reference::Thrust(self.in_force),
+            SetpointKind::Speed => Reference::Speed(self.in_force),
+        };
+        (reference, false)
+    }
+
+    /// Acts on a request; `None` if it is not for the controller, or too old to be meant for now.
+    pub fn request(&mut self, request: &Request, now_ns: u64) -> Option<Reply> {
+        let sent = request.header.stamp_ns;
+        if sent < self.started_ns || now_ns.saturating_sub(sent) > REQUEST_LIFE_NS {
+            return None;
+        }
+        let answer = |outcome, words: std::fmt::Arguments| {
+            Some(Reply::to(request, Process::Controller, outcome, words))
+        };
+        match RequestKind::from_u32(request.kind)? {
+            RequestKind::Arm => None,
+            RequestKind::Disarm => {
+                self.forget();
+                answer(Outcome::Done, format_args!("setpoint forgotten"))
+            }
+            RequestKind::ClearFaults => {
+                self.latched = 0;
+                self.forget();
+                answer(Outcome::Done, format_args!("no faults"))
+            }
+            RequestKind::SetController => match self.configure(request) {
+                Ok(()) => answer(Outcome::Done, format_args!("{} runs", self.config.law.name())),
+                Err(words) => answer(Outcome::Invalid, format_args!("{words}")),
+            },
+        }
+    }
+
+    /// Switches law, observer, estimator and parameters, all or nothing.
+    fn configure(&mut self, request: &Request) -> Result<(), String> {
+        let mut config = self.config;
+        let unknown = |what: &str, name: &str, known: &[&str]| {
+            format!("`{name}` is no {what}; hint: known are {}", known.join(", "))
+        };
+        if !request.law.is_empty() {
+            let name = request.law.as_str();
+            config.law = LawKind::from_name(name)
+                .ok_or_else(|| unknown("control law", name, &LawKind::ALL.map(LawKind::name)))?;
+        }
+        if !request.observer.is_empty() {
+            let name = request.observer.as_str();
+            config.observer = ObserverKind::from_name(name)
+                .ok_or_else(|| unknown("observer", name, &ObserverKind::ALL.map(ObserverKind::name)))?;
+        }
+        if !request.estimator.is_empty() {
+            let name = request.estimator.as_str();
+            config.estimator = EstimatorKind::from_name(name)
+                .ok_or_else(|| unknown("estimator", name, &EstimatorKind::ALL.map(EstimatorKind::name)))?;
+        }
+        for parameter in request.parameters.iter().take(request.parameter_count as usize) {
+            config
+                .set(parameter.name.as_str(), parameter.value)
+                .map_err(|e| e.to_string().replace('\n', "; "))?;
+        }
+        self.config = config;
+        self.controller.configure(&config);
+        Ok(())
+    }
+
+    /// The state for the gateway, without header and timing.
+    pub fn state(&self) -> ControllerState {
+        let mut state = ControllerState {
+            law: Text::new(self.config.law.name()),
+            observer: Text::new(self.config.observer.name()),
+            estimator: Text::new(self.config.estimator.name()),
+            setpoint_kind: SetpointKind::Zero as u32,
+            setpoint_value: self.in_force,
+            estimates: Estimates {
+                thrust_n: self.output.estimate.thrust_n.value,
+                flow_m_s: self.output.estimate.flow_m_s.value,
+                ambient_m_s: self.output.estimate.ambient_m_s.value,
+            },
+            estimator_frozen: u32::from(
+                self.config.estimator != EstimatorKind::Off && self.controller.adapted().frozen.is_some(),
+            ),
+            faults: self.latched,
+            limits: self.limits,
+            thrust_max_n: self.controller.model().thrust_max_n,
+            speed_max_rad_s: self.controller.model().speed_max_rad_s,
+            setpoints_invalid: self.invalid,
+            ..ControllerState::default()
+        };
+        if let Some(setpoint) = self.setpoint {
+            state.setpoint_kind = setpoint.kind as u32;
+            state.setpoint_accepted = setpoint.value;
+            state.setpoint_session = setpoint.session;
+            state.setpoint_generation = setpoint.generation;
+        }
+        for (i, tunable) in TUNABLES.iter().enumerate() {
+            let Some(slot) = state.law_parameters.get_mut(i) else { break };
+            *slot = Parameter {
+                name: Text::new(tunable.name),
+                unit: Text::new(tunable.unit),
+                value: (tunable.get)(&self.config),
+                std_error: f64::NAN,
+                low: tunable.least,
+                high: tunable.most,
+            };
+            state.law_parameter_count += 1;
+        }
+        for (slot, law) in state.laws.iter_mut().zip(LawKind::ALL) {
+            *slot = Text::new(law.name());
+        }
+        state.law_count = LawKind::ALL.len().min(LAWS) as u32;
+        self.put_estimated(&mut state);
+        state
+    }
+
+    /// The adapted coefficients, and the load that the model does not explain.
+    fn put_estimated(&self, state: &mut ControllerState) {
+        let (adapted, nominal) = (self.controller.adapted(), self.controller.nominal());
+        let coefficients = kort_control::estimators::NAMES.iter().enumerate().map(|(i, name)| {
+            let (value, std_error) = adapted.coefficient(i, nominal);
+            (*name, "1", value, std_error)
+        });
+        let load = self.output.estimate.load_torque_n_m;
+        let swirl = self.output.estimate.swirl_m_s;
+        let rest = [
+            ("load_torque_n_m", "N m", load.value, load.std_error),
+            ("swirl_m_s", "m/s", swirl.value, swirl.std_error),
+        ];
+        for ((name, unit, value, std_error), slot) in coefficients.chain(rest).zip(&mut state.parameters) {
+            let std_error = if std_error.is_finite() { std_error } else { f64::NAN };
+            *slot = Parameter {
+                name: Text::new(name),
+                unit: Text::new(unit),
+                value,
+                std_error,
+                low: f64::NAN,
+                high: f64::NAN,
+            };
+            state.parameter_count += 1;
+        }
+    }
+
+    fn measurement(&self) -> Measurement {
+        let there = |value: f64| Some(value).filter(|v| v.is_finite());
+        let m = &self.measured;
+        Measurement {
+            shaft_speed_rad_s: there(m.shaft_speed_rad_s),
+            current_a: there(m.current_a),
+            thrust_n: there(m.thrust_n),
+            flow_m_s: there(m.flow_m_s),
+            ambient_m_s: there(m.ambient_m_s),
+            supply_v: there(m.supply_v),
+        }
+    }
+
+    fn gateway_timeout_ns(&self) -> u64 {
+        GATEWAY_PERIODS * self.period_ns
+    }
+
+    fn trip(&mut self, fault: Fault) {
+        self.latched |= fault.bit();
+        self.forget();
+    }
+
+    /// No setpoint, no lease's end: as at start. What counts afterwards must be given afterwards.
+    fn forget(&mut self) {
+        self.setpoint = None;
+        self.lease_ended_ns = None;
+    }
+}
+
+/// The control crate's limits in the bits of [`Limit`]; both list them in the same order.
+fn bits(limits: LimitSet) -> u64 {
+    u64::from(limits.0) << FIRST_OF_CONTROL
+}
