@@ -1,1 +1,144 @@
-fn main() {}
+//! `kort`: thrust control for marine thrusters, and a laboratory that finds what the model left
+//! out. This file parses and dispatches; every subcommand lives in a folder of its own.
+
+mod up;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Args, Parser, Subcommand};
+use kort_proto::config::Config;
+use kort_proto::transport::Deployment;
+
+/// Done.
+const DONE: u8 = 0;
+/// Failed.
+const FAILED: u8 = 1;
+/// Wrong usage or unreadable input.
+const USAGE: u8 = 2;
+
+const UP_EXAMPLE: &str =
+    "Example: kort up --config config/kort.toml\n\nThen: curl http://127.0.0.1:8080/v1/thrusters/t1";
+
+#[derive(Parser)]
+#[command(name = "kort", version, about = "Thrust control for marine thrusters, and a laboratory beside it")]
+#[command(
+    after_help = "Without a command: kort up, on a simulated copy of a real test stand.\n\nExample: kort"
+)]
+struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Start and watch servo, controller and gateway; Ctrl-C stops them, thrust at zero first
+    #[command(after_help = UP_EXAMPLE)]
+    Up(Service),
+    /// The servo alone: the loop that drives the amplifier
+    #[command(after_help = "Example: kort servo --config config/kort.toml --thruster t1")]
+    Servo {
+        #[command(flatten)]
+        service: Service,
+        #[command(flatten)]
+        which: Which,
+        /// Open the shared memory that another process owns, instead of creating it
+        #[arg(long)]
+        join: bool,
+    },
+    /// The controller alone: from setpoint to drive command
+    #[command(after_help = "Example: kort controller --config config/kort.toml --thruster t1")]
+    Controller {
+        #[command(flatten)]
+        service: Service,
+        #[command(flatten)]
+        which: Which,
+    },
+    /// The gateway alone: console, REST API, WebSocket, metrics, recordings
+    #[command(after_help = "Example: kort gateway --config config/kort.toml")]
+    Gateway(Service),
+}
+
+#[derive(Args, Clone)]
+struct Service {
+    /// Deployment to run [default: config/kort.toml, else the one built in]
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Folder of the shared memory [default: transport.root of the deployment]
+    #[arg(long, value_name = "DIR")]
+    root: Option<PathBuf>,
+}
+
+#[derive(Args)]
+struct Which {
+    /// Thruster to serve
+    #[arg(long, value_name = "ID", default_value = "t1")]
+    thruster: String,
+}
+
+impl Service {
+    fn load(&self) -> Result<(Config, Deployment), ExitCode> {
+        let config = Config::load(self.config.as_deref()).map_err(|e| fail(USAGE, &e))?;
+        let root = self.root.as_deref().unwrap_or(&config.transport.root);
+        let deployment = Deployment::new(Some(root));
+        Ok((config, deployment))
+    }
+}
+
+fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(e) => {
+            let _ = e.print();
+            return ExitCode::from(if e.use_stderr() { USAGE } else { DONE });
+        }
+    };
+    let none = Service { config: None, root: None };
+    dispatch(cli.command.unwrap_or(Command::Up(none))).unwrap_or_else(|code| code)
+}
+
+fn dispatch(command: Command) -> Result<ExitCode, ExitCode> {
+    match command {
+        Command::Up(service) => {
+            log();
+            let (config, deployment) = service.load()?;
+            finish(up::run(&config, &deployment))
+        }
+        Command::Servo { service, which, join } => {
+            log();
+            let (config, deployment) = service.load()?;
+            finish(kort_servo::run(&config, &deployment, &which.thruster, join))
+        }
+        Command::Controller { service, which } => {
+            log();
+            let (config, deployment) = service.load()?;
+            finish(kort_controller::run(&config, &deployment, &which.thruster))
+        }
+        Command::Gateway(service) => {
+            log();
+            let (config, deployment) = service.load()?;
+            finish(kort_gateway::run(&config, &deployment))
+        }
+    }
+}
+
+fn finish<E: std::fmt::Display>(result: Result<(), E>) -> Result<ExitCode, ExitCode> {
+    result.map(|()| ExitCode::from(DONE)).map_err(|e| fail(FAILED, &e))
+}
+
+fn fail(code: u8, error: &dyn std::fmt::Display) -> ExitCode {
+    eprintln!("error: {error}");
+    ExitCode::from(code)
+}
+
+/// Logs to stderr; `RUST_LOG` chooses how much, for example `RUST_LOG=debug`.
+fn log() {
+    use tracing_subscriber::EnvFilter;
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("info"));
+    let terminal = std::io::IsTerminal::is_terminal(&std::io::stderr());
+    let _ = tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .with_ansi(terminal)
+        .try_init();
+}

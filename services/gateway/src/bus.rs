@@ -212,8 +212,10 @@ impl Bridge {
         };
         let lease_until_ns =
             desk.lease.current(now).map_or(0, |lease| monotonic_ns() + lease.expires_in_ms(now) * 1_000_000);
+        let ago_ns = |at: Instant| u64::try_from(now.duration_since(at).as_nanos()).unwrap_or(u64::MAX);
         SetpointMessage {
             generation: desk.generation(),
+            given_at_ns: desk.given().map_or(0, |at| monotonic_ns().saturating_sub(ago_ns(at))),
             lease_until_ns,
             kind: kind as u32,
             value,

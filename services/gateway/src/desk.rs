@@ -15,6 +15,7 @@ pub struct Desk {
     /// Who may command.
     pub lease: LeaseDesk,
     setpoint: Option<Setpoint>,
+    given: Option<Instant>,
     generation: u64,
     accepted: u64,
     version: u64,
@@ -27,6 +28,7 @@ impl Desk {
             thruster: thruster.to_owned(),
             lease: LeaseDesk::default(),
             setpoint: None,
+            given: None,
             generation: 0,
             accepted: 0,
             version: 0,
@@ -36,6 +38,11 @@ impl Desk {
     /// Setpoint in force; none while nobody commands.
     pub fn setpoint(&self) -> Option<Setpoint> {
         self.setpoint
+    }
+
+    /// When the last command was accepted.
+    pub fn given(&self) -> Option<Instant> {
+        self.given
     }
 
     /// Grows with every command and every end of one: the controller acts only on a growing number.
@@ -77,6 +84,7 @@ impl Desk {
     pub fn command(&mut self, id: Option<&str>, setpoint: Setpoint, now: Instant) -> Result<Lease, Problem> {
         let lease = self.renew(id, now)?;
         self.setpoint = Some(setpoint);
+        self.given = Some(now);
         self.generation += 1;
         self.accepted += 1;
         Ok(lease)

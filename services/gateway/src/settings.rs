@@ -60,8 +60,7 @@ pub fn thrusters(config: &Config) -> Result<Vec<Deployed>, ConfigError> {
         .thrusters
         .iter()
         .map(|(id, thruster)| {
-            let key = format!("thrusters.{id}.rig");
-            let (file, text) = config.text_of(&key, &thruster.rig, &[])?;
+            let (file, text) = config.rig_text(id, thruster)?;
             let rig =
                 Rig::from_toml(&text).map_err(|error| ConfigError { file, message: error.to_string() })?;
             let heartbeat = Duration::from_nanos(thruster.controller_period_ns());
