@@ -1,0 +1,115 @@
+//! How a command ends: outcomes, failures and their exit codes.
+
+use std::fmt;
+use std::path::Path;
+
+/// A command that did its work.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// All of it.
+    Done,
+    /// All of it, but data were lost or skipped on the way (exit code 3).
+    DoneWithLoss,
+}
+
+impl Outcome {
+    /// Done, with or without loss.
+    pub fn with_loss(lost: bool) -> Self {
+        if lost { Outcome::DoneWithLoss } else { Outcome::Done }
+    }
+}
+
+/// A command that did not do its work. The message names file, field, value found and what is
+/// allowed, and ends in a `hint:` line where there is something to do.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Failure {
+    /// Wrong usage or unreadable input (exit code 2).
+    Input(String),
+    /// The work itself failed (exit code 1).
+    Failed(String),
+}
+
+impl Failure {
+    /// Wrong usage or unreadable input.
+    pub fn input(message: impl fmt::Display) -> Self {
+        Failure::Input(message.to_string())
+    }
+
+    /// Input of a named file whose error does not name the file itself.
+    pub fn in_file(path: &Path, message: impl fmt::Display) -> Self {
+        Failure::Input(format!("{}: {message}", path.display()))
+    }
+
+    /// The work itself failed.
+    pub fn failed(message: impl fmt::Display) -> Self {
+        Failure::Failed(message.to_string())
+    }
+
+    /// A result that could not be written.
+    pub fn unwritten(path: &Path, error: impl fmt::Display) -> Self {
+        Failure::Failed(format!(
+            "{}: cannot be written: {error}\nhint: check that the folder exists and may be written",
+            path.display()
+        ))
+    }
+
+    /// Exit code.
+    pub fn code(&self) -> u8 {
+        match self {
+            Failure::Input(_) => 2,
+            Failure::Failed(_) => 1,
+        }
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Failure::Input(message) | Failure::Failed(message) => f.write_str(message),
+        }
+    }
+}
+
+impl std::error::Error for Failure {}
+
+/// Reads a text file.
+///
+/// # Errors
+/// Names the file; not readable, or not UTF-8.
+pub fn read_text(path: &Path) -> Result<String, Failure> {
+    std::fs::read_to_string(path)
+        .map_err(|e| Failure::input(format!("{}: cannot be read: {e}\nhint: check the path", path.display())))
+}
+
+/// Reads a rig description.
+///
+/// # Errors
+/// Names the file, the key, the value found and what is allowed.
+pub fn read_rig(path: &Path) -> Result<kort_thruster::rig::Rig, Failure> {
+    kort_thruster::rig::Rig::from_toml(&read_text(path)?).map_err(|e| Failure::in_file(path, e))
+}
+
+/// Writes a result file.
+///
+/// # Errors
+/// Names the file.
+pub fn write_text(path: &Path, text: &str) -> Result<(), Failure> {
+    std::fs::write(path, text).map_err(|e| Failure::unwritten(path, e))
+}
+
+/// Prints to stdout; a closed pipe (`kort … | head`) ends the output quietly.
+pub fn print(text: &str) {
+    use std::io::Write;
+    let mut out = std::io::stdout().lock();
+    let _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+}
+
+/// Prints exactly one JSON document to stdout.
+///
+/// # Errors
+/// The value cannot be JSON: an error of the program.
+pub fn print_json(value: &impl serde::Serialize) -> Result<(), Failure> {
+    let text = serde_json::to_string_pretty(value).map_err(Failure::failed)?;
+    print(&(text + "\n"));
+    Ok(())
+}

@@ -1,0 +1,22 @@
+//! Progress on stderr, on a terminal only.
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+/// A bar over `steps` equal steps of work; silent when stderr is no terminal.
+pub fn bar(steps: u64, what: &'static str) -> ProgressBar {
+    let bar = ProgressBar::with_draw_target(Some(steps), ProgressDrawTarget::stderr());
+    bar.set_style(style("{msg} [{bar:40}] {pos}/{len} {eta}"));
+    bar.with_message(what)
+}
+
+/// A bar over bytes read; silent when stderr is no terminal.
+pub fn bytes(total: u64, what: String) -> ProgressBar {
+    let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr());
+    bar.set_style(style("{msg} [{bar:40}] {bytes}/{total_bytes} {eta}"));
+    bar.with_message(what)
+}
+
+fn style(template: &str) -> ProgressStyle {
+    // The templates above are fixed; should one be wrong, the default bar still shows progress.
+    ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
+}
