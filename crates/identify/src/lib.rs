@@ -1,1 +1,18 @@
 //! Identification from recordings, and diagnosis: which physics did the model leave out?
+
+pub mod baseline;
+pub mod checks;
+pub mod data;
+pub mod diagnose;
+pub mod edges;
+pub mod errors;
+pub mod fit;
+pub mod heldout;
+pub mod judge;
+pub mod library;
+pub mod locate;
+pub mod noise;
+pub mod report;
+pub mod screen;
+pub mod search;
+pub mod words;

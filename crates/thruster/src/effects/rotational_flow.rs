@@ -10,40 +10,37 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     id: "rotational_flow",
     path: Path::Blade,
     what: "the water behind the propeller turns with it (swirl), which lowers the speed of the blade through the water",
-    equation: "ut = 0.7 r Om - us; rho a l gr us' = Q/(0.7 r) - dbr rho a |vp| us; us [m/s], gr, dbr [1]",
+    equation: "ut = 0.7 r Om - us; rho a l gr us' = Q/(0.7 r) - dbr rho a |vp| us; us [m/s], gr, dbr [1]; \
+               fitted as swirl_yield = 1/dbr and swirl_lag_ratio = gr/dbr",
     signature: "shaft speed overshoots after a torque step by the same percentage at all torques, because swirl is not \
                 yet washed out while axial flow is low",
     confused_with: &["entrained_water_inertia", "unsteady_lift_lag", "nonsinusoidal_lift_drag", "inertia_added_mass_error"],
     separated_by: "steps of several sizes both ways with shaft speed and thrust logged: the pair of overshoots; a probe for tangential flow",
     reference: "Bachmayer, Whitcomb, Grosenbaugh 2000 (IEEE JOE 25:146); equation form physics.md C4",
     parameters,
-    starts: |_| vec![vec![0.1, 0.5, 1.0], vec![0.1, 1.5, 0.3]],
+    starts: |_| vec![vec![0.1, 0.08], vec![0.1, 1.5]],
     needs: wet,
     build: |values, context| {
         let p = context.parameters;
-        let flux = p.get(P::DensityKgM3) * p.area_m2();
         Box::new(RotationalFlow {
-            strength: values[0],
-            flux_kg_m: values[1] * flux,
-            mass_kg: values[2] * p.duct_mass_kg(),
+            share: values[0],
+            flux_kg_m: p.get(P::DensityKgM3) * p.area_m2(),
+            mass_kg: values[1] * p.duct_mass_kg(),
             lever_m: REFERENCE_RADIUS * p.get(P::RadiusM),
         })
     },
 };
 
-/// `strength` is the share of the torque's angular momentum that turns the water at 0.7 radius;
-/// 1 is the published form. With flux and mass free as well it is redundant in steady state, so
-/// the fit holds the shape parameters by their priors.
+/// The published pair (`dbr`, `gr`) divided by `dbr`, so that the effect vanishes at zero yield.
 fn parameters(_: &Scale) -> Vec<Spec> {
     vec![
-        Spec::strength("swirl_share", "1", 0.1, 0.0, 3.0),
-        Spec::shape("swirl_flux_coefficient", "1", 1.0, 0.2, 8.0),
-        Spec::shape("swirl_mass_coefficient", "1", 0.5, 0.03, 8.0),
+        Spec::strength("swirl_yield", "1", 0.1, 0.0, 3.0),
+        Spec::shape("swirl_lag_ratio", "1", 0.4, 0.005, 8.0),
     ]
 }
 
 struct RotationalFlow {
-    strength: f64,
+    share: f64,
     flux_kg_m: f64,
     mass_kg: f64,
     lever_m: f64,
@@ -63,7 +60,7 @@ impl Effect for RotationalFlow {
     }
 
     fn balance(&self, at: &Local, own: &[f64], balance: &mut Balance, rates: &mut [f64]) {
-        rates[0] = (self.strength * balance.blade_torque_n_m / self.lever_m
+        rates[0] = (self.share * balance.blade_torque_n_m / self.lever_m
             - self.flux_kg_m * at.axial_m_s.abs() * own[0])
             / self.mass_kg;
     }

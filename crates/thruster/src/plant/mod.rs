@@ -47,12 +47,16 @@ pub struct Plant {
     sense_hooks: Vec<usize>,
     used_states: usize,
     constants: Constants,
+    decays: Decays,
     x: States,
     current_a: f64,
     time_s: f64,
     filters: Filters,
     sensed: Sensed,
     at: Local,
+    /// Rates at the end of the last tick: the first stage of the next, since nothing jumps there
+    /// but the command, which acts through the current.
+    last_rates: Option<States>,
     quantise_encoder: bool,
 }
 
@@ -76,6 +80,37 @@ struct Constants {
     swirl_flux_kg_m: f64,
     yoerger_slip_m: f64,
     dry: bool,
+}
+
+/// Decay factors of the first-order filters over one tick.
+#[derive(Clone, Copy)]
+struct Decays {
+    /// Stated lag of the drive, and its decay over half a tick and a whole one.
+    drive: (f64, f64, f64),
+    speed: Option<f64>,
+    thrust: Option<(f64, f64)>,
+    torque: Option<(f64, f64)>,
+}
+
+impl Decays {
+    fn new(time_constant_s: f64, sensors: &Sensors, tick_s: f64) -> Self {
+        let corner = |hz: Option<f64>| {
+            hz.map(|hz| {
+                let tau = 1.0 / (std::f64::consts::TAU * hz);
+                (tau, (-tick_s / tau).exp())
+            })
+        };
+        Self {
+            drive: (
+                time_constant_s,
+                (-0.5 * tick_s / time_constant_s).exp(),
+                (-tick_s / time_constant_s).exp(),
+            ),
+            speed: sensors.speed_filter_time_constant_s.filter(|t| *t > 0.0).map(|t| (-tick_s / t).exp()),
+            thrust: corner(sensors.thrust_filter_hz),
+            torque: corner(sensors.torque_filter_hz),
+        }
+    }
 }
 
 /// States of the measuring chain.
@@ -133,12 +168,14 @@ impl Plant {
             effects,
             used_states: next,
             constants: Constants::new(parameters, rig.propeller.is_none()),
+            decays: Decays::new(parameters.get(P::TimeConstantS), &rig.sensors, tick_s),
             x: [0.0; STATES],
             current_a: 0.0,
             time_s: 0.0,
             filters: Filters::default(),
             sensed: Sensed::default(),
             at: Local::default(),
+            last_rates: None,
             quantise_encoder: false,
         }
     }
@@ -160,6 +197,7 @@ impl Plant {
         angle_rad: f64,
     ) {
         self.time_s = time_s;
+        self.last_rates = None;
         self.x[SPEED] = shaft_speed_rad_s;
         self.x[FLOW] = axial_m_s;
         self.x[ANGLE] = angle_rad;
@@ -228,7 +266,10 @@ impl Plant {
         let mut x = x0;
         prescribe(&mut x, 0.0);
         let start = x;
-        let (k1, _) = self.rates(&x, &self.local_at(&x, from, 0.0, tick, &drive));
+        let k1 = match self.last_rates {
+            Some(rates) => rates,
+            None => self.rates(&x, &self.local_at(&x, from, 0.0, tick, &drive)).0,
+        };
         x = self.advance(&start, &k1, 0.5 * dt);
         prescribe(&mut x, 0.5);
         let (k2, _) = self.rates(&x, &self.local_at(&x, half, 0.5, tick, &drive));
@@ -246,7 +287,8 @@ impl Plant {
         self.time_s = tick.time_s + dt;
 
         let end = self.local_at(&self.x, full, 1.0, tick, &drive);
-        let (_, balance) = self.rates(&self.x, &end);
+        let (rates, balance) = self.rates(&self.x, &end);
+        self.last_rates = Some(rates);
         self.at = end;
         self.at.thrust_n = balance.thrust_n;
         self.at.blade_torque_n_m = balance.blade_torque_n_m;
@@ -278,7 +320,16 @@ impl Plant {
         if drive.time_constant_s <= 0.0 {
             return target;
         }
-        target + (self.current_a - target) * (-after_s / drive.time_constant_s).exp()
+        // The stated lag's decay is at hand; an effect may have changed the lag.
+        let (stated, half, full) = self.decays.drive;
+        let left = if drive.time_constant_s != stated {
+            (-after_s / drive.time_constant_s).exp()
+        } else if after_s < self.tick_s {
+            half
+        } else {
+            full
+        };
+        target + (self.current_a - target) * left
     }
 
     fn advance(&self, from: &States, rate: &States, dt: f64) -> States {
@@ -427,22 +478,16 @@ impl Plant {
         if filter {
             // Angle differenced at the control rate, then a first-order filter.
             let raw = (angle - f.last_angle_rad) / dt;
-            f.speed_rad_s = match s.speed_filter_time_constant_s {
-                Some(tau) if tau > 0.0 => raw + (f.speed_rad_s - raw) * (-dt / tau).exp(),
+            f.speed_rad_s = match self.decays.speed {
+                Some(left) => raw + (f.speed_rad_s - raw) * left,
                 _ if s.encoder_counts_per_rev.is_some() => raw,
                 _ => self.x[SPEED],
             };
             f.last_angle_rad = angle;
-            let stand = balance.thrust_n + balance.stand_n;
-            f.thrust_n = first_order(f.thrust_n, f.last_thrust_n, stand, dt, s.thrust_filter_hz);
-            f.torque_n_m = first_order(
-                f.torque_n_m,
-                f.last_torque_n_m,
-                balance.blade_torque_n_m,
-                dt,
-                s.torque_filter_hz,
-            );
-            f.last_thrust_n = stand;
+            let (thrust, torque) = (balance.thrust_n + balance.stand_n, balance.blade_torque_n_m);
+            f.thrust_n = first_order(f.thrust_n, f.last_thrust_n, thrust, dt, self.decays.thrust);
+            f.torque_n_m = first_order(f.torque_n_m, f.last_torque_n_m, torque, dt, self.decays.torque);
+            f.last_thrust_n = thrust;
             f.last_torque_n_m = balance.blade_torque_n_m;
         }
         let axial = match self.model {
@@ -468,11 +513,10 @@ impl Plant {
 }
 
 /// Exact first-order low pass over one tick whose input runs straight from `u0` to `u1`.
-fn first_order(y: f64, u0: f64, u1: f64, dt: f64, corner_hz: Option<f64>) -> f64 {
-    let Some(corner) = corner_hz else { return u1 };
-    let tau = 1.0 / (std::f64::consts::TAU * corner);
-    let (a, slope) = ((-dt / tau).exp(), (u1 - u0) / dt);
-    u1 - tau * slope + (y - u0 + tau * slope) * a
+fn first_order(y: f64, u0: f64, u1: f64, dt: f64, filter: Option<(f64, f64)>) -> f64 {
+    let Some((tau, left)) = filter else { return u1 };
+    let slope = (u1 - u0) / dt;
+    u1 - tau * slope + (y - u0 + tau * slope) * left
 }
 
 impl Constants {

@@ -1,0 +1,180 @@
+//! Cheap checks before any model: what a glance at the columns tells.
+
+use kort_thruster::rig::Rig;
+
+use crate::data::Series;
+
+/// What the checks found: words for the report, and rows to leave out.
+#[derive(Clone, Debug, Default)]
+pub struct Checked {
+    /// Words.
+    pub notes: Vec<String>,
+    /// Rows to leave out of every comparison.
+    pub masked: Vec<bool>,
+}
+
+/// Longest run of one value in a sensor that should be noisy, in rows, before it counts as frozen.
+const FROZEN_ROWS: usize = 40;
+/// A spike stands out of its neighbours by this many times their usual distance.
+const SPIKE_RATIO: f64 = 40.0;
+
+/// Runs all checks on one recording.
+pub fn check(series: &Series, rig: &Rig) -> Checked {
+    let n = series.time_s.len();
+    let mut out = Checked { notes: Vec::new(), masked: vec![false; n] };
+    saturated_thrust(series, rig, &mut out);
+    saturated_current(series, rig, &mut out);
+    for name in ["thrust_n", "shaft_speed_rad_s", "torque_n_m", "current_a"] {
+        if let Some(column) = series.column(name) {
+            frozen(&series.name, name, column, &series.time_s, &mut out);
+            spikes(&series.name, name, column, &series.time_s, &mut out);
+        }
+    }
+    unsigned_speed(series, &mut out);
+    rest_bias(series, &mut out);
+    gaps(series, &mut out);
+    out
+}
+
+fn saturated_thrust(series: &Series, rig: &Rig, out: &mut Checked) {
+    let (Some(full), Some(thrust)) = (rig.sensors.thrust_full_scale_n, series.column("thrust_n")) else {
+        return;
+    };
+    let rows: Vec<usize> = (0..thrust.len()).filter(|k| thrust[*k].abs() >= 0.995 * full).collect();
+    if rows.len() > 2 {
+        out.notes.push(format!(
+            "{}: thrust_n sits at its full scale of {full} N in {} rows; they are left out",
+            series.name,
+            rows.len()
+        ));
+        rows.into_iter().for_each(|k| out.masked[k] = true);
+    }
+}
+
+fn saturated_current(series: &Series, rig: &Rig, out: &mut Checked) {
+    let limit = rig.amplifier.current_limit_a;
+    let Some(command) = series.column("current_cmd_a").filter(|_| limit.is_finite()) else { return };
+    let over = command.iter().filter(|c| c.abs() > 1.001 * limit).count();
+    if over > 0 {
+        out.notes.push(format!(
+            "{}: current_cmd_a exceeds the stated limit of {limit} A in {over} rows; the model clips there",
+            series.name
+        ));
+    }
+}
+
+fn frozen(recording: &str, name: &str, column: &[f64], time_s: &[f64], out: &mut Checked) {
+    let scale = column.iter().filter(|v| v.is_finite()).fold(0.0_f64, |m, v| m.max(v.abs()));
+    let mut from = 0;
+    for k in 1..=column.len() {
+        if k < column.len() && column[k] == column[from] {
+            continue;
+        }
+        // At rest a quantised sensor may well stand still.
+        if k - from >= FROZEN_ROWS && column[from].abs() > 0.05 * scale && varies(column) {
+            out.notes.push(format!(
+                "{recording}: {name} stands still at {:.4} from {:.2} s to {:.2} s (frozen sensor?); those rows are left out",
+                column[from], time_s[from], time_s[k - 1]
+            ));
+            out.masked[from..k].fill(true);
+        }
+        from = k;
+    }
+}
+
+/// A sensor that repeats itself everywhere is coarse, not frozen.
+fn varies(column: &[f64]) -> bool {
+    let same = column.windows(2).filter(|w| w[0] == w[1]).count();
+    (same as f64) < 0.5 * column.len() as f64
+}
+
+fn spikes(recording: &str, name: &str, column: &[f64], time_s: &[f64], out: &mut Checked) {
+    let jump = |k: usize| (column[k] - 0.5 * (column[k - 1] + column[k + 1])).abs();
+    let known: Vec<usize> = (1..column.len().saturating_sub(1))
+        .filter(|k| (k - 1..=k + 1).all(|i| column[i].is_finite()))
+        .collect();
+    let mut sizes: Vec<f64> = known.iter().map(|k| jump(*k)).collect();
+    sizes.sort_by(f64::total_cmp);
+    let Some(usual) = sizes.get(sizes.len() / 2).copied() else { return };
+    let scale = column.iter().filter(|v| v.is_finite()).fold(0.0_f64, |m, v| m.max(v.abs()));
+    let limit = (SPIKE_RATIO * usual).max(0.25 * scale);
+    let found: Vec<usize> = known
+        .into_iter()
+        .filter(|k| {
+            let alone = (column[k - 1] - column[k + 1]).abs() < 0.2 * jump(*k);
+            usual > 0.0 && jump(*k) > limit && alone
+        })
+        .collect();
+    if let Some(first) = found.first() {
+        out.notes.push(format!(
+            "{recording}: {name} spikes in {} single rows (first at {:.2} s); they are left out",
+            found.len(),
+            time_s[*first]
+        ));
+        found.into_iter().for_each(|k| out.masked[k] = true);
+    }
+}
+
+fn unsigned_speed(series: &Series, out: &mut Checked) {
+    let Some(speed) = series.column("shaft_speed_rad_s") else { return };
+    let never_negative = speed.iter().all(|v| v.is_nan() || *v >= 0.0);
+    let reversed = ["current_cmd_a", "current_a", "thrust_n", "voltage_cmd_v"].iter().any(|name| {
+        series.column(name).is_some_and(|c| {
+            let top = c.iter().filter(|v| v.is_finite()).fold(0.0_f64, |m, v| m.max(v.abs()));
+            let negative = c.iter().filter(|v| **v < -0.2 * top).count();
+            negative > c.len() / 20
+        })
+    });
+    if never_negative && reversed {
+        out.notes.push(format!(
+            "{}: shaft_speed_rad_s is never negative although the drive reverses: an unsigned speed sensor; give it a sign (column map) before trusting a verdict",
+            series.name
+        ));
+    }
+}
+
+fn rest_bias(series: &Series, out: &mut Checked) {
+    let Some(command) = ["current_cmd_a", "voltage_cmd_v", "duty_cmd", "speed_cmd_rad_s"]
+        .iter()
+        .find_map(|n| series.column(n))
+    else {
+        return;
+    };
+    let first = command.iter().take_while(|c| **c == 0.0).count();
+    if first < 30 {
+        return;
+    }
+    for name in ["thrust_n", "torque_n_m", "current_a"] {
+        let Some(column) = series.column(name) else { continue };
+        let rest: Vec<f64> =
+            column[..first.min(column.len())].iter().copied().filter(|v| v.is_finite()).collect();
+        if rest.len() < 20 {
+            continue;
+        }
+        let n = rest.len() as f64;
+        let mean = rest.iter().sum::<f64>() / n;
+        let deviation = (rest.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
+        let scale = column.iter().filter(|v| v.is_finite()).fold(0.0_f64, |m, v| m.max(v.abs()));
+        if mean.abs() > 6.0 * deviation / n.sqrt() && mean.abs() > 0.005 * scale {
+            out.notes.push(format!(
+                "{}: {name} reads {mean:.4} at rest before the first command ({:.1} % of its range): zero it, or let the diagnosis judge the bias",
+                series.name,
+                100.0 * mean / scale
+            ));
+        }
+    }
+}
+
+fn gaps(series: &Series, out: &mut Checked) {
+    let mut steps: Vec<f64> = series.time_s.windows(2).map(|w| w[1] - w[0]).collect();
+    steps.sort_by(f64::total_cmp);
+    let Some(usual) = steps.get(steps.len() / 2).copied() else { return };
+    let wide = series.time_s.windows(2).filter(|w| w[1] - w[0] > 3.5 * usual).count();
+    if wide > 0 {
+        out.notes.push(format!(
+            "{}: the log has {wide} gaps longer than 3 intervals (longest {:.3} s); inputs are taken as straight across them",
+            series.name,
+            steps[steps.len() - 1]
+        ));
+    }
+}

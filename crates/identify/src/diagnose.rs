@@ -1,0 +1,446 @@
+//! The diagnosis: prepare, check, fit the baseline, search, judge, and write the report.
+
+use kort_thruster::effects::Descriptor;
+use kort_thruster::models::ModelName;
+use kort_thruster::parameters::Parameters;
+use kort_thruster::rig::Rig;
+
+use crate::baseline::{self, Member, members, recompose};
+use crate::checks;
+use crate::data::{DataError, Driving, Prepared, Series, available, scale};
+use crate::errors;
+use crate::fit::{Fit, Problem, Stack, Target};
+use crate::heldout::held_out_rows;
+use crate::judge::{self, Outcome};
+use crate::library::is_term;
+use crate::locate::locate;
+use crate::noise::Whitener;
+use crate::report::{
+    Alternative, Baseline, EmpiricalTerm, Finding, HeldOut, Mismatch, ParameterReport, Report, Verdict,
+};
+use crate::search::Search;
+use crate::words;
+
+/// How to diagnose.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Baseline model.
+    pub model: ModelName,
+    /// Seed of the bootstrap.
+    pub seed: u64,
+}
+
+/// What plots need beyond the report.
+pub struct Traces {
+    /// One entry a recording and channel.
+    pub channels: Vec<Trace>,
+}
+
+/// One channel of one recording, measured and simulated.
+pub struct Trace {
+    /// Recording's name.
+    pub recording: String,
+    /// Column.
+    pub channel: &'static str,
+    /// Time of each sample, s.
+    pub time_s: Vec<f64>,
+    /// Measured.
+    pub measured: Vec<f64>,
+    /// Simulated by the re-fitted baseline.
+    pub baseline: Vec<f64>,
+    /// Simulated with everything found.
+    pub explained: Vec<f64>,
+    /// Shaft speed simulated at each sample, rad/s.
+    pub shaft_speed_rad_s: Vec<f64>,
+}
+
+/// A diagnosis: the report, and traces for its plots.
+pub struct Diagnosis {
+    /// The report.
+    pub report: Report,
+    /// For plots.
+    pub traces: Traces,
+}
+
+/// Diagnoses recordings of one rig together.
+///
+/// # Errors
+/// [`DataError`] if a recording cannot be compared with a model at all.
+pub fn diagnose(
+    series: &[Series],
+    rig: &Rig,
+    options: &Options,
+    progress: &(dyn Fn(&str) + Sync),
+) -> Result<Diagnosis, DataError> {
+    let setup = Setup::new(series, rig, options.model)?;
+    let Setup { problem, hypothesis, notes, thin } = setup;
+    let scale = scale(&problem.recordings, rig);
+    let offered = available(series, &problem.recordings);
+    let mut search = Search::new(problem, scale, &offered);
+    let outcome = judge::run(&mut search, &hypothesis, progress);
+    progress("scoring on held-out data");
+    Ok(write(&search, outcome, series, rig, options, notes, thin))
+}
+
+/// A problem ready to fit, shared by `diagnose` and `fit`.
+pub struct Setup<'a> {
+    /// The problem, with flat whiteners.
+    pub problem: Problem<'a>,
+    /// The baseline's free parameters.
+    pub hypothesis: crate::fit::Hypothesis,
+    /// Words from the checks.
+    pub notes: Vec<String>,
+    /// Why the recording cannot tell anything, if so.
+    pub thin: Option<String>,
+}
+
+impl<'a> Setup<'a> {
+    /// Prepares recordings for a model.
+    ///
+    /// # Errors
+    /// [`DataError`] if a recording cannot be compared with a model at all.
+    pub fn new(series: &[Series], rig: &'a Rig, model: ModelName) -> Result<Self, DataError> {
+        let recordings: Vec<Prepared> = series
+            .iter()
+            .map(|s| Prepared::new(s, rig, model == ModelName::Model3))
+            .collect::<Result<_, _>>()?;
+        let mut notes = Vec::new();
+        let mut masked = Vec::new();
+        for (one, prepared) in series.iter().zip(&recordings) {
+            let checked = checks::check(one, rig);
+            notes.extend(checked.notes);
+            let mut rows = checked.masked;
+            if prepared.start[0] != 0.0 {
+                // The state before the first row is not known: let it settle.
+                let until = prepared.time_s[0] + (0.1 * prepared.duration_s()).min(2.0);
+                prepared.time_s.iter().zip(&mut rows).for_each(|(t, m)| *m |= *t < until);
+            }
+            masked.push(rows);
+        }
+        if baseline::nothing_stated(rig) {
+            notes.push(format!(
+                "the rig description states no tolerance: coefficients are taken as uncertain by {:.0} % (two sigma)",
+                100.0 * baseline::UNSTATED_TOL
+            ));
+        }
+        let whiteners = recordings
+            .iter()
+            .map(|p| p.channels.iter().map(|c| Whitener::flat(0.02 * c.full_scale, c.rows.len())).collect())
+            .collect();
+        let prescribed = recordings.iter().all(|p| p.driving == Driving::Speed);
+        let current = recordings
+            .iter()
+            .any(|p| p.channels.iter().any(|c| c.response == crate::data::Response::Current));
+        let hypothesis = baseline::hypothesis(model, rig, prescribed, current);
+        let thin = too_thin(&recordings);
+        let problem = Problem { model, rig, stated: Parameters::stated(rig), recordings, whiteners, masked };
+        Ok(Self { problem, hypothesis, notes, thin })
+    }
+}
+
+/// Recordings without enough change to tell anything.
+fn too_thin(recordings: &[Prepared]) -> Option<String> {
+    let samples: usize = recordings.iter().map(|r| r.time_s.len()).sum();
+    if samples < 200 {
+        return Some(format!("{samples} rows in all are too few to learn the noise and hold data out"));
+    }
+    let changes: usize = recordings
+        .iter()
+        .map(|r| {
+            let top = r.command.iter().fold(0.0_f64, |m, c| m.max(c.abs()));
+            let mut at = r.command[0];
+            let mut moves = 0;
+            for c in &r.command {
+                if (c - at).abs() > 0.1 * top {
+                    moves += 1;
+                    at = *c;
+                }
+            }
+            moves
+        })
+        .sum();
+    (changes < 3)
+        .then(|| "the driving signal hardly changes: steady data cannot part physics from parameters".into())
+}
+
+fn write(
+    search: &Search,
+    mut outcome: Outcome,
+    series: &[Series],
+    rig: &Rig,
+    options: &Options,
+    mut notes: Vec<String>,
+    thin: Option<String>,
+) -> Diagnosis {
+    let mut problem = search.problem.clone();
+    let held = held_out_rows(&problem);
+    let plain =
+        |fit: &Fit, problem: &Problem| problem.residual(&problem.respond(&fit.hypothesis, &fit.values));
+    let baseline_full = plain(&outcome.baseline, &problem);
+    let last_full = plain(&outcome.last, &problem);
+    let floor = errors::noise_floor(&problem, &last_full);
+    let std_baseline = errors::std_errors(&problem, &mut outcome.baseline);
+    let std_last = errors::std_errors(&problem, &mut outcome.last);
+
+    // Fits on the training rows alone.
+    for (mask, held) in problem.masked.iter_mut().zip(&held) {
+        mask.iter_mut().zip(held).for_each(|(m, h)| *m |= *h);
+    }
+    let train = |fit: &Fit| {
+        let mut hypothesis = fit.hypothesis.clone();
+        hypothesis.start.clone_from(&fit.values);
+        problem.fit(&hypothesis, &fit.columns, 4)
+    };
+    let baseline_train = train(&outcome.baseline);
+    let last_train = if outcome.places.is_empty() { baseline_train.clone() } else { train(&outcome.last) };
+    let with = |list: &[Member]| -> Fit {
+        let (hypothesis, columns) = recompose(&last_train, list, &search.scale);
+        problem.fit(&hypothesis, &columns, 6)
+    };
+    let residual_baseline = plain(&baseline_train, &search.problem);
+    let residual_last = plain(&last_train, &search.problem);
+    let score = |before: &Stack, after: &Stack| {
+        errors::held_out(&search.problem, &held, before, after, &floor, options.seed)
+    };
+
+    let speed: Vec<Vec<f64>> = {
+        let (parameters, effects) = search.problem.assemble(&outcome.last.hypothesis, &outcome.last.values);
+        let hooked: Vec<(&Descriptor, &[f64])> =
+            outcome.last.hypothesis.effects.iter().copied().zip(effects.iter().map(Vec::as_slice)).collect();
+        search
+            .problem
+            .recordings
+            .iter()
+            .map(|r| {
+                search.problem.rows_of(r, &parameters, &hooked).iter().map(|s| s.true_speed_rad_s).collect()
+            })
+            .collect()
+    };
+
+    let all = members(&search.problem, &last_train);
+    let total_gain: f64 = outcome.places.iter().map(|p| p.gain).sum();
+    let mut findings = Vec::new();
+    let mut mismatch = Vec::new();
+    let mut alternatives = Vec::new();
+    let mut empirical_term = None;
+    for (i, place) in outcome.places.iter().enumerate() {
+        let rest: Vec<Member> = all.iter().filter(|m| m.0.id != place.chosen.id).cloned().collect();
+        let without =
+            if rest.is_empty() { residual_baseline.clone() } else { plain(&with(&rest), &search.problem) };
+        let held_here = score(&without, &residual_last);
+        let full_without = if outcome.places.len() == 1 { &baseline_full } else { &without };
+        let located = locate(&search.problem, full_without, &last_full, &speed);
+        let odds = words::odds(place);
+        mismatch.push(Mismatch {
+            path: place.chosen.path.name().into(),
+            channel: located.channel.into(),
+            regime: located.regime.clone(),
+            time_s: located.spans.clone(),
+            significance_sigma: place.gain.max(0.0).sqrt(),
+            share_of_excess_error: (place.gain / total_gain.max(1e-9)).clamp(0.0, 1.0),
+        });
+        if is_term(place.chosen) {
+            empirical_term = Some(empirical(search, &outcome.last, place.chosen, held_here));
+            continue;
+        }
+        let same: Vec<String> = place.rivals.iter().map(|r| r.0.0.id.to_string()).collect();
+        findings.push(finding(
+            search,
+            &outcome.last,
+            &std_last,
+            place,
+            i,
+            held_here,
+            odds[0],
+            same.clone(),
+            &located,
+        ));
+        for (k, ((rival, values), distance)) in place.rivals.iter().enumerate() {
+            let mut swapped = all.clone();
+            if let Some(slot) = swapped.iter().position(|m| m.0.id == place.chosen.id) {
+                swapped[slot] = (rival, values.clone());
+            }
+            let fit = with(&swapped);
+            let held_rival = score(&without, &plain(&fit, &search.problem));
+            let others: Vec<String> = std::iter::once(place.chosen.id.to_string())
+                .chain(same.iter().filter(|s| *s != rival.id).cloned())
+                .collect();
+            findings.push(rival_finding(search, fit, rival, *distance, held_rival, odds[k + 1], others));
+        }
+        for (effect, distance) in place.aside.iter().filter(|a| !is_term(a.0)) {
+            alternatives.push(Alternative {
+                effect: effect.id.into(),
+                probability: words::small_odds(*distance, place.gain),
+                why_not: words::why_not(place.chosen.id, *distance, place.gain),
+            });
+        }
+    }
+    if let Some((effect, gain, why)) = outcome.doubt
+        && !is_term(effect)
+    {
+        alternatives.push(Alternative {
+            effect: effect.id.into(),
+            probability: 0.02,
+            why_not: format!("would lower the misfit by {gain:.0} (in twice the log-likelihood), but {why}"),
+        });
+    }
+    findings.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    let verdict = verdict(&outcome, thin.is_some());
+    if let (Some(why), Verdict::InsufficientData) = (&thin, verdict) {
+        notes.insert(0, why.clone());
+    }
+    notes.extend(words::unused(series, &search.problem));
+    let baseline = Baseline {
+        model: options.model.name().into(),
+        parameters: parameters(&outcome.baseline, &std_baseline, None),
+        channels: errors::channels(&search.problem, &held, &residual_baseline, &baseline_full, &floor),
+    };
+    let next_experiment = words::next_experiment(search, &outcome, rig);
+    let report = Report {
+        schema: "kort.diagnosis/1".into(),
+        kort_version: env!("CARGO_PKG_VERSION").into(),
+        recordings: series.iter().map(|s| s.name.clone()).collect(),
+        rig: rig.name.clone(),
+        seed: options.seed,
+        seconds: search.problem.recordings.iter().map(Prepared::duration_s).sum(),
+        verdict,
+        summary: words::summary(
+            verdict,
+            &findings,
+            &mismatch,
+            empirical_term.as_ref(),
+            next_experiment.as_ref(),
+            &baseline,
+            &outcome,
+            thin.as_deref(),
+        ),
+        baseline,
+        mismatch,
+        findings,
+        alternatives,
+        empirical_term,
+        next_experiment,
+        notes,
+    };
+    Diagnosis { report, traces: traces(&search.problem, &baseline_full, &last_full, &speed) }
+}
+
+fn verdict(outcome: &Outcome, thin: bool) -> Verdict {
+    let total: f64 = outcome.places.iter().map(|p| p.gain).sum();
+    let unnamed: f64 = outcome.places.iter().filter(|p| is_term(p.chosen)).map(|p| p.gain).sum();
+    if outcome.places.is_empty() {
+        if thin { Verdict::InsufficientData } else { Verdict::NoMismatch }
+    } else if unnamed > 0.15 * total {
+        Verdict::Unexplained
+    } else if outcome.places.iter().any(|p| !p.rivals.is_empty()) {
+        Verdict::Ambiguous
+    } else {
+        Verdict::Explained
+    }
+}
+
+/// Free parameters of a fit for a report: the baseline's, or those of one effect.
+pub fn parameters(fit: &Fit, std: &[f64], effect: Option<usize>) -> Vec<ParameterReport> {
+    fit.hypothesis
+        .free
+        .iter()
+        .enumerate()
+        .filter(|(_, f)| match (f.target, effect) {
+            (Target::Base(_), None) => true,
+            (Target::Effect(i, _), Some(wanted)) => i == wanted,
+            _ => false,
+        })
+        .map(|(k, f)| ParameterReport {
+            name: f.name.into(),
+            value: fit.values[k],
+            unit: f.unit.into(),
+            std_error: std[k],
+            stated: f.prior.filter(|_| effect.is_none()).map(|p| p.0),
+            at_bound: Some(fit.at_bound[k]),
+        })
+        .collect()
+}
+
+#[expect(clippy::too_many_arguments, reason = "one call, every argument a part of the finding")]
+fn finding(
+    search: &Search,
+    last: &Fit,
+    std: &[f64],
+    place: &judge::Place,
+    slot: usize,
+    heldout: HeldOut,
+    probability: f64,
+    confounded_with: Vec<String>,
+    located: &crate::locate::Place,
+) -> Finding {
+    let _ = search;
+    Finding {
+        effect: place.chosen.id.into(),
+        path: place.chosen.path.name().into(),
+        probability,
+        statement: words::statement(place.chosen),
+        equation: place.chosen.equation.into(),
+        parameters: parameters(last, std, Some(slot)),
+        evidence: words::evidence(place, &heldout, located),
+        heldout,
+        confounded_with,
+    }
+}
+
+fn rival_finding(
+    search: &Search,
+    mut fit: Fit,
+    rival: &'static Descriptor,
+    distance: f64,
+    heldout: HeldOut,
+    probability: f64,
+    confounded_with: Vec<String>,
+) -> Finding {
+    let std = errors::std_errors(&search.problem, &mut fit);
+    let slot = fit.hypothesis.effects.iter().position(|e| e.id == rival.id);
+    Finding {
+        effect: rival.id.into(),
+        path: rival.path.name().into(),
+        probability,
+        statement: words::statement(rival),
+        equation: rival.equation.into(),
+        parameters: parameters(&fit, &std, slot),
+        heldout,
+        evidence: vec![format!(
+            "explains the recording as well: its misfit differs by {distance:.1} in twice the log-likelihood, within doubt"
+        )],
+        confounded_with,
+    }
+}
+
+fn empirical(search: &Search, last: &Fit, term: &'static Descriptor, heldout: HeldOut) -> EmpiricalTerm {
+    let values =
+        members(&search.problem, last).into_iter().find(|m| m.0.id == term.id).map_or_else(Vec::new, |m| m.1);
+    let (enters, variables) = words::enters(term);
+    EmpiricalTerm {
+        path: term.path.name().into(),
+        enters: enters.into(),
+        expression: words::expression(term, &values),
+        variables: variables.iter().map(|v| (*v).into()).collect(),
+        heldout,
+    }
+}
+
+fn traces(problem: &Problem, before: &Stack, after: &Stack, speed: &[Vec<f64>]) -> Traces {
+    let mut channels = Vec::new();
+    for (r, recording) in problem.recordings.iter().enumerate() {
+        for (c, channel) in recording.channels.iter().enumerate() {
+            let minus = |residual: &[f64]| channel.values.iter().zip(residual).map(|(m, e)| m - e).collect();
+            channels.push(Trace {
+                recording: recording.name.clone(),
+                channel: channel.response.name(),
+                time_s: channel.rows.iter().map(|k| recording.time_s[*k]).collect(),
+                measured: channel.values.clone(),
+                baseline: minus(&before[r][c]),
+                explained: minus(&after[r][c]),
+                shaft_speed_rad_s: channel.rows.iter().map(|k| speed[r][*k]).collect(),
+            });
+        }
+    }
+    Traces { channels }
+}

@@ -1,0 +1,204 @@
+//! Errors of fits by channel: on rows fitted and rows held out, before and after.
+
+use std::collections::BTreeMap;
+
+use rand::{Rng, SeedableRng};
+
+use crate::fit::{Fit, Problem, Stack};
+use crate::report::{BeforeAfter, ChannelReport, HeldOut};
+
+/// Sum of squares and count, by channel name.
+pub type Sums = BTreeMap<&'static str, (f64, usize)>;
+
+/// Sums of squared residuals over rows that `pick` takes.
+pub fn sums(problem: &Problem, residual: &Stack, pick: impl Fn(usize, usize) -> bool) -> Sums {
+    let mut out = Sums::new();
+    for (r, recording) in problem.recordings.iter().enumerate() {
+        for (c, channel) in recording.channels.iter().enumerate() {
+            let entry = out.entry(channel.response.name()).or_insert((0.0, 0));
+            for (row, value) in channel.rows.iter().zip(&residual[r][c]) {
+                if pick(r, *row) {
+                    entry.0 += value * value;
+                    entry.1 += 1;
+                }
+            }
+        }
+    }
+    out
+}
+
+/// Full scale of each channel over all recordings.
+pub fn full_scales(problem: &Problem) -> BTreeMap<&'static str, f64> {
+    let mut out = BTreeMap::new();
+    for channel in problem.recordings.iter().flat_map(|r| &r.channels) {
+        let full = out.entry(channel.response.name()).or_insert(0.0_f64);
+        *full = full.max(channel.full_scale);
+    }
+    out
+}
+
+/// Noise variance of each channel from second differences of the residual, away from edges: what
+/// no smooth model could explain.
+pub fn noise_floor(problem: &Problem, residual: &Stack) -> BTreeMap<&'static str, f64> {
+    let mut out: BTreeMap<&'static str, (f64, usize)> = BTreeMap::new();
+    for (r, recording) in problem.recordings.iter().enumerate() {
+        let mut near = vec![false; recording.time_s.len()];
+        for edge in &recording.edges {
+            let to = (edge.row + 15).min(near.len());
+            near[edge.row.saturating_sub(1)..to].fill(true);
+        }
+        for (c, channel) in recording.channels.iter().enumerate() {
+            let entry = out.entry(channel.response.name()).or_insert((0.0, 0));
+            for (rows, e) in channel.rows.windows(3).zip(residual[r][c].windows(3)) {
+                if rows.iter().any(|row| near[*row] || problem.masked[r][*row]) {
+                    continue;
+                }
+                entry.0 += (e[0] - 2.0 * e[1] + e[2]).powi(2) / 6.0;
+                entry.1 += 1;
+            }
+        }
+    }
+    out.into_iter().map(|(name, (sum, n))| (name, if n > 20 { sum / n as f64 } else { 0.0 })).collect()
+}
+
+/// Errors of the baseline for the report: fitted rows, held-out rows, floor, whiteness.
+pub fn channels(
+    problem: &Problem,
+    held: &[Vec<bool>],
+    train: &Stack,
+    full_fit: &Stack,
+    floor: &BTreeMap<&'static str, f64>,
+) -> BTreeMap<String, ChannelReport> {
+    let usable = |r: usize, row: usize| !problem.masked[r][row];
+    let inside = sums(problem, train, |r, row| usable(r, row) && !held[r][row]);
+    let outside = sums(problem, train, |r, row| usable(r, row) && held[r][row]);
+    let full = full_scales(problem);
+    let nrmse = |(sum, n): (f64, usize), full: f64| (sum / n.max(1) as f64).sqrt() / full;
+    inside
+        .iter()
+        .map(|(name, sum)| {
+            let scale = full[name];
+            let report = ChannelReport {
+                nrmse_train: nrmse(*sum, scale),
+                nrmse_heldout: nrmse(outside[name], scale),
+                noise_floor: floor.get(name).copied().unwrap_or(0.0).sqrt() / scale,
+                white: is_white(problem, full_fit, name),
+            };
+            ((*name).to_string(), report)
+        })
+        .collect()
+}
+
+/// First five autocorrelations of a channel's residual within three standard errors.
+fn is_white(problem: &Problem, residual: &Stack, name: &str) -> bool {
+    for (r, recording) in problem.recordings.iter().enumerate() {
+        for (c, channel) in recording.channels.iter().enumerate() {
+            if channel.response.name() != name {
+                continue;
+            }
+            let e = &residual[r][c];
+            let power: f64 = e.iter().map(|v| v * v).sum();
+            for lag in 1..=5.min(e.len() - 1) {
+                let product: f64 = e.iter().zip(&e[lag..]).map(|(a, b)| a * b).sum();
+                if (product / power.max(1e-300)).abs() > 3.5 / (e.len() as f64).sqrt() {
+                    return false;
+                }
+            }
+        }
+    }
+    true
+}
+
+/// Gain of `after` over `before` on held-out rows, both fitted without them.
+pub fn held_out(
+    problem: &Problem,
+    held: &[Vec<bool>],
+    before: &Stack,
+    after: &Stack,
+    floor: &BTreeMap<&'static str, f64>,
+    seed: u64,
+) -> HeldOut {
+    let pick = |r: usize, row: usize| held[r][row] && !problem.masked[r][row];
+    let (b, a) = (sums(problem, before, pick), sums(problem, after, pick));
+    let full = full_scales(problem);
+    let rms = |(sum, n): (f64, usize)| (sum / n.max(1) as f64).sqrt();
+    // The channel where the error stands highest above the noise.
+    let height = |name: &str| {
+        let (sum, n) = b[name];
+        let noise = floor.get(name).copied().unwrap_or(0.0).max(1e-12 * full[name] * full[name]);
+        (sum / n.max(1) as f64 - noise) / noise
+    };
+    let best = b.keys().copied().max_by(|x, y| height(x).total_cmp(&height(y)));
+    let (removed, interval_95) = best.map_or((0.0, [0.0, 0.0]), |name| {
+        let noise = floor.get(name).copied().unwrap_or(0.0);
+        let pieces = pieces(problem, held, before, after, name);
+        let share = |list: &[usize]| {
+            let (mut sb, mut sa, mut n) = (0.0, 0.0, 0.0);
+            for i in list {
+                sb += pieces[*i].0;
+                sa += pieces[*i].1;
+                n += pieces[*i].2;
+            }
+            let excess = (sb - noise * n).max(1e-12 * sb.max(1e-300));
+            ((sb - sa) / excess).clamp(-1.0, 1.0)
+        };
+        let everything: Vec<usize> = (0..pieces.len()).collect();
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+        let mut draws: Vec<f64> = (0..400)
+            .map(|_| {
+                let list: Vec<usize> = (0..pieces.len()).map(|_| rng.random_range(0..pieces.len())).collect();
+                share(&list)
+            })
+            .collect();
+        draws.sort_by(f64::total_cmp);
+        (share(&everything), [draws[9], draws[389]])
+    });
+    HeldOut {
+        channels: b
+            .iter()
+            .map(|(name, sum)| {
+                let pair = BeforeAfter {
+                    nrmse_before: rms(*sum) / full[name],
+                    nrmse_after: rms(a[name]) / full[name],
+                };
+                ((*name).to_string(), pair)
+            })
+            .collect(),
+        excess_error_removed: removed,
+        interval_95,
+    }
+}
+
+/// Squared errors before and after, and counts, in one-second pieces of the held-out rows.
+fn pieces(
+    problem: &Problem,
+    held: &[Vec<bool>],
+    before: &Stack,
+    after: &Stack,
+    name: &str,
+) -> Vec<(f64, f64, f64)> {
+    let mut out: BTreeMap<(usize, i64), (f64, f64, f64)> = BTreeMap::new();
+    for (r, recording) in problem.recordings.iter().enumerate() {
+        for (c, channel) in recording.channels.iter().enumerate() {
+            if channel.response.name() != name {
+                continue;
+            }
+            for (i, row) in channel.rows.iter().enumerate() {
+                if !held[r][*row] || problem.masked[r][*row] {
+                    continue;
+                }
+                let piece = out.entry((r, recording.time_s[*row].floor() as i64)).or_insert((0.0, 0.0, 0.0));
+                piece.0 += before[r][c][i].powi(2);
+                piece.1 += after[r][c][i].powi(2);
+                piece.2 += 1.0;
+            }
+        }
+    }
+    out.into_values().collect()
+}
+
+/// Standard errors of a fit's free parameters, priors included.
+pub fn std_errors(problem: &Problem, fit: &mut Fit) -> Vec<f64> {
+    let projector = crate::screen::Projector::new(problem, fit);
+    projector.std_errors()
+}

@@ -1,0 +1,433 @@
+//! Output-error identification: simulate, compare with every channel, improve the parameters.
+//!
+//! Gauss-Newton with Levenberg-Marquardt damping on whitened residuals, stated values as priors
+//! (sigma = half the stated tolerance), bounds by freezing. The derivative is by differences of
+//! simulations: the plant is smooth in its parameters by construction.
+
+use kort_thruster::effects::Descriptor;
+use kort_thruster::models::ModelName;
+use kort_thruster::parameters::{Parameter, Parameters};
+use kort_thruster::plant::{Plant, simulate};
+use kort_thruster::rig::Rig;
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+use std::sync::Arc;
+
+use crate::data::{Prepared, Response};
+use crate::noise::Whitener;
+
+/// A fit ends when a step lowers the sum of whitened squares by less than this: far below what
+/// any decision turns on.
+const ENOUGH: f64 = 0.3;
+
+/// What a free parameter changes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Target {
+    /// A parameter of the baseline.
+    Base(Parameter),
+    /// A value of an effect: which effect of the hypothesis, which value.
+    Effect(usize, usize),
+}
+
+/// A free parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Free {
+    /// What it changes.
+    pub target: Target,
+    /// Name for reports.
+    pub name: &'static str,
+    /// Unit for reports.
+    pub unit: &'static str,
+    /// Prior mean and standard deviation, if stated.
+    pub prior: Option<(f64, f64)>,
+    /// Bounds.
+    pub low: f64,
+    /// Bounds.
+    pub high: f64,
+    /// A typical size, for the step of differences.
+    pub size: f64,
+}
+
+/// A baseline model with effects added to it.
+#[derive(Clone)]
+pub struct Hypothesis {
+    /// Effects in order.
+    pub effects: Vec<&'static Descriptor>,
+    /// Free parameters: baseline first, then the effects' in order.
+    pub free: Vec<Free>,
+    /// Values where a fit starts.
+    pub start: Vec<f64>,
+    /// Values of effects that do not move: effect, value's place, value.
+    pub fixed: Vec<(usize, usize, f64)>,
+}
+
+/// Everything that stays the same while hypotheses are compared.
+#[derive(Clone)]
+pub struct Problem<'a> {
+    /// Baseline model.
+    pub model: ModelName,
+    /// The stated rig.
+    pub rig: &'a Rig,
+    /// Stated parameters.
+    pub stated: Parameters,
+    /// Recordings.
+    pub recordings: Vec<Prepared>,
+    /// Whiteners, one a recording and channel.
+    pub whiteners: Vec<Vec<Whitener>>,
+    /// Rows left out of every comparison (flagged data, run-in), by recording.
+    pub masked: Vec<Vec<bool>>,
+}
+
+/// Residuals and responses of all channels: `[recording][channel][sample]`.
+pub type Stack = Vec<Vec<Vec<f64>>>;
+
+/// A fitted hypothesis.
+#[derive(Clone)]
+pub struct Fit {
+    /// The hypothesis.
+    pub hypothesis: Hypothesis,
+    /// Values of its free parameters.
+    pub values: Vec<f64>,
+    /// Sum of squares of the whitened residual over the samples in use.
+    pub chi2: f64,
+    /// Sum of squares of the priors' residuals.
+    pub penalty: f64,
+    /// Whitened residual, all channels joined.
+    pub residual: DVector<f64>,
+    /// Derivative of the response by free parameter, where it is known; perhaps from nearby.
+    pub columns: Vec<Option<Arc<Stack>>>,
+    /// Parameters held at a bound.
+    pub at_bound: Vec<bool>,
+}
+
+impl<'a> Problem<'a> {
+    /// The response of a hypothesis at values of its free parameters.
+    pub fn respond(&self, hypothesis: &Hypothesis, values: &[f64]) -> Stack {
+        let (parameters, effects) = self.assemble(hypothesis, values);
+        let hooked: Vec<(&Descriptor, &[f64])> =
+            hypothesis.effects.iter().copied().zip(effects.iter().map(Vec::as_slice)).collect();
+        self.recordings
+            .iter()
+            .map(|recording| {
+                let rows = self.rows_of(recording, &parameters, &hooked);
+                recording
+                    .channels
+                    .iter()
+                    .map(|c| c.rows.iter().map(|r| c.response.of(&rows[*r])).collect())
+                    .collect()
+            })
+            .collect()
+    }
+
+    /// Simulated rows of one recording.
+    pub fn rows_of(
+        &self,
+        recording: &Prepared,
+        parameters: &Parameters,
+        effects: &[(&Descriptor, &[f64])],
+    ) -> Vec<kort_thruster::plant::Sensed> {
+        let mut plant = Plant::new(self.model, self.rig, parameters, effects, recording.tick_s);
+        let [speed, flow, current, angle] = recording.start;
+        plant.start(recording.time_s[0], speed, flow, current, angle);
+        simulate(&mut plant, &recording.stimulus).rows
+    }
+
+    /// Parameters and effect values from the vector of free ones.
+    pub fn assemble(&self, hypothesis: &Hypothesis, values: &[f64]) -> (Parameters, Vec<Vec<f64>>) {
+        let mut parameters = self.stated;
+        let mut effects: Vec<Vec<f64>> = vec![Vec::new(); hypothesis.effects.len()];
+        let mut put = |i: usize, j: usize, value: f64| {
+            if effects[i].len() <= j {
+                effects[i].resize(j + 1, 0.0);
+            }
+            effects[i][j] = value;
+        };
+        for (free, value) in hypothesis.free.iter().zip(values) {
+            match free.target {
+                Target::Base(p) => parameters.set(p, *value),
+                Target::Effect(i, j) => put(i, j, *value),
+            }
+        }
+        for (i, j, value) in &hypothesis.fixed {
+            put(*i, *j, *value);
+        }
+        (parameters, effects)
+    }
+
+    /// Measured minus simulated.
+    pub fn residual(&self, response: &Stack) -> Stack {
+        self.recordings
+            .iter()
+            .zip(response)
+            .map(|(recording, channels)| {
+                recording
+                    .channels
+                    .iter()
+                    .zip(channels)
+                    .map(|(c, simulated)| c.values.iter().zip(simulated).map(|(m, s)| m - s).collect())
+                    .collect()
+            })
+            .collect()
+    }
+
+    /// Root mean square over full scale, on the channel where that is largest.
+    pub fn size(&self, stack: &Stack) -> f64 {
+        let mut size = 0.0_f64;
+        for (recording, channels) in self.recordings.iter().zip(stack) {
+            for (channel, samples) in recording.channels.iter().zip(channels) {
+                let sum: f64 = samples.iter().map(|v| v * v).sum();
+                size = size.max((sum / samples.len() as f64).sqrt() / channel.full_scale);
+            }
+        }
+        size
+    }
+
+    /// Whitens and joins a stack; masked samples become zero before whitening.
+    pub fn whiten(&self, stack: &Stack) -> DVector<f64> {
+        let mut joined = Vec::new();
+        for (r, channels) in stack.iter().enumerate() {
+            for (c, values) in channels.iter().enumerate() {
+                let rows = &self.recordings[r].channels[c].rows;
+                let masked: Vec<f64> = values
+                    .iter()
+                    .zip(rows)
+                    .map(|(v, row)| if self.masked[r][*row] { 0.0 } else { *v })
+                    .collect();
+                joined.extend(self.whiteners[r][c].apply(&masked));
+            }
+        }
+        DVector::from_vec(joined)
+    }
+
+    /// Derivative of the response to one free parameter, by a one-sided difference.
+    fn column(&self, hypothesis: &Hypothesis, values: &[f64], at: &Stack, k: usize) -> Stack {
+        let free = &hypothesis.free[k];
+        let mut step = 1e-4 * free.size.max(values[k].abs());
+        if values[k] + step > free.high {
+            step = -step;
+        }
+        let mut moved = values.to_vec();
+        moved[k] += step;
+        let mut response = self.respond(hypothesis, &moved);
+        for (channels, base) in response.iter_mut().zip(at) {
+            for (samples, base) in channels.iter_mut().zip(base) {
+                samples.iter_mut().zip(base).for_each(|(s, b)| *s = (*s - b) / step);
+            }
+        }
+        response
+    }
+
+    /// Computes the columns that are missing.
+    fn complete(
+        &self,
+        hypothesis: &Hypothesis,
+        values: &[f64],
+        at: &Stack,
+        columns: &mut [Option<Arc<Stack>>],
+    ) {
+        columns.par_iter_mut().enumerate().for_each(|(k, column)| {
+            if column.is_none() {
+                *column = Some(Arc::new(self.column(hypothesis, values, at, k)));
+            }
+        });
+    }
+
+    /// The whitened derivative, one column a free parameter.
+    fn whiten_columns(&self, columns: &[Option<Arc<Stack>>], samples: usize) -> DMatrix<f64> {
+        let whitened: Vec<DVector<f64>> = columns.par_iter().flatten().map(|c| self.whiten(c)).collect();
+        if whitened.is_empty() { DMatrix::zeros(samples, 0) } else { DMatrix::from_columns(&whitened) }
+    }
+
+    /// Fits a hypothesis from its start. `known` holds derivative columns from a nearby fit (by
+    /// free parameter); they are used until a step falls short of what they promise, which saves
+    /// most simulations while hypotheses are compared.
+    pub fn fit(&self, hypothesis: &Hypothesis, known: &[Option<Arc<Stack>>], iterations: usize) -> Fit {
+        let free = &hypothesis.free;
+        let n = free.len();
+        let mut values = hypothesis.start.clone();
+        let mut response = self.respond(hypothesis, &values);
+        let mut residual = self.whiten(&self.residual(&response));
+        let mut cost = residual.norm_squared() + penalty(free, &values);
+        let mut damping = 1e-4;
+        let mut columns = known.to_vec();
+        columns.resize(n, None);
+        let mut fresh = columns.iter().all(Option::is_none);
+        let size = DVector::from_iterator(n, free.iter().map(|f| f.size));
+        for _ in 0..iterations {
+            self.complete(hypothesis, &values, &response, &mut columns);
+            let mut scaled = self.whiten_columns(&columns, residual.len());
+            for k in 0..n {
+                scaled.column_mut(k).scale_mut(size[k]);
+            }
+            let mut normal = scaled.tr_mul(&scaled);
+            let mut gradient = scaled.tr_mul(&residual);
+            for k in 0..n {
+                if let Some((mean, sigma)) = free[k].prior {
+                    let s = size[k] / sigma;
+                    normal[(k, k)] += s * s;
+                    gradient[k] += s * (mean - values[k]) / sigma;
+                }
+            }
+            let mut outcome = None;
+            for _ in 0..6 {
+                let step = damped_step(&normal, &gradient, damping, free, &values);
+                let trial: Vec<f64> = (0..n)
+                    .map(|k| (values[k] + step[k] * size[k]).clamp(free[k].low, free[k].high))
+                    .collect();
+                let trial_response = self.respond(hypothesis, &trial);
+                let trial_residual = self.whiten(&self.residual(&trial_response));
+                let trial_cost = trial_residual.norm_squared() + penalty(free, &trial);
+                if trial_cost < cost {
+                    let promised = 2.0 * gradient.dot(&step) - (&normal * &step).dot(&step);
+                    outcome = Some((cost - trial_cost, promised));
+                    (values, response, residual, cost) = (trial, trial_response, trial_residual, trial_cost);
+                    damping = (damping * 0.1).max(1e-9);
+                    break;
+                }
+                if !fresh {
+                    break;
+                }
+                damping *= 10.0;
+            }
+            match outcome {
+                Some((gain, promised)) if gain > 0.75 * promised => {
+                    if gain < ENOUGH {
+                        break;
+                    }
+                    fresh = false;
+                }
+                // The derivative no longer tells: refresh the effects' first, then everything.
+                Some((gain, promised)) if gain > 0.3 * promised && !fresh && gain > ENOUGH => {
+                    for k in 0..n {
+                        if matches!(free[k].target, Target::Effect(..)) {
+                            columns[k] = None;
+                        }
+                    }
+                }
+                other => {
+                    if fresh && other.is_none_or(|(gain, _)| gain < ENOUGH) {
+                        break;
+                    }
+                    columns.fill(None);
+                    fresh = true;
+                }
+            }
+        }
+        Fit {
+            at_bound: (0..n).map(|k| near_bound(&free[k], values[k])).collect(),
+            hypothesis: hypothesis.clone(),
+            chi2: residual.norm_squared(),
+            penalty: penalty(free, &values),
+            values,
+            residual,
+            columns,
+        }
+    }
+
+    /// The whitened derivative at a fit, every column computed anew.
+    pub fn jacobian(&self, fit: &mut Fit) -> DMatrix<f64> {
+        let at = self.respond(&fit.hypothesis, &fit.values);
+        fit.columns = vec![None; fit.values.len()];
+        self.complete(&fit.hypothesis, &fit.values, &at, &mut fit.columns);
+        self.whiten_columns(&fit.columns, fit.residual.len())
+    }
+
+    /// Learns the noise from the residual of a fitted hypothesis.
+    pub fn learn_noise(&mut self, hypothesis: &Hypothesis, values: &[f64]) {
+        let (parameters, effects) = self.assemble(hypothesis, values);
+        let hooked: Vec<(&Descriptor, &[f64])> =
+            hypothesis.effects.iter().copied().zip(effects.iter().map(Vec::as_slice)).collect();
+        let whiteners = self
+            .recordings
+            .iter()
+            .zip(&self.masked)
+            .map(|(recording, masked)| {
+                let rows = self.rows_of(recording, &parameters, &hooked);
+                let top = rows.iter().fold(1e-9_f64, |m, r| m.max(r.true_speed_rad_s.abs()));
+                recording
+                    .channels
+                    .iter()
+                    .map(|c| {
+                        let residual: Vec<f64> = c
+                            .rows
+                            .iter()
+                            .zip(&c.values)
+                            .map(|(r, v)| if masked[*r] { 0.0 } else { v - c.response.of(&rows[*r]) })
+                            .collect();
+                        let activity: Vec<f64> =
+                            c.rows.iter().map(|r| (rows[*r].true_speed_rad_s / top).abs()).collect();
+                        Whitener::learn(&residual, &activity, self.quantum(c.response) + 1e-5 * c.full_scale)
+                    })
+                    .collect()
+            })
+            .collect();
+        self.whiteners = whiteners;
+    }
+
+    /// Standard deviation of a sensor's quantisation.
+    fn quantum(&self, response: Response) -> f64 {
+        let s = &self.rig.sensors;
+        let uniform = 12.0_f64.sqrt();
+        match response {
+            Response::Thrust => match (s.thrust_full_scale_n, s.thrust_bits) {
+                (Some(full), Some(bits)) => 2.0 * full / 2.0_f64.powi(bits as i32) / uniform,
+                _ => 0.0,
+            },
+            Response::ShaftSpeed => match (s.encoder_counts_per_rev, s.control_rate_hz) {
+                (Some(counts), Some(rate)) => {
+                    let raw = std::f64::consts::TAU / counts * rate;
+                    let tau = s.speed_filter_time_constant_s.unwrap_or(0.0) * rate;
+                    raw / uniform / (1.0 + 2.0 * tau).sqrt() / 3.0
+                }
+                _ => 0.0,
+            },
+            _ => 0.0,
+        }
+    }
+}
+
+/// Sum of squares of the priors' residuals.
+pub fn penalty(free: &[Free], values: &[f64]) -> f64 {
+    free.iter()
+        .zip(values)
+        .filter_map(|(f, v)| f.prior.map(|(mean, sigma)| ((v - mean) / sigma).powi(2)))
+        .sum()
+}
+
+fn near_bound(free: &Free, value: f64) -> bool {
+    let slack = 1e-6 * (free.high - free.low);
+    value <= free.low + slack || value >= free.high - slack
+}
+
+/// The damped step in scaled parameters; a parameter at its bound that wants out is frozen.
+fn damped_step(
+    normal: &DMatrix<f64>,
+    gradient: &DVector<f64>,
+    damping: f64,
+    free: &[Free],
+    values: &[f64],
+) -> DVector<f64> {
+    let n = free.len();
+    let frozen: Vec<bool> = (0..n)
+        .map(|k| {
+            values[k] <= free[k].low && gradient[k] < 0.0 || values[k] >= free[k].high && gradient[k] > 0.0
+        })
+        .collect();
+    let mut a = normal.clone();
+    let mut b = gradient.clone();
+    for k in 0..n {
+        a[(k, k)] += damping * a[(k, k)] + 1e-12;
+        if frozen[k] {
+            for j in 0..n {
+                a[(k, j)] = 0.0;
+                a[(j, k)] = 0.0;
+            }
+            a[(k, k)] = 1.0;
+            b[k] = 0.0;
+        }
+    }
+    match a.cholesky() {
+        Some(c) => c.solve(&b),
+        None => DVector::zeros(n),
+    }
+}

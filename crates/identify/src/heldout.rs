@@ -1,0 +1,95 @@
+//! Scores on data that were not fitted.
+//!
+//! Two forms. While hypotheses compete, each is judged on blocks of the recording left out in
+//! turn, to first order from one fit (the parameters move by what the block contributed). What
+//! the report claims is done in full: a fit on the training blocks alone, scored on the others.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::fit::{Fit, Problem};
+
+/// Length of a block, s: long against the noise's memory, short against the recording.
+const BLOCK_S: f64 = 2.0;
+/// Blocks left out together.
+const FOLDS: usize = 5;
+/// Blocks of the split into training and held-out data.
+const SPLIT_BLOCKS: usize = 12;
+
+/// Block of every joined sample, numbered over all recordings.
+pub fn blocks(problem: &Problem) -> (Vec<usize>, usize) {
+    let mut of = Vec::new();
+    let mut offset = 0;
+    for recording in &problem.recordings {
+        let count = ((recording.duration_s() / BLOCK_S).round() as usize).max(4);
+        let width = recording.duration_s() / count as f64 * (1.0 + 1e-9);
+        for channel in &recording.channels {
+            of.extend(
+                channel
+                    .rows
+                    .iter()
+                    .map(|r| offset + ((recording.time_s[*r] - recording.time_s[0]) / width) as usize),
+            );
+        }
+        offset += count;
+    }
+    (of, offset)
+}
+
+/// Sum of squares of each block when its fold is left out of the fit, to first order.
+pub fn left_out(problem: &Problem, fit: &mut Fit) -> Vec<f64> {
+    let (block, count) = blocks(problem);
+    let n = fit.values.len();
+    let size = DVector::from_iterator(n, fit.hypothesis.free.iter().map(|f| f.size));
+    let mut j = problem.jacobian(fit);
+    for k in 0..n {
+        j.column_mut(k).scale_mut(if fit.at_bound[k] { 0.0 } else { size[k] });
+    }
+    let mut normals = vec![DMatrix::<f64>::zeros(n, n); FOLDS];
+    let mut gradients = vec![DVector::<f64>::zeros(n); FOLDS];
+    let rows_of: Vec<Vec<usize>> =
+        (0..FOLDS).map(|f| (0..block.len()).filter(|i| block[*i] % FOLDS == f).collect()).collect();
+    for f in 0..FOLDS {
+        let part = j.select_rows(&rows_of[f]);
+        let r = DVector::from_iterator(rows_of[f].len(), rows_of[f].iter().map(|i| fit.residual[*i]));
+        normals[f] = part.tr_mul(&part);
+        gradients[f] = part.tr_mul(&r);
+    }
+    let mut total: DMatrix<f64> = normals.iter().sum();
+    for (k, free) in fit.hypothesis.free.iter().enumerate() {
+        if let Some((_, sigma)) = free.prior {
+            total[(k, k)] += (size[k] / sigma).powi(2);
+        }
+        total[(k, k)] += 1e-6;
+    }
+    let mut losses = vec![0.0; count];
+    for f in 0..FOLDS {
+        let rest = &total - &normals[f];
+        let shift = rest.cholesky().map_or_else(|| DVector::zeros(n), |c| c.solve(&gradients[f]));
+        for i in &rows_of[f] {
+            let left = fit.residual[*i] + j.row(*i).transpose().dot(&shift);
+            losses[block[*i]] += left * left;
+        }
+    }
+    losses
+}
+
+/// Sum of paired differences and its standard error: positive if `after` is better.
+pub fn paired(before: &[f64], after: &[f64]) -> (f64, f64) {
+    let d: Vec<f64> = before.iter().zip(after).map(|(b, a)| b - a).collect();
+    let n = d.len() as f64;
+    let mean = d.iter().sum::<f64>() / n;
+    let var = d.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
+    (mean * n, (var * n).sqrt())
+}
+
+/// Rows that the reported held-out score leaves out of the fit: every third of twelve blocks.
+pub fn held_out_rows(problem: &Problem) -> Vec<Vec<bool>> {
+    problem
+        .recordings
+        .iter()
+        .map(|r| {
+            let width = r.duration_s() / SPLIT_BLOCKS as f64 * (1.0 + 1e-9);
+            r.time_s.iter().map(|t| ((t - r.time_s[0]) / width) as usize % 3 == 2).collect()
+        })
+        .collect()
+}

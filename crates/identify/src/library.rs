@@ -1,0 +1,375 @@
+//! Terms without a name: signed and even powers of the states on each path, products, and
+//! loads that switch on at some time. They judge whether a named effect is good enough, and say
+//! what is known where none is.
+
+use kort_thruster::effects::{Descriptor, Effect, Hooks, Path, Scale, Spec, free_shaft, one_start, wet};
+use kort_thruster::plant::{Balance, Drive, Local, Sensed, Tick};
+
+/// All terms.
+pub const TERMS: &[&Descriptor] = &[
+    &SHAFT_ODD,
+    &SHAFT_EVEN,
+    &SHAFT_FLOW,
+    &SHAFT_SWITCHED,
+    &DRIVE_ODD,
+    &DRIVE_SWITCHED,
+    &BLADE_THRUST_ODD,
+    &BLADE_THRUST_EVEN,
+    &BLADE_THRUST_FLOW,
+    &BLADE_TORQUE_ODD,
+    &FLOW_ODD,
+    &FLOW_EVEN,
+    &FLOW_SWITCHED,
+    &SENSOR_THRUST,
+    &SENSOR_THRUST_SWITCHED,
+];
+
+/// Is this a term of the library rather than a named effect?
+pub fn is_term(effect: &Descriptor) -> bool {
+    effect.id.starts_with("term_")
+}
+
+type Act = fn(&Values, &Local, &mut Balance);
+
+/// Values of a term: size, reference, exponent or time.
+#[derive(Clone, Copy)]
+struct Values {
+    size: f64,
+    reference: f64,
+    shape: f64,
+}
+
+struct BalanceTerm {
+    values: Values,
+    act: Act,
+}
+
+impl Effect for BalanceTerm {
+    fn hooks(&self) -> Hooks {
+        Hooks::BALANCE
+    }
+
+    fn balance(&self, at: &Local, _: &[f64], balance: &mut Balance, _: &mut [f64]) {
+        (self.act)(&self.values, at, balance);
+    }
+}
+
+struct DriveTerm {
+    values: Values,
+    act: fn(&Values, &Tick, f64) -> f64,
+}
+
+impl Effect for DriveTerm {
+    fn hooks(&self) -> Hooks {
+        Hooks::DRIVE
+    }
+
+    fn drive(&mut self, tick: &Tick, drive: &mut Drive) {
+        drive.command += (self.act)(&self.values, tick, drive.command);
+    }
+}
+
+struct ThrustTerm {
+    values: Values,
+    act: fn(&Values, &Tick, f64) -> f64,
+}
+
+impl Effect for ThrustTerm {
+    fn hooks(&self) -> Hooks {
+        Hooks::SENSE
+    }
+
+    fn sense(&mut self, tick: &Tick, sensed: &mut Sensed) {
+        sensed.thrust_n += (self.act)(&self.values, tick, sensed.thrust_n);
+    }
+}
+
+fn values(v: &[f64]) -> Values {
+    Values { size: v[0], reference: v[1], shape: v[2] }
+}
+
+/// `sgn(x) |x/x0|^p`, smooth at zero.
+fn odd(x: f64, v: &Values) -> f64 {
+    let u = x / v.reference;
+    u.signum() * (u * u + 1e-6).powf(0.5 * v.shape) * (30.0 * u).tanh().abs()
+}
+
+/// `|x/x0|^p`, smooth at zero.
+fn even(x: f64, v: &Values) -> f64 {
+    let u = x / v.reference;
+    (u * u + 1e-6).powf(0.5 * v.shape)
+}
+
+/// 0 before, 1 after the time of switching, over a tenth of a second.
+fn switched(time_s: f64, v: &Values) -> f64 {
+    0.5 * (1.0 + ((time_s - v.shape) / 0.05).tanh())
+}
+
+fn power(name: &'static str, unit: &'static str, size: f64, reference: f64) -> Vec<Spec> {
+    let reach = 20.0 * size;
+    vec![
+        Spec::strength(name, unit, size, -reach, reach),
+        Spec::shape("reference", "SI", reference, reference, reference),
+        Spec::shape("exponent", "1", 1.5, 0.0, 4.0),
+    ]
+}
+
+fn switch(name: &'static str, unit: &'static str, size: f64, scale: &Scale) -> Vec<Spec> {
+    let reach = 20.0 * size;
+    vec![
+        Spec::strength(name, unit, size, -reach, reach),
+        Spec::shape(
+            "reference",
+            "SI",
+            scale.shaft_speed_rad_s,
+            scale.shaft_speed_rad_s,
+            scale.shaft_speed_rad_s,
+        ),
+        Spec::shape("switch_time_s", "s", 0.5 * scale.duration_s, 0.0, scale.duration_s),
+    ]
+}
+
+fn exponents(specs: Vec<Spec>) -> Vec<Vec<f64>> {
+    [0.5, 3.0].into_iter().map(|p| vec![specs[0].start, specs[1].start, p]).collect()
+}
+
+fn times(specs: Vec<Spec>, scale: &Scale) -> Vec<Vec<f64>> {
+    (1..10)
+        .filter(|k| *k != 5)
+        .map(|k| vec![specs[0].start, specs[1].start, f64::from(k) / 10.0 * scale.duration_s])
+        .collect()
+}
+
+macro_rules! term {
+    ($const:ident, $id:literal, $path:expr, $equation:literal, $needs:expr, $parameters:expr, $starts:expr, $build:expr) => {
+        const $const: Descriptor = Descriptor {
+            id: $id,
+            path: $path,
+            what: "a term without a name",
+            equation: $equation,
+            signature: "",
+            confused_with: &[],
+            separated_by: "",
+            reference: "",
+            parameters: $parameters,
+            starts: $starts,
+            needs: $needs,
+            build: $build,
+        };
+    };
+}
+
+fn boxed(v: &[f64], act: Act) -> Box<dyn Effect> {
+    Box::new(BalanceTerm { values: values(v), act })
+}
+
+fn shaft(s: &Scale) -> Vec<Spec> {
+    power("shaft_torque_n_m", "N m", 0.02 * s.torque_n_m, s.shaft_speed_rad_s)
+}
+fn blade_thrust(s: &Scale) -> Vec<Spec> {
+    power("thrust_n", "N", 0.02 * s.thrust_n, s.shaft_speed_rad_s)
+}
+fn blade_torque(s: &Scale) -> Vec<Spec> {
+    power("blade_torque_n_m", "N m", 0.02 * s.torque_n_m, s.shaft_speed_rad_s)
+}
+fn flow(s: &Scale) -> Vec<Spec> {
+    power("force_on_the_water_n", "N", 0.02 * s.thrust_n, s.flow_m_s)
+}
+fn command(s: &Scale) -> Vec<Spec> {
+    power("command_offset", "A, V or rad/s", 0.02 * s.command, s.command)
+}
+fn thrust_reading(s: &Scale) -> Vec<Spec> {
+    power("thrust_reading_n", "N", 0.02 * s.thrust_n, s.thrust_n)
+}
+fn shaft_switch(s: &Scale) -> Vec<Spec> {
+    switch("load_torque_n_m", "N m", 0.02 * s.torque_n_m, s)
+}
+fn drive_switch(s: &Scale) -> Vec<Spec> {
+    switch("gain_change", "1", 0.02, s)
+}
+fn flow_switch(s: &Scale) -> Vec<Spec> {
+    switch("ambient_step_m_s", "m/s", 0.05 * s.flow_m_s, s)
+}
+fn thrust_switch(s: &Scale) -> Vec<Spec> {
+    switch("thrust_step_n", "N", 0.02 * s.thrust_n, s)
+}
+
+term!(
+    SHAFT_ODD,
+    "term_shaft_odd",
+    Path::Shaft,
+    "shaft torque -k sgn(Om) |Om/Om0|^p",
+    free_shaft,
+    shaft,
+    |s| exponents(shaft(s)),
+    |v, _| { boxed(v, |v, at, b| b.shaft_torque_n_m -= v.size * odd(at.shaft_speed_rad_s, v)) }
+);
+term!(
+    SHAFT_EVEN,
+    "term_shaft_even",
+    Path::Shaft,
+    "shaft torque -k |Om/Om0|^p",
+    free_shaft,
+    shaft,
+    |s| exponents(shaft(s)),
+    |v, _| { boxed(v, |v, at, b| b.shaft_torque_n_m -= v.size * even(at.shaft_speed_rad_s, v)) }
+);
+term!(
+    SHAFT_FLOW,
+    "term_shaft_flow",
+    Path::Shaft,
+    "shaft torque -k sgn(Om) |Om/Om0|^p |vp|",
+    free_shaft,
+    shaft,
+    one_start,
+    |v, _| {
+        boxed(v, |v, at, b| b.shaft_torque_n_m -= v.size * odd(at.shaft_speed_rad_s, v) * at.axial_m_s.abs())
+    }
+);
+term!(
+    SHAFT_SWITCHED,
+    "term_shaft_switched",
+    Path::Shaft,
+    "shaft torque -k tanh(10 Om/Om0) from a time on",
+    free_shaft,
+    shaft_switch,
+    |s| times(shaft_switch(s), s),
+    |v, _| {
+        boxed(v, |v, at, b| {
+            b.shaft_torque_n_m -=
+                v.size * switched(at.time_s, v) * (10.0 * at.shaft_speed_rad_s / v.reference).tanh();
+        })
+    }
+);
+term!(
+    DRIVE_ODD,
+    "term_drive_odd",
+    Path::Drive,
+    "command + k sgn(u) |u/u0|^p",
+    commanded,
+    command,
+    |s| exponents(command(s)),
+    |v, _| { Box::new(DriveTerm { values: values(v), act: |v, _, u| v.size * odd(u, v) }) }
+);
+term!(
+    DRIVE_SWITCHED,
+    "term_drive_switched",
+    Path::Drive,
+    "command (1 + k) from a time on",
+    commanded,
+    drive_switch,
+    |s| times(drive_switch(s), s),
+    |v, _| {
+        Box::new(DriveTerm { values: values(v), act: |v, tick, u| v.size * u * switched(tick.time_s, v) })
+    }
+);
+term!(
+    BLADE_THRUST_ODD,
+    "term_blade_thrust_odd",
+    Path::Blade,
+    "thrust + k sgn(Om) |Om/Om0|^p",
+    wet,
+    blade_thrust,
+    |s| exponents(blade_thrust(s)),
+    |v, _| { boxed(v, |v, at, b| b.thrust_n += v.size * odd(at.shaft_speed_rad_s, v)) }
+);
+term!(
+    BLADE_THRUST_EVEN,
+    "term_blade_thrust_even",
+    Path::Blade,
+    "thrust + k |Om/Om0|^p",
+    wet,
+    blade_thrust,
+    |s| exponents(blade_thrust(s)),
+    |v, _| { boxed(v, |v, at, b| b.thrust_n += v.size * even(at.shaft_speed_rad_s, v)) }
+);
+term!(
+    BLADE_THRUST_FLOW,
+    "term_blade_thrust_flow",
+    Path::Blade,
+    "thrust + k sgn(Om) |Om/Om0|^p |vp|",
+    wet,
+    blade_thrust,
+    one_start,
+    |v, _| { boxed(v, |v, at, b| b.thrust_n += v.size * odd(at.shaft_speed_rad_s, v) * at.axial_m_s.abs()) }
+);
+term!(
+    BLADE_TORQUE_ODD,
+    "term_blade_torque_odd",
+    Path::Blade,
+    "blade torque + k sgn(Om) |Om/Om0|^p",
+    wet,
+    blade_torque,
+    |s| exponents(blade_torque(s)),
+    |v, _| { boxed(v, |v, at, b| b.blade_torque_n_m += v.size * odd(at.shaft_speed_rad_s, v)) }
+);
+term!(
+    FLOW_ODD,
+    "term_flow_odd",
+    Path::Flow,
+    "force on the axial flow -k sgn(vp) |vp/v0|^p",
+    wet,
+    flow,
+    |s| exponents(flow(s)),
+    |v, _| { boxed(v, |v, at, b| b.momentum_n -= v.size * odd(at.axial_m_s, v)) }
+);
+term!(
+    FLOW_EVEN,
+    "term_flow_even",
+    Path::Flow,
+    "force on the axial flow -k |vp/v0|^p",
+    wet,
+    flow,
+    |s| exponents(flow(s)),
+    |v, _| { boxed(v, |v, at, b| b.momentum_n -= v.size * even(at.axial_m_s, v)) }
+);
+term!(
+    FLOW_SWITCHED,
+    "term_flow_switched",
+    Path::Flow,
+    "ambient flow + k from a time on",
+    wet,
+    flow_switch,
+    |s| times(flow_switch(s), s),
+    |v, _| { boxed(v, |v, at, b| b.ambient_m_s += v.size * switched(at.time_s, v)) }
+);
+term!(
+    SENSOR_THRUST,
+    "term_sensor_thrust",
+    Path::Sensor,
+    "thrust reading + k sgn(T) |T/T0|^p",
+    thrust_measured,
+    thrust_reading,
+    |s| exponents(thrust_reading(s)),
+    |v, _| { Box::new(ThrustTerm { values: values(v), act: |v, _, t| v.size * odd(t, v) }) }
+);
+term!(
+    SENSOR_THRUST_SWITCHED,
+    "term_sensor_thrust_switched",
+    Path::Sensor,
+    "thrust reading + k from a time on",
+    thrust_measured,
+    thrust_switch,
+    |s| times(thrust_switch(s), s),
+    |v, _| {
+        Box::new(ThrustTerm { values: values(v), act: |v, tick, _| v.size * switched(tick.time_s, v) })
+    }
+);
+
+fn thrust_measured(
+    _: &kort_thruster::rig::Rig,
+    available: &kort_thruster::effects::Available,
+) -> Result<(), &'static str> {
+    if available.has("thrust_n") { Ok(()) } else { Err("thrust is not recorded") }
+}
+
+fn commanded(
+    _: &kort_thruster::rig::Rig,
+    available: &kort_thruster::effects::Available,
+) -> Result<(), &'static str> {
+    if available.current_prescribed || available.shaft_prescribed {
+        Err("a recorded response drives the model")
+    } else {
+        Ok(())
+    }
+}

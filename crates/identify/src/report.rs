@@ -1,0 +1,197 @@
+//! The diagnosis report: the JSON of `kort diagnose`, schema `kort.diagnosis/1`.
+
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// Outcome of a diagnosis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// A re-fit within the stated tolerances explains the recording.
+    NoMismatch,
+    /// Named effects explain it, and no rival comes close.
+    Explained,
+    /// Several named effects explain it and this excitation cannot part them.
+    Ambiguous,
+    /// The mismatch is real and no named effect explains it.
+    Unexplained,
+    /// The recording cannot tell.
+    InsufficientData,
+}
+
+/// A parameter with its uncertainty.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ParameterReport {
+    /// Name, unit last.
+    pub name: String,
+    /// Fitted value.
+    pub value: f64,
+    /// Unit.
+    pub unit: String,
+    /// Standard error of the fit, prior included.
+    pub std_error: f64,
+    /// What the rig description states.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stated: Option<f64>,
+    /// At the edge of what is allowed: a symptom, not a value.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub at_bound: Option<bool>,
+}
+
+/// Errors of the baseline on one channel, root mean square over full scale.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ChannelReport {
+    /// On the rows fitted.
+    pub nrmse_train: f64,
+    /// On the rows held out.
+    pub nrmse_heldout: f64,
+    /// What measurement noise alone would give.
+    pub noise_floor: f64,
+    /// Whether the residual is white.
+    pub white: bool,
+}
+
+/// The re-fitted baseline.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Baseline {
+    /// Model's name.
+    pub model: String,
+    /// Its parameters.
+    pub parameters: Vec<ParameterReport>,
+    /// Its errors.
+    pub channels: BTreeMap<String, ChannelReport>,
+}
+
+/// Where model and recording differ.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Mismatch {
+    /// drive, shaft, blade, flow or sensor.
+    pub path: String,
+    /// The column where it shows most.
+    pub channel: String,
+    /// Words: when and where.
+    pub regime: String,
+    /// Spans in which most of it lies.
+    pub time_s: Vec<[f64; 2]>,
+    /// How far beyond the noise, in standard deviations.
+    pub significance_sigma: f64,
+    /// Its share of the error above the noise.
+    pub share_of_excess_error: f64,
+}
+
+/// Errors before and after on one channel, root mean square over full scale, held-out rows.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct BeforeAfter {
+    /// Without the effect.
+    pub nrmse_before: f64,
+    /// With it.
+    pub nrmse_after: f64,
+}
+
+/// Gain on rows that were not fitted.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct HeldOut {
+    /// By channel.
+    pub channels: BTreeMap<String, BeforeAfter>,
+    /// Share of the squared error above the noise floor that goes, on the channel with most of it.
+    pub excess_error_removed: f64,
+    /// Bootstrap over blocks.
+    pub interval_95: [f64; 2],
+}
+
+/// A named effect that explains the mismatch.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Finding {
+    /// Catalogue identifier.
+    pub effect: String,
+    /// Where it enters.
+    pub path: String,
+    /// Calibrated probability that this is the right name.
+    pub probability: f64,
+    /// In an engineer's words.
+    pub statement: String,
+    /// Equation.
+    pub equation: String,
+    /// Fitted values.
+    pub parameters: Vec<ParameterReport>,
+    /// Gain on held-out rows.
+    pub heldout: HeldOut,
+    /// Effects that this recording cannot tell from it.
+    pub confounded_with: Vec<String>,
+    /// Why.
+    pub evidence: Vec<String>,
+}
+
+/// An effect that was tried and set aside.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Alternative {
+    /// Catalogue identifier.
+    pub effect: String,
+    /// Calibrated probability.
+    pub probability: f64,
+    /// Words.
+    pub why_not: String,
+}
+
+/// What is known of a mismatch without a name.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct EmpiricalTerm {
+    /// Where it enters.
+    pub path: String,
+    /// What it adds to, with its unit.
+    pub enters: String,
+    /// Formula with numbers.
+    pub expression: String,
+    /// Variables in it.
+    pub variables: Vec<String>,
+    /// Gain on held-out rows.
+    pub heldout: HeldOut,
+}
+
+/// The run that would settle what this one cannot.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct NextExperiment {
+    /// Effects it parts.
+    pub separates: Vec<String>,
+    /// Words.
+    pub excitation: String,
+    /// Words.
+    pub why: String,
+    /// A scenario that `kort simulate` runs.
+    pub scenario: serde_json::Value,
+}
+
+/// The whole report.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Report {
+    /// `kort.diagnosis/1`
+    pub schema: String,
+    /// Version of kort.
+    pub kort_version: String,
+    /// Recordings by name.
+    pub recordings: Vec<String>,
+    /// Rig by name.
+    pub rig: String,
+    /// Seed of the bootstrap.
+    pub seed: u64,
+    /// Length of the recordings together, s (the same in every run: time spent goes to stderr).
+    pub seconds: f64,
+    /// Outcome.
+    pub verdict: Verdict,
+    /// One paragraph to act on.
+    pub summary: String,
+    /// The re-fitted baseline.
+    pub baseline: Baseline,
+    /// Where model and recording differ.
+    pub mismatch: Vec<Mismatch>,
+    /// Named effects.
+    pub findings: Vec<Finding>,
+    /// Effects set aside.
+    pub alternatives: Vec<Alternative>,
+    /// What is known where no name fits.
+    pub empirical_term: Option<EmpiricalTerm>,
+    /// What to run next.
+    pub next_experiment: Option<NextExperiment>,
+    /// Cheap checks that found something, unused columns, effects that cannot be seen here.
+    pub notes: Vec<String>,
+}

@@ -1,0 +1,259 @@
+//! The search for what was left out: forward one effect at a time, then back.
+//!
+//! Each round screens everything, simulates and re-fits what scores well, learns the noise again
+//! from the best (a wrong model's residual would hide the differences between rivals), and lets
+//! the rivals compete under that noise.
+
+use kort_thruster::effects::{self, Available, Descriptor, Scale};
+use rayon::prelude::*;
+
+use crate::baseline::with_effect;
+use crate::fit::{Fit, Problem};
+use crate::heldout;
+use crate::library::{self, is_term};
+use crate::screen::{Screened, screen};
+
+/// Thresholds of the search, in units of whitened sums of squares (twice log-likelihoods). Set
+/// on tuning seeds (`kort prove --seed` below 1000), never on reported ones.
+pub mod rules {
+    /// Cost of one more parameter.
+    pub const PER_PARAMETER: f64 = 6.0;
+    /// What an effect must gain to be believed at all.
+    pub const BELIEVE: f64 = 30.0;
+    /// ... and as a share of what was gained before: the rest of an effect whose true form
+    /// differs a little from ours is not another effect.
+    pub const SHARE_OF_FIRST: f64 = 0.004;
+    /// Least size: root mean square of its response over full scale, on some channel.
+    pub const LEAST_SIZE: f64 = 0.0015;
+    /// Share of the gain that must hold on left-out blocks.
+    pub const HOLDS: f64 = 0.4;
+    /// Rivals closer than this cannot be told apart.
+    pub const MARGIN: f64 = 12.0;
+    /// ... or closer than this share of what the effect gains.
+    pub const MARGIN_SHARE: f64 = 0.02;
+    /// How much better a term without a name must be than the best name, as a share of its gain.
+    pub const TERM_SHARE: f64 = 0.06;
+    /// ... and at least this much.
+    pub const TERM_LEAST: f64 = 20.0;
+    /// Most effects found in one recording.
+    pub const MOST_FOUND: usize = 3;
+    /// Effects re-fitted in a round.
+    pub const REFITTED: usize = 9;
+}
+
+/// An effect fitted on top of what was found before.
+#[derive(Clone)]
+pub struct Candidate {
+    /// The effect.
+    pub effect: &'static Descriptor,
+    /// Fit with it.
+    pub fit: Fit,
+    /// Sum of squares, priors' penalty and cost of parameters.
+    pub criterion: f64,
+    /// First-order promise in the screen.
+    pub screened: f64,
+}
+
+/// One round's result.
+#[derive(Clone)]
+pub struct Round {
+    /// Fit without the new effect, under the same noise.
+    pub before: Fit,
+    /// Candidates, best first, under the same noise.
+    pub candidates: Vec<Candidate>,
+    /// Fall of the criterion by the best.
+    pub gain: f64,
+    /// Fall of the left-out sum of squares by the best, and its standard error.
+    pub left_out: (f64, f64),
+    /// Root mean square of the best's response over full scale, largest channel.
+    pub size: f64,
+}
+
+/// Criterion of a fit.
+pub fn criterion(fit: &Fit) -> f64 {
+    let of_effects =
+        fit.hypothesis.free.iter().filter(|f| matches!(f.target, crate::fit::Target::Effect(..))).count();
+    fit.chi2 + fit.penalty + rules::PER_PARAMETER * of_effects as f64
+}
+
+/// What a search works on.
+pub struct Search<'a> {
+    /// The problem; its noise and edges follow the best hypothesis so far.
+    pub problem: Problem<'a>,
+    /// Sizes in use.
+    pub scale: Scale,
+    /// Named effects that this recording can show.
+    pub named: Vec<&'static Descriptor>,
+    /// Named effects it cannot, and why.
+    pub unfit: Vec<(&'static Descriptor, &'static str)>,
+    /// Terms without a name.
+    pub terms: Vec<&'static Descriptor>,
+}
+
+impl<'a> Search<'a> {
+    /// Sorts the catalogue by what this recording can show.
+    pub fn new(problem: Problem<'a>, scale: Scale, available: &Available) -> Self {
+        let mut named = Vec::new();
+        let mut unfit = Vec::new();
+        for effect in effects::ALL {
+            match (effect.needs)(problem.rig, available) {
+                Ok(()) => named.push(*effect),
+                Err(why) => unfit.push((*effect, why)),
+            }
+        }
+        let terms =
+            library::TERMS.iter().copied().filter(|t| (t.needs)(problem.rig, available).is_ok()).collect();
+        Self { problem, scale, named, unfit, terms }
+    }
+
+    /// Fits the baseline: edges, noise and parameters in turn until they agree.
+    pub fn baseline(&mut self, hypothesis: &crate::fit::Hypothesis) -> Fit {
+        let mut at = hypothesis.clone();
+        let mut fit = self.problem.fit(&at, &[], 8);
+        for _ in 0..3 {
+            at.start.clone_from(&fit.values);
+            let moved = self.problem.place_edges(&at, &fit.values);
+            if moved {
+                fit = self.problem.fit(&at, &fit.columns, 3);
+                at.start.clone_from(&fit.values);
+            }
+            self.problem.learn_noise(&at, &fit.values);
+            fit = self.problem.fit(&at, &fit.columns, 4);
+            if !moved {
+                break;
+            }
+        }
+        fit
+    }
+
+    /// Looks for one more effect on top of a fit that already gained `so_far`.
+    pub fn round(&mut self, current: &mut Fit, so_far: f64) -> Option<Round> {
+        let taken: Vec<&str> = current.hypothesis.effects.iter().map(|e| e.id).collect();
+        let everything: Vec<&'static Descriptor> =
+            self.named.iter().chain(&self.terms).copied().filter(|e| !taken.contains(&e.id)).collect();
+        let screened = screen(&self.problem, current, &everything, &self.scale);
+        let least = (0.5 * rules::BELIEVE).max(0.5 * rules::SHARE_OF_FIRST * so_far);
+        let chosen = choose(&screened, least);
+        let mut candidates = self.refit(current, &chosen);
+        let base = criterion(current);
+        if candidates.first().is_none_or(|c| base - c.criterion < 0.6 * rules::BELIEVE) {
+            return None;
+        }
+        // Under the noise of the best so far the rivals part more sharply; that may change the best.
+        let mut before = current.clone();
+        for _ in 0..2 {
+            let best = candidates[0].clone();
+            let leader = best.effect.id;
+            self.problem.place_edges(&best.fit.hypothesis, &best.fit.values);
+            self.problem.learn_noise(&best.fit.hypothesis, &best.fit.values);
+            let base = criterion(&before);
+            let worth = base - candidates[0].criterion;
+            candidates.retain(|c| base - c.criterion > 0.2 * worth);
+            before = self.again(&before);
+            candidates = candidates
+                .into_par_iter()
+                .map(|c| {
+                    let fit = self.again(&c.fit);
+                    Candidate { criterion: criterion(&fit), fit, ..c }
+                })
+                .collect();
+            sort(&mut candidates);
+            if candidates[0].effect.id == leader {
+                break;
+            }
+        }
+        let left_out = heldout::paired(
+            &heldout::left_out(&self.problem, &mut before),
+            &heldout::left_out(&self.problem, &mut candidates[0].fit),
+        );
+        let best = &candidates[0];
+        Some(Round {
+            gain: criterion(&before) - best.criterion,
+            left_out,
+            size: self.size(&before, &best.fit),
+            before,
+            candidates,
+        })
+    }
+
+    /// Re-fits chosen effects on top of a fit, best first.
+    fn refit(&self, current: &Fit, chosen: &[Screened]) -> Vec<Candidate> {
+        let mut all: Vec<Candidate> = chosen
+            .par_iter()
+            .map(|s| {
+                let hypothesis =
+                    with_effect(&current.hypothesis, &current.values, s.effect, &self.scale, Some(&s.start));
+                let fit = self.problem.fit(&hypothesis, &current.columns, 4);
+                Candidate { effect: s.effect, criterion: criterion(&fit), fit, screened: s.gain }
+            })
+            .collect();
+        sort(&mut all);
+        // An effect may have been started from several places: keep its best.
+        let mut seen: Vec<&str> = Vec::new();
+        all.retain(|c| {
+            let fresh = !seen.contains(&c.effect.id);
+            seen.push(c.effect.id);
+            fresh
+        });
+        all
+    }
+
+    /// The same hypothesis fitted again from where it was, under the present noise and edges.
+    pub fn again(&self, fit: &Fit) -> Fit {
+        let mut hypothesis = fit.hypothesis.clone();
+        hypothesis.start.clone_from(&fit.values);
+        self.problem.fit(&hypothesis, &fit.columns, 6)
+    }
+
+    /// Largest root mean square difference of two fits' responses over full scale.
+    pub fn size(&self, a: &Fit, b: &Fit) -> f64 {
+        let mut x = self.problem.respond(&a.hypothesis, &a.values);
+        let y = self.problem.respond(&b.hypothesis, &b.values);
+        for (channels, other) in x.iter_mut().zip(&y) {
+            for (samples, other) in channels.iter_mut().zip(other) {
+                samples.iter_mut().zip(other).for_each(|(p, q)| *p -= q);
+            }
+        }
+        self.problem.size(&x)
+    }
+}
+
+fn sort(candidates: &mut [Candidate]) {
+    candidates.sort_by(|a, b| a.criterion.total_cmp(&b.criterion).then(a.effect.id.cmp(b.effect.id)));
+}
+
+/// Which screened starts are worth a re-fit: the best by promise, a second start where it
+/// promises nearly as much, and whatever the leaders are known to be confused with.
+fn choose(screened: &[Screened], least: f64) -> Vec<Screened> {
+    let mut chosen: Vec<Screened> = Vec::new();
+    let Some(top) = screened.first().map(|s| s.gain) else { return chosen };
+    let mates: Vec<&str> = screened.iter().take(2).flat_map(|s| s.effect.confused_with).copied().collect();
+    let (mut named, mut terms) = (0, 0);
+    for s in screened {
+        if s.gain < least {
+            break;
+        }
+        if s.size < rules::LEAST_SIZE {
+            continue;
+        }
+        let starts: Vec<&Screened> = chosen.iter().filter(|c| c.effect.id == s.effect.id).collect();
+        if let Some(first) = starts.first() {
+            if starts.len() < 2 && s.gain > 0.7 * first.gain && s.gain > 0.5 * top && !is_term(s.effect) {
+                chosen.push(s.clone());
+            }
+            continue;
+        }
+        if is_term(s.effect) {
+            if terms < 3 && s.gain > 0.5 * top {
+                terms += 1;
+                chosen.push(s.clone());
+            }
+        } else if named < rules::REFITTED && s.gain > 0.02 * top
+            || mates.contains(&s.effect.id) && s.gain > 0.01 * top
+        {
+            named += 1;
+            chosen.push(s.clone());
+        }
+    }
+    chosen
+}

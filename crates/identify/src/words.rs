@@ -1,0 +1,221 @@
+//! What the report says in words, and the odds it gives.
+
+use kort_thruster::effects::Descriptor;
+use kort_thruster::rig::Rig;
+
+use crate::data::Series;
+use crate::fit::Problem;
+use crate::judge::{Outcome, Place, margin};
+use crate::locate;
+use crate::report::{Baseline, EmpiricalTerm, Finding, HeldOut, Mismatch, NextExperiment, Verdict};
+use crate::search::Search;
+
+/// How sure a lone name is when nothing comes near it; measured on tuning seeds.
+const SURE: f64 = 0.97;
+
+/// Probabilities of the chosen effect and its rivals. A distance in the criterion counts less
+/// than its size in log-likelihood says, because the true form differs a little from ours.
+pub fn odds(place: &Place) -> Vec<f64> {
+    let softness = 0.5 * margin(place.gain);
+    let weight = |distance: f64| (-distance.max(0.0) / softness).exp();
+    let mut weights = vec![1.0];
+    weights.extend(place.rivals.iter().map(|r| weight(r.1)));
+    let aside: f64 = place.aside.iter().map(|a| weight(a.1)).sum();
+    let total: f64 = weights.iter().sum::<f64>() + aside;
+    weights.into_iter().map(|w| SURE * w / total).collect()
+}
+
+/// Probability of an effect set aside.
+pub fn small_odds(distance: f64, gain: f64) -> f64 {
+    (0.5 * (-distance / (0.5 * margin(gain))).exp()).min(0.2)
+}
+
+/// One sentence on an effect.
+pub fn statement(effect: &Descriptor) -> String {
+    format!("The model leaves out {}: {}.", effect.id.replace('_', " "), effect.what)
+}
+
+/// Why an effect stands.
+pub fn evidence(place: &Place, heldout: &HeldOut, located: &locate::Place) -> Vec<String> {
+    let mut out = vec![
+        format!(
+            "with it, {:.0} % of the error above the noise goes on data it was not fitted to (95 % interval {:.0} to {:.0} %)",
+            100.0 * heldout.excess_error_removed,
+            100.0 * heldout.interval_95[0],
+            100.0 * heldout.interval_95[1]
+        ),
+        format!("the error it removes shows most in {}, {}", located.channel, located.regime),
+        format!("expected signature: {}", place.chosen.signature),
+    ];
+    if let Some((next, distance)) = place
+        .rivals
+        .iter()
+        .map(|r| (r.0.0, r.1))
+        .chain(place.aside.iter().copied())
+        .min_by(|a, b| a.1.total_cmp(&b.1))
+    {
+        out.push(format!(
+            "the nearest other explanation, {}, is worse by {distance:.0} of {:.0} in twice the log-likelihood",
+            next.id, place.gain
+        ));
+    }
+    out
+}
+
+/// Why an effect was set aside.
+pub fn why_not(leader: &str, distance: f64, gain: f64) -> String {
+    let share = 100.0 * (1.0 - distance / gain.max(1e-9));
+    if share > 0.0 {
+        format!("explains {share:.0} % of what {leader} explains; the rest stays in the residual")
+    } else {
+        format!("explains nothing of what {leader} explains")
+    }
+}
+
+/// What a term adds to, and its variables.
+pub fn enters(term: &Descriptor) -> (&'static str, &'static [&'static str]) {
+    match term.id {
+        "term_shaft_flow" => ("shaft torque [N m]", &["shaft_speed_rad_s", "flow_m_s"]),
+        "term_shaft_switched" => ("shaft torque [N m]", &["shaft_speed_rad_s", "time_s"]),
+        id if id.starts_with("term_shaft") => ("shaft torque [N m]", &["shaft_speed_rad_s"]),
+        "term_drive_switched" => ("drive command", &["command", "time_s"]),
+        id if id.starts_with("term_drive") => ("drive command", &["command"]),
+        "term_blade_torque_odd" => ("blade torque [N m]", &["shaft_speed_rad_s"]),
+        "term_blade_thrust_flow" => ("thrust [N]", &["shaft_speed_rad_s", "flow_m_s"]),
+        id if id.starts_with("term_blade") => ("thrust [N]", &["shaft_speed_rad_s"]),
+        "term_flow_switched" => ("ambient flow [m/s]", &["time_s"]),
+        id if id.starts_with("term_flow") => ("force on the axial flow [N]", &["flow_m_s"]),
+        "term_sensor_thrust_switched" => ("thrust reading [N]", &["time_s"]),
+        _ => ("thrust reading [N]", &["thrust_n"]),
+    }
+}
+
+/// The term's formula with numbers.
+pub fn expression(term: &Descriptor, values: &[f64]) -> String {
+    let mut text = term.equation.to_string();
+    let (size, reference, shape) = (
+        values.first().copied().unwrap_or(0.0),
+        values.get(1).copied().unwrap_or(1.0),
+        values.get(2).copied().unwrap_or(0.0),
+    );
+    if term.id.ends_with("_switched") {
+        text = text.replace("from a time on", &format!("from t = {shape:.2} s on"));
+    }
+    for (symbol, value) in [("Om0", reference), ("u0", reference), ("v0", reference), ("T0", reference)] {
+        text = text.replace(symbol, &format!("{value:.4}"));
+    }
+    text = text.replace("^p", &format!("^{shape:.2}"));
+    // The size last: "k" stands alone in every equation.
+    let number = format!("{size:.5}");
+    text.replace("-k ", &format!("-{number} ")).replace("+ k", &format!("+ {number}")).replace("--", "+")
+}
+
+/// Columns that were not used.
+pub fn unused(series: &[Series], problem: &Problem) -> Vec<String> {
+    let mut used: Vec<&str> =
+        vec!["time_s", "ambient_m_s", "shaft_angle_rad", "supply_v", "depth_m", "temperature_c"];
+    for recording in &problem.recordings {
+        used.push(recording.driving.column());
+        used.extend(recording.channels.iter().map(|c| c.response.name()));
+    }
+    let mut left: Vec<&str> = series
+        .iter()
+        .flat_map(|s| s.columns.iter().map(|c| c.0.as_str()))
+        .filter(|name| !used.contains(name))
+        .collect();
+    left.sort_unstable();
+    left.dedup();
+    if left.is_empty() { Vec::new() } else { vec![format!("columns not used: {}", left.join(", "))] }
+}
+
+/// The run that would part what this one cannot.
+pub fn next_experiment(search: &Search, outcome: &Outcome, rig: &Rig) -> Option<NextExperiment> {
+    let _ = (search, outcome, rig);
+    None
+}
+
+/// One paragraph to act on.
+#[expect(clippy::too_many_arguments, reason = "a summary of everything")]
+pub fn summary(
+    verdict: Verdict,
+    findings: &[Finding],
+    mismatch: &[Mismatch],
+    term: Option<&EmpiricalTerm>,
+    next: Option<&NextExperiment>,
+    baseline: &Baseline,
+    outcome: &Outcome,
+    thin: Option<&str>,
+) -> String {
+    let model = &baseline.model;
+    let list = |f: &[&Finding]| f.iter().map(|f| f.effect.replace('_', " ")).collect::<Vec<_>>().join(" or ");
+    let gain = |h: &HeldOut| format!("{:.0} %", 100.0 * h.excess_error_removed);
+    let strayed: Vec<String> = outcome
+        .baseline
+        .hypothesis
+        .free
+        .iter()
+        .zip(&outcome.baseline.values)
+        .filter_map(|(f, v)| {
+            let (mean, sigma) = f.prior?;
+            ((v - mean).abs() > 3.0 * sigma).then(|| format!("{} ({v:.4} against {mean:.4} stated)", f.name))
+        })
+        .collect();
+    let mut text = match verdict {
+        Verdict::NoMismatch => {
+            let mut text = format!(
+                "{model}, re-fitted within the stated tolerances, explains the recording down to its noise: nothing is missing that this excitation can show."
+            );
+            if !strayed.is_empty() {
+                text.push_str(&format!(" Check the stated values of {}.", strayed.join(", ")));
+            }
+            text
+        }
+        Verdict::Explained => {
+            let named: Vec<String> = findings
+                .iter()
+                .map(|f| {
+                    format!("{} ({}, probability {:.2})", f.effect.replace('_', " "), f.path, f.probability)
+                })
+                .collect();
+            format!(
+                "{model} leaves out {}. Adding it removes {} of the error above the noise on data it was not fitted to. It shows most in {}, {}.",
+                named.join(" and "),
+                findings.first().map_or_else(String::new, |f| gain(&f.heldout)),
+                mismatch.first().map_or("", |m| &m.channel),
+                mismatch.first().map_or("", |m| &m.regime),
+            )
+        }
+        Verdict::Ambiguous => {
+            let groups: Vec<&Finding> = findings.iter().filter(|f| !f.confounded_with.is_empty()).collect();
+            format!(
+                "{model} leaves something out on the {} path, and this excitation cannot tell which of these it is: {}.",
+                mismatch.first().map_or("", |m| &m.path),
+                list(&groups),
+            )
+        }
+        Verdict::Unexplained => {
+            let mut text = format!(
+                "The mismatch is real ({} path, most in {}, {}), and no effect in the catalogue explains it.",
+                mismatch.first().map_or("?", |m| &m.path),
+                mismatch.first().map_or("?", |m| &m.channel),
+                mismatch.first().map_or("?", |m| &m.regime),
+            );
+            if let Some(term) = term {
+                text.push_str(&format!(
+                    " An empirical term describes it: {} = {}; it removes {} of the error above the noise on held-out data.",
+                    term.enters,
+                    term.expression,
+                    gain(&term.heldout)
+                ));
+            }
+            text
+        }
+        Verdict::InsufficientData => {
+            format!("The recording cannot tell: {}.", thin.unwrap_or("too little changes in it"))
+        }
+    };
+    if let Some(next) = next {
+        text.push_str(&format!(" Run next: {}.", next.excitation));
+    }
+    text
+}
