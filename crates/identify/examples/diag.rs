@@ -5,6 +5,8 @@ use kort_thruster::{models::ModelName, rig::Rig};
 
 fn main() {
     let json = std::env::args().any(|a| a == "--json");
+    let model: ModelName = std::env::var("MODEL").map_or(ModelName::Model2, |m| m.parse().unwrap());
+    let drop: Vec<String> = std::env::var("DROP").unwrap_or_default().split(',').map(String::from).collect();
     for dir in std::env::args().skip(1).filter(|a| a != "--json") {
         let rig = Rig::from_toml(&std::fs::read_to_string(format!("{dir}/rig.toml")).unwrap()).unwrap();
         let text = std::fs::read_to_string(format!("{dir}/recording.csv")).unwrap();
@@ -17,10 +19,13 @@ fn main() {
             }
         }
         let time_s = cols.remove(0);
-        let series =
-            Series { name: dir.clone(), time_s, columns: names[1..].iter().cloned().zip(cols).collect() };
+        let series = Series {
+            name: dir.clone(),
+            time_s,
+            columns: names[1..].iter().cloned().zip(cols).filter(|c| !drop.contains(&c.0)).collect(),
+        };
         let t = std::time::Instant::now();
-        let d = diagnose(&[series], &rig, &Options { model: ModelName::Model2, seed: 1 }, &|_| ()).unwrap();
+        let d = diagnose(&[series], &rig, &Options { model, seed: 1 }, &|_| ()).unwrap();
         let r = &d.report;
         if json {
             println!("{}", serde_json::to_string_pretty(r).unwrap());

@@ -77,7 +77,7 @@ pub fn diagnose(
     let scale = scale(&problem.recordings, rig);
     let offered = available(series, &problem.recordings);
     let mut search = Search::new(problem, scale, &offered);
-    let outcome = judge::run(&mut search, &hypothesis, progress);
+    let outcome = judge::run(&mut search, &hypothesis, series, progress);
     progress("scoring on held-out data");
     Ok(write(&search, outcome, series, rig, options, notes, thin))
 }
@@ -289,7 +289,7 @@ fn write(
     if let (Some(why), Verdict::InsufficientData) = (&thin, verdict) {
         notes.insert(0, why.clone());
     }
-    notes.extend(words::unused(series, &search.problem));
+    notes.extend(words::unused(series, &search.problem, search.driver.as_deref()));
     let baseline = Baseline {
         model: options.model.name().into(),
         parameters: parameters(&outcome.baseline, &std_baseline, None),
@@ -420,8 +420,11 @@ fn empirical(search: &Search, last: &Fit, term: &'static Descriptor, heldout: He
     EmpiricalTerm {
         path: term.path.name().into(),
         enters: enters.into(),
-        expression: words::expression(term, &values),
-        variables: variables.iter().map(|v| (*v).into()).collect(),
+        expression: words::expression(term, &values, search.driver.as_deref()),
+        variables: variables
+            .iter()
+            .map(|v| if *v == "column" { search.driver.clone().unwrap_or_default() } else { (*v).into() })
+            .collect(),
         heldout,
     }
 }

@@ -3,6 +3,7 @@
 use kort_thruster::effects::Descriptor;
 
 use crate::baseline::{Member, members, recompose};
+use crate::data::{Series, available};
 use crate::fit::Fit;
 use crate::library::is_term;
 use crate::search::{Candidate, Search, criterion, rules};
@@ -38,55 +39,112 @@ pub fn margin(gain: f64) -> f64 {
 }
 
 /// Runs the search to its end. `progress` is told what is going on.
-pub fn run(search: &mut Search, start: &crate::fit::Hypothesis, progress: &(dyn Fn(&str) + Sync)) -> Outcome {
+///
+/// Named effects are searched alone first. Terms without a name then judge the result: one that
+/// does better than the names, or as well as several of them together, shows that the physics
+/// is not in the catalogue.
+pub fn run(
+    search: &mut Search,
+    start: &crate::fit::Hypothesis,
+    series: &[Series],
+    progress: &(dyn Fn(&str) + Sync),
+) -> Outcome {
     progress("fitting the baseline");
     let mut current = search.baseline(start);
+    let offered = available(series, &search.problem.recordings);
+    search.try_columns(series, &mut current, &offered);
     let mut rounds: Vec<Vec<Candidate>> = Vec::new();
+    let mut term: Option<Candidate> = None;
     let mut so_far = 0.0;
     let mut doubt = None;
     while rounds.len() < rules::MOST_FOUND {
         progress(&format!("looking for effect {}", rounds.len() + 1));
         let saved = (search.problem.recordings.clone(), search.problem.whiteners.clone());
         let Some(round) = search.round(&mut current, so_far) else { break };
-        let mut candidates = round.candidates;
-        prefer_a_name(&mut candidates, round.gain);
-        let believed = if round.gain < rules::BELIEVE.max(rules::SHARE_OF_FIRST * so_far) {
-            Err("its gain is within the noise")
-        } else if round.size < rules::LEAST_SIZE {
-            Err("it is too small to matter")
-        } else if round.left_out.0 < rules::HOLDS * round.gain {
-            Err("its gain does not hold on data left out of the fit")
-        } else {
-            Ok(())
-        };
-        if let Err(why) = believed {
-            doubt = Some((candidates[0].effect, round.gain, why));
-            (search.problem.recordings, search.problem.whiteners) = saved;
-            current = search.again(&current);
+        let (terms, named): (Vec<_>, Vec<_>) = round.candidates.into_iter().partition(|c| is_term(c.effect));
+        let base = criterion(&round.before);
+        let best_term = terms.into_iter().next().filter(|t| base - t.criterion > rules::BELIEVE);
+        let believed = named.first().is_some_and(|best| {
+            let gain = base - best.criterion;
+            let others = best_term.as_ref().map_or(0.0, |t| base - t.criterion);
+            gain > rules::BELIEVE.max(rules::SHARE_OF_FIRST * so_far) && gain > rules::LEAST_OF_TERM * others
+        });
+        let holds = round.left_out.0 > rules::HOLDS * round.gain && round.size > rules::LEAST_SIZE;
+        if rounds.is_empty() && holds {
+            term = best_term;
+        }
+        if !(believed && holds) {
+            if let Some(best) = named.first() {
+                let why = if round.size <= rules::LEAST_SIZE {
+                    "it is too small to matter"
+                } else if !holds {
+                    "its gain does not hold on data left out of the fit"
+                } else {
+                    "its gain is within the noise, or far below that of a term without a name"
+                };
+                doubt = Some((best.effect, base - best.criterion, why));
+            }
+            if term.is_none() || !rounds.is_empty() {
+                (search.problem.recordings, search.problem.whiteners) = saved;
+                current = search.again(&current);
+            } else {
+                current = round.before;
+            }
             break;
         }
-        so_far += round.gain;
-        current = candidates[0].fit.clone();
-        rounds.push(candidates);
+        so_far += base - named[0].criterion;
+        current = named[0].fit.clone();
+        rounds.push(named);
     }
-    if rounds.is_empty() {
+    let plain = |search: &Search, at: &Fit| {
+        let (hypothesis, columns) = recompose(at, &[], &search.scale);
+        search.problem.fit(&hypothesis, &columns, 8)
+    };
+    if rounds.is_empty() && term.is_none() {
         return Outcome { baseline: current.clone(), last: current, places: Vec::new(), doubt };
     }
     progress("weighing rivals");
     prune(search, &mut current, &mut rounds);
-    let places = settle(search, &mut current, &rounds);
-    let (hypothesis, columns) = recompose(&current, &[], &search.scale);
-    let baseline = search.problem.fit(&hypothesis, &columns, 8);
+    let mut places = settle(search, &mut current, &rounds);
+    let baseline = plain(search, &current);
+    unnamed(search, &baseline, &mut current, &mut places, term);
     Outcome { baseline, last: current, places, doubt }
 }
 
-/// A term without a name may lead only if it beats the best name by more than doubt.
-fn prefer_a_name(candidates: &mut Vec<Candidate>, gain: f64) {
-    let Some(best) = candidates.first().map(|c| c.criterion) else { return };
-    let Some(named) = candidates.iter().position(|c| !is_term(c.effect)) else { return };
-    if candidates[named].criterion - best < rules::TERM_LEAST.max(rules::TERM_SHARE * gain) {
-        let name = candidates.remove(named);
-        candidates.insert(0, name);
+/// Lets terms without a name judge what the names explain.
+fn unnamed(
+    search: &mut Search,
+    baseline: &Fit,
+    current: &mut Fit,
+    places: &mut Vec<Place>,
+    term: Option<Candidate>,
+) {
+    let base = criterion(baseline);
+    let named_gain = base - criterion(current);
+    let place = |effect, gain| Place { chosen: effect, rivals: Vec::new(), aside: Vec::new(), gain };
+    let alone = term.map(|t| (t.effect, search.again(&t.fit)));
+    let on_top = if places.is_empty() { None } else { search.best_term(current) };
+    let needed = rules::TERM_LEAST.max(rules::TERM_SHARE * named_gain);
+    let now = criterion(current);
+    if let Some((effect, fit)) = alone {
+        let lead = now - criterion(&fit);
+        let with_names = on_top.as_ref().map_or(f64::NEG_INFINITY, |t| now - t.criterion);
+        let simpler = places.len() > 1 && lead > -margin(named_gain);
+        if places.is_empty() || (simpler || lead > needed) && with_names < lead + needed {
+            let gain = base - criterion(&fit);
+            let names: Vec<_> =
+                places.drain(..).map(|p| (p.chosen, criterion(&fit) - base + gain - p.gain)).collect();
+            *places = vec![Place { aside: names, ..place(effect, gain) }];
+            *current = fit;
+            return;
+        }
+    }
+    if let Some(term) = on_top
+        && now - term.criterion > needed
+        && search.size(current, &term.fit) > 2.0 * rules::LEAST_SIZE
+    {
+        places.push(place(term.effect, now - term.criterion));
+        *current = term.fit;
     }
 }
 

@@ -8,6 +8,7 @@ use kort_thruster::effects::{self, Available, Descriptor, Scale};
 use rayon::prelude::*;
 
 use crate::baseline::with_effect;
+use crate::data::{Series, possible_drivers};
 use crate::fit::{Fit, Problem};
 use crate::heldout;
 use crate::library::{self, is_term};
@@ -35,6 +36,8 @@ pub mod rules {
     pub const TERM_SHARE: f64 = 0.06;
     /// ... and at least this much.
     pub const TERM_LEAST: f64 = 20.0;
+    /// A name must explain at least this share of what the best term explains to be followed.
+    pub const LEAST_OF_TERM: f64 = 0.35;
     /// Most effects found in one recording.
     pub const MOST_FOUND: usize = 3;
     /// Effects re-fitted in a round.
@@ -88,6 +91,8 @@ pub struct Search<'a> {
     pub unfit: Vec<(&'static Descriptor, &'static str)>,
     /// Terms without a name.
     pub terms: Vec<&'static Descriptor>,
+    /// The further column that promises most as a driver of what the baseline leaves.
+    pub driver: Option<String>,
 }
 
 impl<'a> Search<'a> {
@@ -103,7 +108,7 @@ impl<'a> Search<'a> {
         }
         let terms =
             library::TERMS.iter().copied().filter(|t| (t.needs)(problem.rig, available).is_ok()).collect();
-        Self { problem, scale, named, unfit, terms }
+        Self { problem, scale, named, unfit, terms, driver: None }
     }
 
     /// Fits the baseline: edges, noise and parameters in turn until they agree.
@@ -126,11 +131,43 @@ impl<'a> Search<'a> {
         fit
     }
 
+    /// Tries further columns as drivers of what the baseline leaves; the most promising one is
+    /// laid beside the inputs and its terms join the library.
+    pub fn try_columns(&mut self, series: &[Series], current: &mut Fit, available: &Available) {
+        let usable: Vec<&'static Descriptor> = library::COLUMN_TERMS
+            .iter()
+            .copied()
+            .filter(|t| (t.needs)(self.problem.rig, available).is_ok())
+            .collect();
+        let mut best: Option<(f64, String)> = None;
+        for name in possible_drivers(series) {
+            self.lay_extra(series, &name);
+            let gain = screen(&self.problem, current, &usable, &self.scale).first().map_or(0.0, |s| s.gain);
+            if gain > rules::BELIEVE && best.as_ref().is_none_or(|b| gain > b.0) {
+                best = Some((gain, name));
+            }
+        }
+        if let Some((_, name)) = best {
+            self.lay_extra(series, &name);
+            self.terms.extend(usable);
+            self.driver = Some(name);
+        }
+    }
+
+    fn lay_extra(&mut self, series: &[Series], name: &str) {
+        for (recording, one) in self.problem.recordings.iter_mut().zip(series) {
+            if let Some(column) = one.column(name) {
+                recording.lay_extra(column);
+            }
+        }
+    }
+
     /// Looks for one more effect on top of a fit that already gained `so_far`.
     pub fn round(&mut self, current: &mut Fit, so_far: f64) -> Option<Round> {
         let taken: Vec<&str> = current.hypothesis.effects.iter().map(|e| e.id).collect();
+        let terms: &[&'static Descriptor] = if taken.is_empty() { &self.terms } else { &[] };
         let everything: Vec<&'static Descriptor> =
-            self.named.iter().chain(&self.terms).copied().filter(|e| !taken.contains(&e.id)).collect();
+            self.named.iter().chain(terms).copied().filter(|e| !taken.contains(&e.id)).collect();
         let screened = screen(&self.problem, current, &everything, &self.scale);
         let least = (0.5 * rules::BELIEVE).max(0.5 * rules::SHARE_OF_FIRST * so_far);
         let chosen = choose(&screened, least);
@@ -174,6 +211,17 @@ impl<'a> Search<'a> {
             before,
             candidates,
         })
+    }
+
+    /// The best term without a name on top of a fit, if any promises something.
+    pub fn best_term(&self, current: &mut Fit) -> Option<Candidate> {
+        let screened = screen(&self.problem, current, &self.terms, &self.scale);
+        let chosen: Vec<Screened> = screened
+            .into_iter()
+            .filter(|s| s.gain > 0.5 * rules::TERM_LEAST && s.size > rules::LEAST_SIZE)
+            .take(2)
+            .collect();
+        self.refit(current, &chosen).into_iter().next()
     }
 
     /// Re-fits chosen effects on top of a fit, best first.

@@ -75,6 +75,10 @@ pub fn why_not(leader: &str, distance: f64, gain: f64) -> String {
 /// What a term adds to, and its variables.
 pub fn enters(term: &Descriptor) -> (&'static str, &'static [&'static str]) {
     match term.id {
+        "term_column_shaft" => ("shaft torque [N m]", &["column", "shaft_speed_rad_s"]),
+        "term_column_drive" => ("drive command", &["column", "command"]),
+        "term_column_ambient" => ("ambient flow [m/s]", &["column"]),
+        "term_column_thrust" => ("thrust reading [N]", &["column"]),
         "term_shaft_flow" => ("shaft torque [N m]", &["shaft_speed_rad_s", "flow_m_s"]),
         "term_shaft_switched" => ("shaft torque [N m]", &["shaft_speed_rad_s", "time_s"]),
         id if id.starts_with("term_shaft") => ("shaft torque [N m]", &["shaft_speed_rad_s"]),
@@ -91,7 +95,7 @@ pub fn enters(term: &Descriptor) -> (&'static str, &'static [&'static str]) {
 }
 
 /// The term's formula with numbers.
-pub fn expression(term: &Descriptor, values: &[f64]) -> String {
+pub fn expression(term: &Descriptor, values: &[f64], driver: Option<&str>) -> String {
     let mut text = term.equation.to_string();
     let (size, reference, shape) = (
         values.first().copied().unwrap_or(0.0),
@@ -105,13 +109,16 @@ pub fn expression(term: &Descriptor, values: &[f64]) -> String {
         text = text.replace(symbol, &format!("{value:.4}"));
     }
     text = text.replace("^p", &format!("^{shape:.2}"));
+    if let Some(name) = driver.filter(|_| term.id.starts_with("term_column")) {
+        text = text.replace(" x", &format!(" (standardised {name})"));
+    }
     // The size last: "k" stands alone in every equation.
     let number = format!("{size:.5}");
     text.replace("-k ", &format!("-{number} ")).replace("+ k", &format!("+ {number}")).replace("--", "+")
 }
 
 /// Columns that were not used.
-pub fn unused(series: &[Series], problem: &Problem) -> Vec<String> {
+pub fn unused(series: &[Series], problem: &Problem, driver: Option<&str>) -> Vec<String> {
     let mut used: Vec<&str> =
         vec!["time_s", "ambient_m_s", "shaft_angle_rad", "supply_v", "depth_m", "temperature_c"];
     for recording in &problem.recordings {
@@ -125,7 +132,18 @@ pub fn unused(series: &[Series], problem: &Problem) -> Vec<String> {
         .collect();
     left.sort_unstable();
     left.dedup();
-    if left.is_empty() { Vec::new() } else { vec![format!("columns not used: {}", left.join(", "))] }
+    let mut notes = Vec::new();
+    if let Some(name) = driver {
+        notes.push(format!("what the baseline leaves follows the column {name}; it was tried as a driver"));
+        left.retain(|c| *c != name);
+    }
+    if !left.is_empty() {
+        notes.push(format!(
+            "columns not used: {} (tried as drivers of the residual where they vary)",
+            left.join(", ")
+        ));
+    }
+    notes
 }
 
 /// The run that would part what this one cannot.
