@@ -43,12 +43,12 @@ async function call(method, path, body) {
     throw error;
   }
   if (answer.status === 204) return null;
-  const document = await answer.json();
+  const answered = await answer.json();
   if (!answer.ok) {
-    log(`${document.title}: ${document.detail}${document.hint ? ` (hint: ${document.hint})` : ""}`, true);
-    throw new Error(document.title);
+    log(`${answered.title}: ${answered.detail}${answered.hint ? ` (hint: ${answered.hint})` : ""}`, true);
+    throw new Error(answered.title);
   }
-  return document;
+  return answered;
 }
 const base = () => `/v1/thrusters/${encodeURIComponent(thruster)}`;
 // A click whose failure is already in the log.
@@ -171,7 +171,12 @@ async function loadController() {
   const answer = await call("GET", `${base()}/controller`);
   $("controller").dataset.running = answer.controller;
   $("controller").replaceChildren(...answer.available.map((name) => new Option(name, name, false, name === answer.controller)));
-  $("controller-text").textContent = answer.parameters.map((p) => `${p.name} ${p.value} ${p.unit}`).join(" · ");
+  $("law-parameters").replaceChildren(...answer.parameters.map((p) => {
+    const entry = Object.assign(document.createElement("input"), { type: "number", step: "any", value: p.value, min: p.low, max: p.high, title: `${p.low} to ${p.high} ${p.unit}` });
+    entry.addEventListener("change", () => call("PUT", `${base()}/controller`, { parameters: { [p.name]: Number(entry.value) } })
+      .then(() => log(`${p.name} = ${entry.value} ${p.unit}`)).catch(() => { entry.value = p.value; }));
+    return cells([p.name, entry, p.unit]);
+  }));
 }
 click("switch", async () => {
   const answer = await call("PUT", `${base()}/controller`, { controller: $("controller").value });

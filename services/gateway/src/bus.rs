@@ -9,6 +9,7 @@ use std::sync::{Arc, mpsc};
 use std::time::{Duration, Instant};
 
 use kort_proto::messages::{Reply, Setpoint as SetpointMessage, SetpointKind, Telemetry};
+use kort_proto::signals::{Kind, SIGNALS};
 use kort_proto::transport::{Deployment, GatewayPorts, Ticker, TransportError, monotonic_ns, realtime};
 
 use crate::record::Recorder;
@@ -59,6 +60,38 @@ struct Bridge {
     pending: Vec<Pending>,
     next_ask: u64,
     last_servo_sequence: (u64, u64),
+    held: Held,
+}
+
+/// The last value of each signal and when it was taken, ns: a flow meter of 20 Hz shows a value in one row of
+/// fifty, and the state should show it in between.
+#[derive(Default)]
+struct Held(Vec<(f64, u64)>);
+
+impl Held {
+    /// Longest time a value is shown after it was taken, ns.
+    const LIFE_NS: u64 = 1_000_000_000;
+
+    /// Remembers what this sample measured.
+    fn take(&mut self, telemetry: &Telemetry) {
+        self.0.resize(SIGNALS.len(), (f64::NAN, 0));
+        for (held, signal) in self.0.iter_mut().zip(SIGNALS) {
+            let value = (signal.get)(&telemetry.signals);
+            if !value.is_nan() {
+                *held = (value, telemetry.time_ns);
+            }
+        }
+    }
+
+    /// The sample with what it did not measure itself.
+    fn fill(&self, mut telemetry: Telemetry) -> Telemetry {
+        for ((value, at_ns), signal) in self.0.iter().zip(SIGNALS) {
+            if signal.kind == Kind::Measured && telemetry.time_ns.saturating_sub(*at_ns) < Self::LIFE_NS {
+                (signal.set)(&mut telemetry.signals, *value);
+            }
+        }
+        telemetry
+    }
 }
 
 /// A request that waits for its answers.
@@ -79,6 +112,7 @@ impl Bridge {
             pending: Vec::new(),
             next_ask: 1,
             last_servo_sequence: (0, 0),
+            held: Held::default(),
         }
     }
 
@@ -145,6 +179,7 @@ impl Bridge {
             self.last_servo_sequence = (session, sequence);
             self.link.tally.telemetry(&telemetry, lost);
             recorder.offer(&thruster.id, &telemetry, lost);
+            self.held.take(&telemetry);
             last = Some(telemetry);
         }
         let state = ports.state.latest();
@@ -154,7 +189,7 @@ impl Bridge {
         if last.is_some() || state.is_some() {
             thruster.hear(|heard| {
                 if let Some(telemetry) = last {
-                    heard.servo = Some((now, telemetry));
+                    heard.servo = Some((now, self.held.fill(telemetry)));
                 }
                 if let Some(state) = state {
                     heard.controller = Some((now, state));

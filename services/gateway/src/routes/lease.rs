@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use axum::extract::State;
 use axum::http::StatusCode;
-use serde::{Deserialize, Serialize};
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize};
 use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
@@ -28,13 +29,24 @@ struct LeaseRequest {
     #[schema(min_length = 1, max_length = 64, pattern = r"^[^\u0000-\u001f\u007f-\u009f]+$")]
     holder: String,
     /// Life of the lease without a command, ms.
-    #[serde(default = "ttl_default_ms")]
+    #[serde(default = "ttl_default_ms", deserialize_with = "whole_number")]
     #[schema(minimum = 1, maximum = 60000, default = 500)]
     ttl_ms: u64,
 }
 
 fn ttl_default_ms() -> u64 {
     TTL_DEFAULT_MS
+}
+
+/// JSON knows one kind of number: 500.0 is as whole as 500.
+fn whole_number<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u64, D::Error> {
+    let value = f64::deserialize(deserializer)?;
+    // The range is checked later, with words of its own; what is negative or huge ends up outside of it.
+    if value.fract() == 0.0 {
+        Ok(if value < 0.0 { 0 } else { value as u64 })
+    } else {
+        Err(D::Error::custom(format!("ttl_ms = {value} is not a whole number of milliseconds")))
+    }
 }
 
 /// A lease in force.
