@@ -8,6 +8,8 @@ pub mod edges;
 pub mod errors;
 pub mod fit;
 pub mod heldout;
+pub mod identifiable;
+pub mod identify;
 pub mod judge;
 pub mod library;
 pub mod locate;
