@@ -1,6 +1,6 @@
 //! The water already moves: current, towing, vehicle speed.
 
-use super::{Available, Descriptor, Effect, Hooks, Path, Scale, Spec, wet};
+use super::{Available, Descriptor, Effect, Hooks, Path, Scale, Spec, one_start, wet};
 use crate::plant::{Balance, Local};
 use crate::rig::Rig;
 
@@ -16,7 +16,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     separated_by: "a staircase in both directions; a towed run; a force bias leaves shaft speed alone",
     reference: "equation (6a), derived from (4); physics.md C3",
     parameters,
-    starts: |scale| vec![vec![-0.03 * scale.flow_m_s], vec![0.2 * scale.flow_m_s], vec![-0.2 * scale.flow_m_s]],
+    starts: one_start,
     needs,
     build: |values, _| Box::new(AmbientAxialFlow { ambient_m_s: values[0] }),
 };

@@ -19,7 +19,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     separated_by: "steps to several speeds, flow correlated with thrust at each; a traverse of the meter",
     reference: "physics.md C5; dbeta 1.86 = 2/g^2 gives g = 1.04",
     parameters,
-    starts: |scale| vec![vec![0.1 * scale.flow_m_s, 0.0, 0.0], vec![0.3 * scale.flow_m_s, 0.0, 0.0], vec![0.0, 0.1, 0.0]],
+    starts: |scale| [0.15, 0.35].iter().map(|share| vec![share * scale.flow_m_s, 0.02, 0.005 * scale.flow_m_s]).collect(),
     needs: flow_measured,
     build: |values, context| {
         Box::new(FlowMeter { distance_m: values[0], gain_error: values[1], offset_m_s: values[2], past: History::new(LONGEST_S, context.tick_s) })

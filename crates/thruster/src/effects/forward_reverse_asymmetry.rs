@@ -23,8 +23,8 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 fn parameters(_: &Scale) -> Vec<Spec> {
     vec![
         Spec::strength("reverse_lift_error", "1", -0.04, -0.8, 1.0),
-        Spec::strength("reverse_drag_error", "1", 0.0, -0.8, 2.0),
-        Spec::strength("reverse_flux_error", "1", 0.0, -0.8, 2.0),
+        Spec::strength("reverse_drag_error", "1", 0.05, -0.8, 2.0),
+        Spec::strength("reverse_flux_error", "1", 0.05, -0.8, 2.0),
     ]
 }
 

@@ -211,6 +211,14 @@ pub struct Context<'a> {
     pub tick_s: f64,
 }
 
+/// Name under which [`Available`] lists a recorded signal laid into [`Tick::extra`].
+pub const EXTRA: &str = "extra";
+
+/// A smooth step from 0 to 1 about zero, `1/(1 + exp(-x))`.
+pub fn logistic(x: f64) -> f64 {
+    1.0 / (1.0 + (-x).exp())
+}
+
 /// No further starting points.
 pub fn one_start(_: &Scale) -> Vec<Vec<f64>> {
     Vec::new()
@@ -310,16 +318,31 @@ catalogue! {
     gear_backlash,
     // C3: axial flow
     ambient_axial_flow,
+    ambient_flow_unsteady,
+    tank_recirculation,
+    duct_loss,
+    thrust_deduction_interaction,
+    cross_flow,
     inertia_added_mass_error,
     // C4: blades
     rotational_flow,
     nonsinusoidal_lift_drag,
+    blade_stall,
     forward_reverse_asymmetry,
+    unsteady_lift_lag,
+    ventilation,
+    air_ingestion,
+    cavitation,
+    water_density,
     // C5: sensors and structure
     thrust_bias_gain_hysteresis,
     thrust_sensor_lag,
+    stand_resonance,
     flowmeter_offset_lag_location,
+    encoder_filter_lag,
+    encoder_eccentricity,
     torque_channel_bias,
+    clock_skew,
 }
 
 /// The effect with this identifier.

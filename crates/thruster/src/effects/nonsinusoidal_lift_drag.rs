@@ -1,6 +1,6 @@
 //! Lift and drag are not plain sinusoids of the angle of attack.
 
-use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, wet};
+use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, one_start, wet};
 use crate::plant::{Foil, Local};
 
 /// Catalogue entry.
@@ -15,7 +15,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     separated_by: "steps of shaft speed, towed runs: whatever sweeps the angle of attack",
     reference: "Bachmayer, Whitcomb, Grosenbaugh 2000 (IEEE JOE 25:146); physics.md C4",
     parameters,
-    starts: |_| vec![vec![0.02, 0.0, 0.0], vec![0.0, 0.1, 0.0], vec![0.0, 0.0, 0.05], vec![0.0, 0.0, -0.05]],
+    starts: one_start,
     needs: wet,
     build: |values, _| Box::new(NonsinusoidalLiftDrag { profile_drag: values[0], drag_4: values[1], lift_4: values[2] }),
 };

@@ -1,6 +1,6 @@
 //! Constant offsets of torque and current: drive zero, current sensor, torque transducer.
 
-use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, always};
+use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, always, one_start};
 use crate::plant::{Balance, Local, Sensed, Tick};
 
 /// Catalogue entry.
@@ -15,10 +15,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     separated_by: "a staircase in both directions; the zeros before and after the run",
     reference: "physics.md C5",
     parameters,
-    starts: |scale| {
-        let (torque, current) = (0.02 * scale.torque_n_m, 0.02 * scale.current_a);
-        vec![vec![-torque, 0.0, 0.0], vec![0.0, current, 0.0], vec![0.0, 0.0, torque]]
-    },
+    starts: one_start,
     needs: always,
     build: |values, _| Box::new(TorqueChannelBias { shaft_n_m: values[0], current_a: values[1], transducer_n_m: values[2] }),
 };
@@ -27,8 +24,8 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
     let (torque, current) = (scale.torque_n_m, scale.current_a);
     vec![
         Spec::strength("shaft_torque_bias_n_m", "N m", 0.02 * torque, -0.5 * torque, 0.5 * torque),
-        Spec::strength("current_offset_a", "A", 0.0, -0.5 * current, 0.5 * current),
-        Spec::strength("transducer_offset_n_m", "N m", 0.0, -0.5 * torque, 0.5 * torque),
+        Spec::strength("current_offset_a", "A", 0.02 * current, -0.5 * current, 0.5 * current),
+        Spec::strength("transducer_offset_n_m", "N m", 0.02 * torque, -0.5 * torque, 0.5 * torque),
     ]
 }
 

@@ -16,10 +16,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
                    error shows in speed but not in thrust",
     reference: "physics.md C2",
     parameters,
-    starts: |scale| {
-        let cogging = 0.02 * scale.torque_n_m;
-        [2, 3, 4, 6, 7, 8, 12, 14, 18, 21, 24, 36, 42].iter().map(|k| vec![f64::from(*k), cogging, 0.0, 0.0, 0.0]).collect()
-    },
+    starts,
     needs,
     build: |values, _| {
         Box::new(TorqueRipple { order: values[0].round(), cogging_n_m: [values[1], values[2]], ripple_nm_a: [values[3], values[4]] })
@@ -31,10 +28,19 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
     vec![
         Spec::held("order", "1", 1.0, 1.0, 144.0),
         Spec::strength("cogging_sin_n_m", "N m", 0.02 * torque, -0.5 * torque, 0.5 * torque),
-        Spec::strength("cogging_cos_n_m", "N m", 0.0, -0.5 * torque, 0.5 * torque),
-        Spec::strength("ripple_sin_nm_a", "N m/A", 0.0, -0.5 * per_a, 0.5 * per_a),
-        Spec::strength("ripple_cos_nm_a", "N m/A", 0.0, -0.5 * per_a, 0.5 * per_a),
+        Spec::strength("cogging_cos_n_m", "N m", 0.02 * torque, -0.5 * torque, 0.5 * torque),
+        Spec::strength("ripple_sin_nm_a", "N m/A", 0.02 * per_a, -0.5 * per_a, 0.5 * per_a),
+        Spec::strength("ripple_cos_nm_a", "N m/A", 0.02 * per_a, -0.5 * per_a, 0.5 * per_a),
     ]
+}
+
+/// One start an order: twice the pole pairs, the slots, six times the pole pairs, and what misalignment gives.
+fn starts(scale: &Scale) -> Vec<Vec<f64>> {
+    let (torque, per_a) = (0.02 * scale.torque_n_m, 0.02 * scale.torque_n_m / scale.current_a);
+    [2, 3, 4, 6, 7, 8, 12, 14, 18, 21, 24, 36, 42]
+        .iter()
+        .map(|order| vec![f64::from(*order), torque, torque, per_a, per_a])
+        .collect()
 }
 
 fn needs(rig: &Rig, available: &Available) -> Result<(), &'static str> {

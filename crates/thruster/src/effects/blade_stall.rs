@@ -1,0 +1,60 @@
+//! Flow separates from the blade at a large angle of attack.
+
+use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, wet};
+use crate::parameters::Parameter as P;
+use crate::plant::{Balance, Foil, Local};
+
+/// Width of the onset, rad.
+const WIDTH_RAD: f64 = 0.03;
+
+/// Catalogue entry.
+pub const DESCRIPTOR: Descriptor = Descriptor {
+    id: "blade_stall",
+    path: Path::Blade,
+    what: "flow separates from the blades above an angle of attack and lift collapses, with a lag of some chords",
+    equation: "CL (1 - k e), n r e' = V [s((|a| - as)/0.03) - e], s logistic; k [1], as [rad], n [radii]",
+    signature: "thrust falls short at the onset of large steps and in crash reversals; steady bollard pull is clean unless \
+                its angle of attack lies above the stall",
+    confused_with: &["nonsinusoidal_lift_drag", "ventilation", "unsteady_lift_lag"],
+    separated_by: "reversals at several rates, which sweep the angle of attack",
+    reference: "physics.md C4",
+    parameters,
+    starts: |_| vec![vec![0.1, 0.17, 1.0], vec![0.1, 0.28, 1.0], vec![0.1, 0.35, 1.0], vec![0.1, 0.28, 4.0]],
+    needs: wet,
+    build: |values, context| {
+        Box::new(BladeStall { loss: values[0], stall_rad: values[1], lag_m: values[2] * context.parameters.get(P::RadiusM) })
+    },
+};
+
+fn parameters(_: &Scale) -> Vec<Spec> {
+    vec![
+        Spec::strength("lift_loss", "1", 0.1, 0.0, 0.9),
+        Spec::shape("stall_angle_rad", "rad", 0.22, 0.08, 0.8),
+        Spec::shape("lag_radii", "1", 1.0, 0.1, 10.0),
+    ]
+}
+
+struct BladeStall {
+    loss: f64,
+    stall_rad: f64,
+    lag_m: f64,
+}
+
+impl Effect for BladeStall {
+    fn states(&self) -> usize {
+        1
+    }
+
+    fn hooks(&self) -> Hooks {
+        Hooks { foil: true, balance: true, ..Hooks::NONE }
+    }
+
+    fn foil(&self, _: &Local, own: &[f64], foil: &mut Foil) {
+        foil.lift *= 1.0 - self.loss * own[0];
+    }
+
+    fn balance(&self, _: &Local, own: &[f64], balance: &mut Balance, rates: &mut [f64]) {
+        let past = (balance.foil.attack_rad().abs() - self.stall_rad) / WIDTH_RAD;
+        rates[0] = balance.foil.speed_m_s / self.lag_m * (super::logistic(past) - own[0]);
+    }
+}

@@ -1,0 +1,62 @@
+//! One channel's clock runs behind the others.
+
+use super::memory::History;
+use super::{Available, Descriptor, Effect, Hooks, Path, Scale, Spec};
+use crate::plant::{Sensed, Tick};
+use crate::rig::Rig;
+
+/// Longest delay, s.
+const LONGEST_S: f64 = 0.5;
+
+/// Catalogue entry.
+pub const DESCRIPTOR: Descriptor = Descriptor {
+    id: "clock_skew",
+    path: Path::Sensor,
+    what: "one channel is logged late against the others and the command: another clock, a buffer, a slow bus",
+    equation: "y_c(t) = y_c(t - d_c), d_c >= 0 [s] for thrust, shaft speed and flow; a channel logged early shows as the others late",
+    signature: "one channel is shifted by the same time at all frequencies and amplitudes, its levels fit",
+    confused_with: &["transport_delay", "thrust_sensor_lag", "encoder_filter_lag", "flowmeter_offset_lag_location", "amplifier_lag"],
+    separated_by: "channels correlated with each other at the start and at the end of the run",
+    reference: "physics.md C5",
+    parameters,
+    starts: |_| vec![vec![0.04, 0.04, 0.04], vec![0.12, 0.12, 0.12]],
+    needs,
+    build: |values, context| {
+        let past = || History::new(LONGEST_S, context.tick_s);
+        Box::new(ClockSkew { delay_s: [values[0], values[1], values[2]], past: [past(), past(), past()] })
+    },
+};
+
+/// Screening looks at each channel's delay alone.
+fn parameters(_: &Scale) -> Vec<Spec> {
+    let delay = |name| Spec::strength(name, "s", 0.01, 0.0, LONGEST_S);
+    vec![delay("thrust_delay_s"), delay("speed_delay_s"), delay("flow_delay_s")]
+}
+
+fn needs(_: &Rig, available: &Available) -> Result<(), &'static str> {
+    let speed = !available.shaft_prescribed && available.has("shaft_speed_rad_s");
+    if speed || available.has("thrust_n") || available.has("flow_m_s") {
+        Ok(())
+    } else {
+        Err("neither thrust nor shaft speed nor flow is recorded as a response")
+    }
+}
+
+struct ClockSkew {
+    delay_s: [f64; 3],
+    past: [History; 3],
+}
+
+impl Effect for ClockSkew {
+    fn hooks(&self) -> Hooks {
+        Hooks::SENSE
+    }
+
+    fn sense(&mut self, _: &Tick, sensed: &mut Sensed) {
+        let channels = [&mut sensed.thrust_n, &mut sensed.shaft_speed_rad_s, &mut sensed.flow_m_s];
+        for ((channel, past), delay) in channels.into_iter().zip(&mut self.past).zip(self.delay_s) {
+            past.push(*channel);
+            *channel = past.ago(delay);
+        }
+    }
+}

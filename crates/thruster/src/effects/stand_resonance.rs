@@ -1,0 +1,79 @@
+//! The stand swings and the force sensor sees it.
+
+use super::{Context, Descriptor, Effect, Hooks, Path, Scale, Spec, thrust_measured};
+use crate::plant::{Sensed, Tick};
+
+/// Catalogue entry.
+pub const DESCRIPTOR: Descriptor = Descriptor {
+    id: "stand_resonance",
+    path: Path::Sensor,
+    what: "the stand and the force sensor swing at a natural frequency",
+    equation: "y = T + g (x - T), x''/wn^2 + 2 z x'/wn + x = T, wn = 2 pi fn; g, z [1], fn [Hz]; g = 1 if all thrust passes \
+               through the swinging mass",
+    signature: "thrust rings at a fixed frequency after steps, shaft speed does not; larger where the blades' passing meets \
+                the frequency",
+    confused_with: &["thrust_sensor_lag", "rotational_flow", "nonsinusoidal_lift_drag"],
+    separated_by: "a tap on the stand with the motor off; a chirp",
+    reference: "physics.md C5",
+    parameters,
+    starts: |_| [5.0, 7.0, 10.0, 14.0, 28.0, 40.0, 56.0, 80.0].iter().map(|hz| vec![0.5, *hz, 0.03]).collect(),
+    needs: thrust_measured,
+    build,
+};
+
+fn parameters(_: &Scale) -> Vec<Spec> {
+    vec![
+        Spec::strength("swinging_share", "1", 0.5, -1.5, 1.5),
+        Spec::shape("natural_frequency_hz", "Hz", 20.0, 2.0, 200.0),
+        Spec::shape("damping_ratio", "1", 0.03, 0.001, 0.9),
+    ]
+}
+
+fn build(values: &[f64], context: &Context) -> Box<dyn Effect> {
+    let (wn, z, dt) = (std::f64::consts::TAU * values[1], values[2], context.tick_s);
+    let (decay, damped) = (z * wn, wn * (1.0 - z * z).sqrt());
+    let ((sin, cos), fall) = ((damped * dt).sin_cos(), (-decay * dt).exp());
+    Box::new(StandResonance {
+        share: values[0],
+        behind_s: 2.0 * z / wn,
+        tick_s: dt,
+        // Free swing over one tick: e(t), e'(t) from e, e' at its start.
+        free: [
+            [fall * (cos + decay / damped * sin), fall * sin / damped],
+            [-fall * wn * wn / damped * sin, fall * (cos - decay / damped * sin)],
+        ],
+        thrust_n: 0.0,
+        swing: None,
+    })
+}
+
+struct StandResonance {
+    share: f64,
+    behind_s: f64,
+    tick_s: f64,
+    free: [[f64; 2]; 2],
+    thrust_n: f64,
+    /// Position (as thrust, N) and its rate.
+    swing: Option<[f64; 2]>,
+}
+
+impl Effect for StandResonance {
+    fn hooks(&self) -> Hooks {
+        Hooks::SENSE
+    }
+
+    /// Exact for a thrust that runs straight over the tick: the swing about the forced answer to
+    /// a ramp, which trails the ramp by `2 z/wn`.
+    fn sense(&mut self, _: &Tick, sensed: &mut Sensed) {
+        let thrust = sensed.thrust_n;
+        let [position, rate] = self.swing.unwrap_or([thrust, 0.0]);
+        let slope = if self.swing.is_some() { (thrust - self.thrust_n) / self.tick_s } else { 0.0 };
+        let before = if self.swing.is_some() { self.thrust_n } else { thrust };
+        let (e, de) = (position - (before - self.behind_s * slope), rate - slope);
+        let [[a, b], [c, d]] = self.free;
+        let position = thrust - self.behind_s * slope + a * e + b * de;
+        self.swing = Some([position, slope + c * e + d * de]);
+        self.thrust_n = thrust;
+        sensed.thrust_n = thrust + self.share * (position - thrust);
+    }
+}

@@ -1,0 +1,55 @@
+//! A hull or a neighbouring thruster takes part.
+
+use super::{Available, Descriptor, Effect, Hooks, Path, Scale, Spec, one_start, wet};
+use crate::plant::{Balance, Drive, Local, Tick};
+use crate::rig::Rig;
+
+/// Catalogue entry.
+pub const DESCRIPTOR: Descriptor = Descriptor {
+    id: "thrust_deduction_interaction",
+    path: Path::Flow,
+    what: "the jet of a neighbouring thruster feeds or starves this one, and suction on the hull takes some of the thrust",
+    equation: "va += C n; y = T (1 - t); n a neighbour's recorded signal (standardised) [1], C [m/s], t [1]",
+    signature: "thrust and flow follow another thruster's command; thrust is low in proportion",
+    confused_with: &["ambient_axial_flow", "ambient_flow_unsteady", "thrust_bias_gain_hysteresis", "duct_loss"],
+    separated_by: "the thrusters run one by one, then together",
+    reference: "physics.md C3",
+    parameters,
+    starts: one_start,
+    needs,
+    build: |values, _| Box::new(Interaction { flow_m_s: values[0], deduction: values[1], neighbour: 0.0 }),
+};
+
+fn parameters(scale: &Scale) -> Vec<Spec> {
+    let full = scale.flow_m_s;
+    vec![
+        Spec::strength("neighbour_flow_m_s", "m/s", 0.03 * full, -full, full),
+        Spec::strength("deduction", "1", 0.02, -0.3, 0.6),
+    ]
+}
+
+fn needs(rig: &Rig, available: &Available) -> Result<(), &'static str> {
+    wet(rig, available)?;
+    if available.has(super::EXTRA) { Ok(()) } else { Err("no signal of a neighbouring thruster is recorded") }
+}
+
+struct Interaction {
+    flow_m_s: f64,
+    deduction: f64,
+    neighbour: f64,
+}
+
+impl Effect for Interaction {
+    fn hooks(&self) -> Hooks {
+        Hooks { drive: true, balance: true, ..Hooks::NONE }
+    }
+
+    fn drive(&mut self, tick: &Tick, _: &mut Drive) {
+        self.neighbour = tick.extra;
+    }
+
+    fn balance(&self, _: &Local, _: &[f64], balance: &mut Balance, _: &mut [f64]) {
+        balance.ambient_m_s += self.flow_m_s * self.neighbour;
+        balance.stand_n -= self.deduction * balance.thrust_n;
+    }
+}

@@ -1,0 +1,72 @@
+//! Lift builds up over some chords of travel (Wagner).
+
+use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, wet};
+use crate::parameters::Parameter as P;
+use crate::plant::{Balance, Foil, Local};
+
+/// Wagner's function: phi(s) = 1 - sum A exp(-b s), s in half chords.
+const WAGNER: [(f64, f64); 2] = [(0.165, 0.0455), (0.335, 0.3)];
+
+/// Catalogue entry.
+pub const DESCRIPTOR: Descriptor = Descriptor {
+    id: "unsteady_lift_lag",
+    path: Path::Blade,
+    what: "circulation, and with it lift, builds up only as the blade travels some chords (Wagner's function)",
+    equation: "V CL = w - g sum Ai (w - yi), yi' = bi (2V/c)(w - yi), w = V CL quasi-steady [m/s]; A 0.165, 0.335, \
+               b 0.0455, 0.3; c [radii], g = 1 a flat plate",
+    signature: "thrust and torque lag fast changes by a time that shrinks with speed; the gain of thrust at high frequency is low",
+    confused_with: &["thrust_sensor_lag", "inertia_added_mass_error", "rotational_flow", "blade_stall"],
+    separated_by: "a chirp at two mean speeds (a sensor's lag stays the same in seconds)",
+    reference: "Wagner 1925; R. T. Jones 1940 (NACA TR 681); physics.md C4",
+    parameters,
+    starts: |_| vec![vec![0.3, 0.2], vec![0.3, 1.5]],
+    needs: wet,
+    build: |values, context| {
+        let p = context.parameters;
+        Box::new(UnsteadyLift {
+            share: values[0],
+            per_m: 2.0 / (values[1] * p.get(P::RadiusM)),
+            lift_max: p.get(P::LiftMax),
+        })
+    },
+};
+
+fn parameters(_: &Scale) -> Vec<Spec> {
+    vec![Spec::strength("wagner_share", "1", 0.3, 0.0, 1.9), Spec::shape("chord_radii", "1", 0.5, 0.05, 5.0)]
+}
+
+struct UnsteadyLift {
+    share: f64,
+    per_m: f64,
+    lift_max: f64,
+}
+
+impl UnsteadyLift {
+    /// Quasi-steady `V CL` in proportion to the circulation, m/s.
+    fn circulation_m_s(&self, foil: &Foil) -> f64 {
+        self.lift_max * foil.sin_2a * foil.speed_m_s
+    }
+}
+
+impl Effect for UnsteadyLift {
+    fn states(&self) -> usize {
+        WAGNER.len()
+    }
+
+    fn hooks(&self) -> Hooks {
+        Hooks { foil: true, balance: true, ..Hooks::NONE }
+    }
+
+    fn foil(&self, _: &Local, own: &[f64], foil: &mut Foil) {
+        let now = self.circulation_m_s(foil);
+        let missing: f64 = WAGNER.iter().zip(own).map(|((a, _), y)| a * (now - y)).sum();
+        foil.lift -= self.share * missing / foil.speed_m_s;
+    }
+
+    fn balance(&self, _: &Local, own: &[f64], balance: &mut Balance, rates: &mut [f64]) {
+        let now = self.circulation_m_s(&balance.foil);
+        for (i, (_, b)) in WAGNER.iter().enumerate() {
+            rates[i] = b * self.per_m * balance.foil.speed_m_s * (now - own[i]);
+        }
+    }
+}

@@ -1,0 +1,73 @@
+//! A propeller near the surface draws air.
+
+use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, wet};
+use crate::plant::{Balance, Drive, Foil, Local, Tick};
+
+/// Width of the onset, as a share of the onset speed.
+const WIDTH: f64 = 0.04;
+/// How much lower the speed of recovery lies, as a share of the onset speed.
+const HYSTERESIS: f64 = 0.15;
+/// Torque loss over thrust loss: a ventilated blade keeps more of its drag.
+const DRAG_SHARE: f64 = 0.85;
+
+/// Catalogue entry.
+pub const DESCRIPTOR: Descriptor = Descriptor {
+    id: "ventilation",
+    path: Path::Blade,
+    what: "near the surface the propeller draws air above some speed: thrust and torque collapse, the shaft races, and the \
+           blades recover only at a lower speed",
+    equation: "CL (1 - k e), CD (1 - 0.85 k e), tv e' = s[(|Om|/on - 1 + 0.15 e)/0.04] - e, s logistic; k [1], tv [s], \
+               on [rad/s], in proportion to the root of depth where depth is recorded",
+    signature: "an abrupt loss of thrust and torque together at high speed, a rise of shaft speed, recovery with hysteresis",
+    confused_with: &["cavitation", "air_ingestion", "blade_stall"],
+    separated_by: "depth changed at the same speed; the recovery on the way down",
+    reference: "Minsaas, Faltinsen, Persson 1983; Smogeli 2006 (NTNU); physics.md C4",
+    parameters,
+    starts: |scale| [0.5, 0.65, 0.95].iter().map(|share| vec![0.05, share * scale.shaft_speed_rad_s, 0.3]).collect(),
+    needs: wet,
+    build: |values, _| Box::new(Ventilation { loss: values[0], onset_rad_s: values[1], lag_s: values[2], first_depth_m: None }),
+};
+
+fn parameters(scale: &Scale) -> Vec<Spec> {
+    let full = scale.shaft_speed_rad_s;
+    vec![
+        Spec::strength("thrust_loss", "1", 0.05, 0.0, 0.95),
+        Spec::shape("onset_speed_rad_s", "rad/s", 0.8 * full, 0.2 * full, 1.3 * full),
+        Spec::shape("lag_s", "s", 0.3, 0.02, 20.0),
+    ]
+}
+
+struct Ventilation {
+    loss: f64,
+    onset_rad_s: f64,
+    lag_s: f64,
+    first_depth_m: Option<f64>,
+}
+
+impl Effect for Ventilation {
+    fn states(&self) -> usize {
+        1
+    }
+
+    fn hooks(&self) -> Hooks {
+        Hooks { drive: true, foil: true, balance: true, ..Hooks::NONE }
+    }
+
+    fn drive(&mut self, tick: &Tick, _: &mut Drive) {
+        self.first_depth_m = self.first_depth_m.or(tick.depth_m);
+    }
+
+    fn foil(&self, _: &Local, own: &[f64], foil: &mut Foil) {
+        foil.lift *= 1.0 - self.loss * own[0];
+        foil.drag *= 1.0 - DRAG_SHARE * self.loss * own[0];
+    }
+
+    fn balance(&self, at: &Local, own: &[f64], _: &mut Balance, rates: &mut [f64]) {
+        let deeper = match (at.depth_m, self.first_depth_m) {
+            (Some(now), Some(first)) if first > 0.0 => (now / first).clamp(0.05, 20.0).sqrt(),
+            _ => 1.0,
+        };
+        let past = at.shaft_speed_rad_s.abs() / (self.onset_rad_s * deeper) - 1.0 + HYSTERESIS * own[0];
+        rates[0] = (super::logistic(past / WIDTH) - own[0]) / self.lag_s;
+    }
+}

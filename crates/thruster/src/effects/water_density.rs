@@ -1,0 +1,44 @@
+//! The water is heavier or lighter than stated.
+
+use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, one_start, wet};
+use crate::plant::{Balance, Foil, Local};
+
+/// Catalogue entry.
+pub const DESCRIPTOR: Descriptor = Descriptor {
+    id: "water_density",
+    path: Path::Blade,
+    what: "the density of the water is not the stated one: salt, temperature, a constant share of bubbles",
+    equation: "rho (1 + e); e [1]; 998 fresh, 1025 kg/m^3 sea",
+    signature: "thrust and torque over speed squared are off by the same percentage; thrust per torque and thrust at a given \
+                torque are unchanged",
+    confused_with: &["air_ingestion", "thrust_bias_gain_hysteresis", "windage_drag", "duct_loss"],
+    separated_by: "temperature and salinity of the water; shaft speed together with thrust and torque",
+    reference: "physics.md C4",
+    parameters,
+    starts: one_start,
+    needs: wet,
+    build: |values, _| Box::new(WaterDensity { factor: 1.0 + values[0] }),
+};
+
+fn parameters(_: &Scale) -> Vec<Spec> {
+    vec![Spec::strength("density_error", "1", 0.03, -0.6, 0.3)]
+}
+
+struct WaterDensity {
+    factor: f64,
+}
+
+impl Effect for WaterDensity {
+    fn hooks(&self) -> Hooks {
+        Hooks { foil: true, balance: true, ..Hooks::NONE }
+    }
+
+    fn foil(&self, _: &Local, _: &[f64], foil: &mut Foil) {
+        foil.density_kg_m3 *= self.factor;
+    }
+
+    fn balance(&self, _: &Local, _: &[f64], balance: &mut Balance, _: &mut [f64]) {
+        balance.flux_kg_m *= self.factor;
+        balance.added_mass_kg *= self.factor;
+    }
+}
