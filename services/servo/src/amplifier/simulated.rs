@@ -89,7 +89,7 @@ impl Simulated {
                 ),
             ));
         }
-        if !(keys.ambient_m_s.abs() <= 5.0) {
+        if keys.ambient_m_s.is_nan() || keys.ambient_m_s.abs() > 5.0 {
             return Err(fail("ambient_m_s", format!("{} is outside -5 to 5", keys.ambient_m_s)));
         }
         let tick_s = thruster.servo_period_ns() as f64 * 1e-9;

@@ -1,0 +1,308 @@
+//! A deployment under test: real processes, a root and a port of its own, so that tests run side
+//! by side. The controller is slow (50 Hz) to keep its time-outs above what a loaded machine does
+//! to a process; what is asserted is order and outcome, and time only in controller periods.
+#![allow(dead_code)]
+
+use std::path::PathBuf;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use kort_proto::messages::Telemetry;
+use kort_proto::transport::{Deployment, GatewayPorts};
+use serde_json::{Value, json};
+
+/// Controller period of the deployments under test, ns.
+pub const PERIOD_NS: u64 = 20_000_000;
+/// How long anything may take on a busy machine.
+pub const PATIENCE: Duration = Duration::from_secs(30);
+
+pub const KORT: &str = env!("CARGO_BIN_EXE_kort");
+
+/// A folder with a configuration, not yet started.
+pub struct Site {
+    pub folder: tempfile::TempDir,
+    pub port: u16,
+}
+
+impl Site {
+    pub fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+        let rig = concat!(env!("CARGO_MANIFEST_DIR"), "/config/thrusters/whitcomb-yoerger-1999.toml");
+        let config = format!(
+            r#"
+[gateway]
+bind = "127.0.0.1:{port}"
+recordings = "{folder}/recordings"
+[thrusters.t1]
+rig = "{rig}"
+amplifier = "simulated"
+servo = {{ rate_hz = 500 }}
+controller = {{ rate_hz = 50, law = "velocity_servo" }}
+limits = {{ full_drive_s = 0.005 }}
+"#,
+            folder = folder.path().display()
+        );
+        std::fs::write(folder.path().join("kort.toml"), config).unwrap();
+        Self { folder, port }
+    }
+
+    pub fn config(&self) -> PathBuf {
+        self.folder.path().join("kort.toml")
+    }
+
+    pub fn root(&self) -> PathBuf {
+        self.folder.path().join("shm")
+    }
+
+    pub fn deployment(&self) -> Deployment {
+        Deployment::new(Some(&self.root()))
+    }
+
+    pub fn command(&self, role: &str) -> Command {
+        let mut command = Command::new(KORT);
+        command.arg(role).arg("--config").arg(self.config()).arg("--root").arg(self.root());
+        command.current_dir(self.folder.path()).stdin(Stdio::null());
+        command
+    }
+
+    pub fn log(&self) -> String {
+        std::fs::read_to_string(self.folder.path().join("log")).unwrap_or_default()
+    }
+
+    /// Starts a role with its talk going to a file.
+    pub fn spawn(&self, role: &str) -> Child {
+        let log = std::fs::OpenOptions::new()
+            .create(true)
+            .append(true)
+            .open(self.folder.path().join("log"))
+            .unwrap();
+        self.command(role).stdout(log.try_clone().unwrap()).stderr(log).spawn().unwrap()
+    }
+}
+
+impl Drop for Site {
+    fn drop(&mut self) {
+        // Owning clears what killed processes left in shared memory.
+        let _ = self.deployment().own();
+    }
+}
+
+/// Waits until `done` gives something.
+pub fn wait<T>(what: &str, mut done: impl FnMut() -> Option<T>) -> T {
+    let end = Instant::now() + PATIENCE;
+    loop {
+        if let Some(value) = done() {
+            return value;
+        }
+        assert!(Instant::now() < end, "waited in vain for: {what}");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+pub fn kill(pid: u32, signal: &str) {
+    let done = Command::new("kill").args([format!("-{signal}"), pid.to_string()]).status().unwrap();
+    assert!(done.success(), "kill -{signal} {pid}");
+}
+
+pub fn run(command: &mut Command) -> Output {
+    command.output().unwrap()
+}
+
+/// `kort up` with all its children.
+pub struct Stack {
+    pub site: Site,
+    pub supervisor: Child,
+    lease: String,
+}
+
+impl Stack {
+    pub fn start() -> Self {
+        Self::start_at(Site::new())
+    }
+
+    pub fn start_at(site: Site) -> Self {
+        let supervisor = site.spawn("up");
+        let stack = Self { site, supervisor, lease: String::new() };
+        stack.wait_until_up();
+        stack
+    }
+
+    /// All three processes speak.
+    pub fn wait_until_up(&self) {
+        wait("the service to answer with a controller's law", || {
+            let state = self.state()?;
+            (!state["controller"].is_null() && !state["measured"]["shaft_speed_rad_s"].is_null())
+                .then_some(())
+        });
+    }
+
+    /// Sends a request; status and body.
+    pub fn http(&self, method: &str, path: &str, body: Option<Value>) -> Option<(u16, Value)> {
+        let agent: ureq::Agent = ureq::Agent::config_builder()
+            .http_status_as_error(false)
+            .timeout_global(Some(Duration::from_secs(5)))
+            .build()
+            .into();
+        let url = format!("http://127.0.0.1:{}/v1/thrusters/t1{path}", self.site.port);
+        let request = ureq::http::Request::builder()
+            .method(method)
+            .uri(url)
+            .header("Lease-Id", &self.lease)
+            .header("Content-Type", "application/json");
+        let body = body.map(|b| b.to_string()).unwrap_or_default();
+        let request = if self.lease.is_empty() {
+            let mut request = request.body(body).ok()?;
+            request.headers_mut().remove("Lease-Id");
+            request
+        } else {
+            request.body(body).ok()?
+        };
+        let mut response = agent.run(request).ok()?;
+        let text = response.body_mut().read_to_string().ok()?;
+        Some((response.status().as_u16(), serde_json::from_str(&text).unwrap_or(Value::Null)))
+    }
+
+    pub fn state(&self) -> Option<Value> {
+        self.http("GET", "", None).filter(|(status, _)| *status == 200).map(|(_, body)| body)
+    }
+
+    pub fn expect(&self, method: &str, path: &str, body: Option<Value>) -> Value {
+        let (status, answer) =
+            self.http(method, path, body).unwrap_or_else(|| panic!("{method} {path}: no answer"));
+        assert!(status < 300, "{method} {path}: {status} {answer}");
+        answer
+    }
+
+    /// Takes the lease, clears, arms and asks for a thrust; waits until it is there.
+    pub fn thrust(&mut self, newton: f64, ttl_ms: u64) {
+        let lease = wait("the lease", || {
+            if !self.lease.is_empty() {
+                self.http("DELETE", "/lease", None)?;
+                self.lease.clear();
+            }
+            let (status, body) =
+                self.http("POST", "/lease", Some(json!({"holder": "test", "ttl_ms": ttl_ms})))?;
+            (status == 201).then_some(body)
+        });
+        self.lease = lease["lease_id"].as_str().unwrap().to_owned();
+        wait("faults to clear and the servo to arm", || {
+            self.http("POST", "/clear-faults", None)?;
+            let (status, _) = self.http("POST", "/arm", None)?;
+            (status < 300).then_some(())
+        });
+        wait("the setpoint to be accepted", || {
+            let (status, _) = self.http("PUT", "/setpoint", Some(json!({"thrust_n": newton})))?;
+            (status < 300).then_some(())
+        });
+        let mut watch = self.watch();
+        watch.until("the thrust to be there", |t| (t.signals.thrust_n - newton).abs() < 0.2 * newton.abs());
+    }
+
+    /// Listens to the servo past the gateway.
+    pub fn watch(&self) -> Watch {
+        Watch::new(&self.site.deployment())
+    }
+
+    /// Process of a child by its role.
+    pub fn process(&self, role: &str) -> Option<u32> {
+        children(self.supervisor.id()).into_iter().find(|(_, r)| r == role).map(|(pid, _)| pid)
+    }
+
+    pub fn process_of(&self, role: &str) -> u32 {
+        wait("the child to live", || self.process(role))
+    }
+}
+
+impl Drop for Stack {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            eprintln!("--- log of the deployment\n{}", self.site.log());
+        }
+        let children = children(self.supervisor.id());
+        let _ = Command::new("kill").args(["-TERM", &self.supervisor.id().to_string()]).status();
+        let end = Instant::now() + Duration::from_secs(10);
+        while matches!(self.supervisor.try_wait(), Ok(None)) && Instant::now() < end {
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        let _ = self.supervisor.kill();
+        let _ = self.supervisor.wait();
+        for (pid, _) in children {
+            let _ = Command::new("kill").args(["-KILL", &pid.to_string()]).stderr(Stdio::null()).status();
+        }
+    }
+}
+
+/// Children of a process with their role, the first argument.
+pub fn children(parent: u32) -> Vec<(u32, String)> {
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir("/proc").unwrap().flatten() {
+        let Some(pid) = entry.file_name().to_str().and_then(|n| n.parse::<u32>().ok()) else { continue };
+        let Ok(stat) = std::fs::read_to_string(entry.path().join("stat")) else { continue };
+        let Some((_, rest)) = stat.rsplit_once(')') else { continue };
+        let mut fields = rest.split_whitespace();
+        let (state, ppid) = (fields.next(), fields.next());
+        if state == Some("Z") || ppid != Some(parent.to_string().as_str()) {
+            continue;
+        }
+        let line = std::fs::read(entry.path().join("cmdline")).unwrap_or_default();
+        let role = line.split(|b| *b == 0).nth(1).map(|r| String::from_utf8_lossy(r).into_owned());
+        found.push((pid, role.unwrap_or_default()));
+    }
+    found
+}
+
+/// Reads every telemetry sample of a servo from shared memory.
+pub struct Watch {
+    deployment: Deployment,
+    ports: GatewayPorts,
+}
+
+impl Watch {
+    pub fn new(deployment: &Deployment) -> Self {
+        let ports = wait("shared memory", || GatewayPorts::open(deployment, "t1").ok());
+        Self { deployment: deployment.clone(), ports }
+    }
+
+    /// Next sample.
+    pub fn next(&mut self) -> Telemetry {
+        wait("telemetry", || {
+            if self.deployment.generation().is_some_and(|g| g != self.ports.generation)
+                && let Ok(ports) = GatewayPorts::open(&self.deployment, "t1")
+            {
+                self.ports = ports;
+            }
+            self.ports.telemetry.next()
+        })
+    }
+
+    /// First sample for which `done` holds.
+    pub fn until(&mut self, what: &str, done: impl Fn(&Telemetry) -> bool) -> Telemetry {
+        let end = Instant::now() + PATIENCE;
+        loop {
+            let t = self.next();
+            if done(&t) {
+                return t;
+            }
+            assert!(Instant::now() < end, "waited in vain for: {what}; last {:?}", t.signals);
+        }
+    }
+
+    /// For a time no sample is armed or driven.
+    pub fn stays_at_zero(&mut self, time: Duration) {
+        while self.ports.telemetry.next().is_some() {}
+        let end = Instant::now() + time;
+        while Instant::now() < end {
+            let t = self.next();
+            assert_eq!((t.armed, t.signals.current_cmd_a), (0, 0.0), "{t:?}");
+        }
+    }
+}
+
+/// Is a process there (and no zombie)?
+pub fn alive(pid: u32) -> bool {
+    std::fs::read_to_string(format!("/proc/{pid}/stat"))
+        .ok()
+        .and_then(|s| s.rsplit_once(')').map(|(_, r)| !r.trim_start().starts_with('Z')))
+        .unwrap_or(false)
+}

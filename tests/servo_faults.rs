@@ -1,0 +1,178 @@
+//! The servo alone as a real process, with this test as its controller: nothing unsound ever
+//! reaches the drive.
+
+mod common;
+
+use std::process::Child;
+use std::time::Duration;
+
+use common::{PATIENCE, PERIOD_NS, Site, kill, wait};
+use kort_proto::faults::Fault;
+use kort_proto::messages::{Command, Outcome, Process, Reply, Request, RequestKind, Telemetry};
+use kort_proto::transport::{ControllerPorts, GatewayPorts, Ticker};
+
+/// A servo process, and the ports of a controller and a gateway in this one.
+struct Bench {
+    servo: Child,
+    site: Site,
+    controller: ControllerPorts,
+    gateway: GatewayPorts,
+    next_id: u64,
+}
+
+impl Bench {
+    fn start() -> Self {
+        let site = Site::new();
+        let servo = site.spawn("servo");
+        let deployment = site.deployment();
+        deployment.wait_for_generation(PATIENCE).unwrap();
+        let controller = wait("ports", || ControllerPorts::open(&deployment, "t1").ok());
+        let gateway = wait("ports", || GatewayPorts::open(&deployment, "t1").ok());
+        wait("telemetry", || gateway.telemetry.next());
+        Self { servo, site, controller, gateway, next_id: 0 }
+    }
+
+    /// Asks the servo for something while a controller at zero goes on.
+    fn ask(&mut self, kind: RequestKind) -> (Outcome, String) {
+        self.next_id += 1;
+        let id = self.next_id;
+        self.gateway.request.send(Request { id, kind: kind as u32, ..Request::default() }).unwrap();
+        let session = self.gateway.request.session();
+        let mine = |r: &Reply| r.id == id && r.to_session == session && r.from == Process::Servo as u32;
+        let reply = wait("a reply", || {
+            self.controller.command.send(Command::default()).unwrap();
+            std::iter::from_fn(|| self.gateway.reply.next()).find(mine)
+        });
+        (Outcome::from_u32(reply.outcome).unwrap(), reply.message.as_str().to_owned())
+    }
+
+    fn arm(&mut self) {
+        for _ in 0..3 {
+            self.controller.command.send(Command::default()).unwrap();
+            std::thread::sleep(Duration::from_millis(4));
+        }
+        assert_eq!(self.ask(RequestKind::Arm), (Outcome::Done, "armed".into()));
+        while self.gateway.telemetry.next().is_some() {}
+    }
+
+    /// Sends commands for some servo ticks and returns all telemetry of that time.
+    fn send(&mut self, ticks: usize, mut command: impl FnMut(&mut ControllerPorts, usize)) -> Vec<Telemetry> {
+        let mut ticker = Ticker::new(2_000_000);
+        for i in 0..ticks {
+            command(&mut self.controller, i);
+            ticker.wait();
+        }
+        std::thread::sleep(Duration::from_millis(10));
+        std::iter::from_fn(|| self.gateway.telemetry.next()).collect()
+    }
+}
+
+impl Drop for Bench {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            eprintln!("--- log of the servo\n{}", self.site.log());
+        }
+        let _ = self.servo.kill();
+        let _ = self.servo.wait();
+    }
+}
+
+fn largest(rows: &[Telemetry]) -> f64 {
+    rows.iter().map(|t| t.signals.current_cmd_a.abs()).fold(0.0, f64::max)
+}
+
+#[test]
+fn a_sound_command_drives_and_the_log_says_what_is_not_permitted() {
+    let mut bench = Bench::start();
+    bench.arm();
+    let rows = bench.send(100, |c, _| c.command.send(Command { drive: 2.0, ..Command::default() }).unwrap());
+    assert_eq!(largest(&rows), 2.0);
+    assert!(rows.last().unwrap().signals.shaft_speed_rad_s > 1.0, "the shaft turns");
+    let log = bench.site.log();
+    assert!(log.contains("servo runs, disarmed"), "{log}");
+}
+
+#[test]
+fn unsound_commands_never_reach_the_drive_and_are_latched() {
+    let mut bench = Bench::start();
+    for (drive, kind) in [
+        (f64::NAN, 0),
+        (f64::INFINITY, 0),
+        (f64::NEG_INFINITY, 0),
+        (9.5, 0),
+        (-1e300, 0),
+        (1.0, 1),
+        (1.0, 77),
+    ] {
+        bench.arm();
+        let rows =
+            bench.send(10, |c, _| c.command.send(Command { drive, kind, ..Command::default() }).unwrap());
+        assert_eq!(largest(&rows), 0.0, "drive {drive} of kind {kind}");
+        assert!(rows.iter().all(|t| t.signals.current_cmd_a.is_finite()));
+        assert_eq!(rows.last().unwrap().faults, Fault::CommandInvalid.bit());
+        let (outcome, words) = bench.ask(RequestKind::Arm);
+        assert_eq!(outcome, Outcome::Refused);
+        assert!(words.contains("command_invalid (code 5)"), "{words}");
+        assert_eq!(bench.ask(RequestKind::ClearFaults).0, Outcome::Done);
+    }
+}
+
+#[test]
+fn silence_ends_at_zero_within_five_controller_periods() {
+    let mut bench = Bench::start();
+    bench.arm();
+    bench.send(50, |c, _| c.command.send(Command { drive: 3.0, ..Command::default() }).unwrap());
+    let rows = bench.send(100, |_, _| {});
+    let zero = rows.iter().find(|t| t.armed == 0).expect("disarmed");
+    assert!(zero.time_ns - zero.command_stamp_ns <= 5 * PERIOD_NS + 10_000_000);
+    assert_eq!(zero.faults, Fault::CommandTimeout.bit());
+    assert_eq!(zero.signals.current_cmd_a, 0.0);
+    // A controller that comes back is not followed.
+    let rows = bench.send(20, |c, _| c.command.send(Command { drive: 3.0, ..Command::default() }).unwrap());
+    assert_eq!(largest(&rows), 0.0);
+}
+
+#[test]
+fn another_controller_is_not_followed() {
+    let mut bench = Bench::start();
+    bench.arm();
+    bench.send(20, |c, _| c.command.send(Command { drive: 3.0, ..Command::default() }).unwrap());
+    bench.controller = ControllerPorts::open(&bench.site.deployment(), "t1").unwrap();
+    let rows = bench.send(20, |c, _| c.command.send(Command { drive: 3.0, ..Command::default() }).unwrap());
+    assert_eq!(rows.last().unwrap().faults, Fault::ControllerRestarted.bit());
+    assert_eq!(rows.last().unwrap().signals.current_cmd_a, 0.0);
+}
+
+#[test]
+fn sigterm_sets_the_drive_to_zero_before_the_process_ends() {
+    let mut bench = Bench::start();
+    bench.arm();
+    bench.send(20, |c, _| c.command.send(Command { drive: 3.0, ..Command::default() }).unwrap());
+    kill(bench.servo.id(), "TERM");
+    let status = wait("the end", || bench.servo.try_wait().unwrap());
+    assert_eq!(status.code(), Some(0));
+    let last = std::iter::from_fn(|| bench.gateway.telemetry.next()).last().unwrap();
+    assert_eq!((last.armed, last.signals.current_cmd_a), (0, 0.0));
+}
+
+#[test]
+fn forty_starts_under_the_axe_leave_nothing_behind() {
+    // A servo that owns its shared memory is killed at every instant of its start; the next one
+    // must come up without help.
+    let site = Site::new();
+    for i in 0u64..40 {
+        let mut servo = site.spawn("servo");
+        std::thread::sleep(Duration::from_micros(i * 1500));
+        servo.kill().unwrap();
+        servo.wait().unwrap();
+    }
+    let mut servo = site.spawn("servo");
+    let deployment = site.deployment();
+    wait("the last one to run", || {
+        let ports = GatewayPorts::open(&deployment, "t1").ok()?;
+        std::thread::sleep(Duration::from_millis(50));
+        ports.telemetry.next().map(drop)
+    });
+    servo.kill().unwrap();
+    servo.wait().unwrap();
+}

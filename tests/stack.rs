@@ -1,0 +1,211 @@
+//! The whole service as real processes: it starts and thrusts, and whatever is killed, frozen or
+//! lost ends at zero thrust, is replaced, and never resumes what it was told before.
+
+mod common;
+
+use std::time::{Duration, Instant};
+
+use common::{PERIOD_NS, Site, Stack, alive, children, kill, run, wait};
+use kort_proto::faults::Fault;
+use kort_proto::messages::Telemetry;
+
+const LEASE_MS: u64 = 60_000;
+
+fn at_zero(t: &Telemetry) -> bool {
+    t.armed == 0 && t.signals.current_cmd_a == 0.0
+}
+
+/// Thrust is at zero within a number of controller periods after an instant, by the servo's own
+/// clock; two more are allowed for a busy machine.
+fn within(periods: u64, since_ns: u64, zero: &Telemetry) {
+    let took = zero.time_ns.saturating_sub(since_ns);
+    assert!(took <= (periods + 2) * PERIOD_NS, "zero after {} ms", took / 1_000_000);
+}
+
+fn now_ns() -> u64 {
+    kort_proto::transport::monotonic_ns()
+}
+
+#[test]
+fn starts_thrusts_and_goes_to_zero_before_it_ends() {
+    let mut stack = Stack::start();
+    let state = stack.state().unwrap();
+    assert_eq!((&state["armed"], &state["faults"]), (&false.into(), &serde_json::json!([])));
+    stack.thrust(80.0, LEASE_MS);
+    let servo = stack.process_of("servo");
+    let mut watch = stack.watch();
+    kill(stack.supervisor.id(), "TERM");
+    let zero = watch.until("zero", at_zero);
+    assert_eq!(zero.faults, 0, "an ordered stop is no fault");
+    assert!(alive(servo), "the servo still ran when thrust was at zero");
+    let status = stack.supervisor.wait().unwrap();
+    assert_eq!(status.code(), Some(0), "{}", stack.site.log());
+    assert!(!alive(servo));
+    let log = stack.site.log();
+    assert!(log.contains(&format!("http://127.0.0.1:{}/", stack.site.port)), "{log}");
+}
+
+#[test]
+fn a_killed_controller_ends_at_zero_and_its_successor_starts_there() {
+    let mut stack = Stack::start();
+    stack.thrust(80.0, LEASE_MS);
+    let mut watch = stack.watch();
+    let first = stack.process_of("controller");
+    kill(first, "KILL");
+    let zero = watch.until("zero", at_zero);
+    within(5, zero.command_stamp_ns, &zero);
+    assert_ne!(zero.faults & (Fault::CommandTimeout.bit() | Fault::ControllerRestarted.bit()), 0);
+    wait("a successor", || stack.process("controller").filter(|pid| *pid != first));
+    watch.stays_at_zero(Duration::from_millis(700));
+    stack.thrust(60.0, LEASE_MS);
+}
+
+#[test]
+fn a_killed_gateway_ends_at_zero_and_its_successor_starts_there() {
+    let mut stack = Stack::start();
+    stack.thrust(80.0, LEASE_MS);
+    let mut watch = stack.watch();
+    let first = stack.process_of("gateway");
+    let killed_ns = now_ns();
+    kill(first, "KILL");
+    let zero = watch.until("zero", at_zero);
+    within(5, killed_ns, &zero);
+    wait("a successor", || stack.process("gateway").filter(|pid| *pid != first));
+    stack.wait_until_up();
+    wait("the fault to be shown", || {
+        let faults = stack.state()?["faults"].to_string();
+        (faults.contains("gateway_lost") || faults.contains("gateway_restarted")).then_some(())
+    });
+    watch.stays_at_zero(Duration::from_millis(700));
+    stack.thrust(60.0, LEASE_MS);
+}
+
+#[test]
+fn a_killed_servo_is_replaced_by_one_at_zero() {
+    let mut stack = Stack::start();
+    stack.thrust(80.0, LEASE_MS);
+    let first = stack.process_of("servo");
+    let mut watch = stack.watch();
+    let session = watch.next().header.session;
+    kill(first, "KILL");
+    let fresh = watch.until("a successor", |t| t.header.session != session);
+    assert!(at_zero(&fresh), "{fresh:?}");
+    watch.stays_at_zero(Duration::from_millis(700));
+    stack.thrust(60.0, LEASE_MS);
+}
+
+#[test]
+fn a_frozen_controller_ends_at_zero_and_resumes_nothing_when_it_thaws() {
+    let mut stack = Stack::start();
+    stack.thrust(80.0, LEASE_MS);
+    let mut watch = stack.watch();
+    let controller = stack.process_of("controller");
+    kill(controller, "STOP");
+    let zero = watch.until("zero", at_zero);
+    within(5, zero.command_stamp_ns, &zero);
+    assert_eq!(zero.faults, Fault::CommandTimeout.bit());
+    kill(controller, "CONT");
+    watch.stays_at_zero(Duration::from_millis(700));
+    assert_eq!(stack.process("controller"), Some(controller), "a frozen process is not a dead one");
+    stack.thrust(60.0, LEASE_MS);
+}
+
+#[test]
+fn a_frozen_gateway_ends_at_zero_and_resumes_nothing_when_it_thaws() {
+    let mut stack = Stack::start();
+    stack.thrust(80.0, LEASE_MS);
+    let mut watch = stack.watch();
+    let gateway = stack.process_of("gateway");
+    let frozen_ns = now_ns();
+    kill(gateway, "STOP");
+    let zero = watch.until("zero", at_zero);
+    within(5, frozen_ns, &zero);
+    kill(gateway, "CONT");
+    watch.stays_at_zero(Duration::from_millis(700));
+    stack.thrust(60.0, LEASE_MS);
+}
+
+#[test]
+fn the_end_of_a_lease_ramps_to_zero_within_half_a_second() {
+    let mut stack = Stack::start();
+    let taken = Instant::now();
+    stack.thrust(80.0, 3000);
+    let mut watch = stack.watch();
+    // The lease was renewed by the setpoint at the latest; from then on nobody renews it.
+    let falling = watch.until("the ramp", |t| t.armed != 0 && t.signals.thrust_cmd_n < 70.0);
+    let zero = watch.until("zero", at_zero);
+    let took_ms = (zero.time_ns - falling.time_ns) / 1_000_000;
+    assert!(took_ms <= 500 + 2 * PERIOD_NS / 1_000_000, "{took_ms} ms");
+    assert!(took_ms >= 150, "a ramp, no step: {took_ms} ms");
+    assert!(taken.elapsed() >= Duration::from_millis(2900), "the lease ended early");
+    watch.stays_at_zero(Duration::from_millis(500));
+    stack.thrust(60.0, LEASE_MS);
+}
+
+#[test]
+fn kills_at_any_instant_start_up_included_need_no_person() {
+    let mut stack = Stack::start();
+    // Delays sweep what a start goes through: exec, configuration, ports, first ticks.
+    let roles = ["servo", "controller", "gateway"];
+    for i in 0u64..30 {
+        let role = roles[(i % 3) as usize];
+        std::thread::sleep(Duration::from_micros((i * 7919) % 60_000));
+        if let Some(pid) = stack.process(role) {
+            let _ = std::process::Command::new("kill").args(["-KILL", &pid.to_string()]).status();
+        }
+    }
+    stack.wait_until_up();
+    stack.thrust(60.0, LEASE_MS);
+    assert!(alive(stack.supervisor.id()));
+}
+
+#[test]
+fn a_killed_supervisor_takes_its_children_along_and_the_next_one_starts() {
+    let mut stack = Stack::start();
+    stack.thrust(80.0, LEASE_MS);
+    let orphans = children(stack.supervisor.id());
+    assert_eq!(orphans.len(), 3);
+    kill(stack.supervisor.id(), "KILL");
+    stack.supervisor.wait().unwrap();
+    wait("the children to end", || orphans.iter().all(|(pid, _)| !alive(*pid)).then_some(()));
+    stack.supervisor = stack.site.spawn("up");
+    stack.wait_until_up();
+    stack.watch().stays_at_zero(Duration::from_millis(300));
+    stack.thrust(60.0, LEASE_MS);
+}
+
+#[test]
+fn a_second_supervisor_is_told_who_runs_here() {
+    let stack = Stack::start();
+    let second = run(&mut stack.site.command("up"));
+    assert_eq!(second.status.code(), Some(1));
+    let words = String::from_utf8_lossy(&second.stderr);
+    assert!(words.contains(&stack.supervisor.id().to_string()) && words.contains("hint:"), "{words}");
+    assert!(stack.state().is_some(), "the first one still runs");
+}
+
+#[test]
+fn a_wrong_configuration_is_refused_with_the_nearest_key() {
+    let site = Site::new();
+    let text = std::fs::read_to_string(site.config()).unwrap();
+    for (wrong, words) in [
+        (
+            text.replace("amplifier", "amplifyer"),
+            vec!["unknown field `amplifyer`", "did you mean `amplifier`?"],
+        ),
+        (text.replace("rate_hz = 500", "rate_hz = 9000"), vec!["thrusters.t1.servo.rate_hz", "100 to 5000"]),
+        (
+            text.replace("full_drive_s", "full_drive"),
+            vec!["thrusters.t1.limits", "did you mean `full_drive_s`?"],
+        ),
+        (text.replace("velocity_servo", "velocity"), vec!["velocity", "known are static_map"]),
+    ] {
+        std::fs::write(site.config(), wrong).unwrap();
+        // Each process refuses what it reads; the first three are read by the servo.
+        let role = if words[0] == "velocity" { "controller" } else { "servo" };
+        let out = run(&mut site.command(role));
+        let error = String::from_utf8_lossy(&out.stderr);
+        assert!(!out.status.success(), "{error}");
+        assert!(words.iter().all(|w| error.contains(w)) && error.contains("kort.toml"), "{error}");
+    }
+}
