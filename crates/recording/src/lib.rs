@@ -1,1 +1,21 @@
-//! Recordings with SI columns: read, write, map foreign logs.
+//! Recordings with SI columns: read, write, and map foreign logs.
+//!
+//! A recording is a table over strictly increasing `time_s`; every other column holds a number or
+//! NaN for "not sampled then". Files are CSV (plain or gzip) or MCAP, recognised by content. A log
+//! with other names or units comes in through a [`ColumnMap`]; nothing is guessed.
+//!
+//! [`Recording::decode`] takes any reader and opens nothing itself; [`Recording::read`] is the
+//! same for a path.
+
+mod assemble;
+pub mod columns;
+mod error;
+pub mod formats;
+pub mod map;
+mod recording;
+pub mod units;
+
+pub use error::{Place, Problem, RecordingError};
+pub use formats::{Format, Writer};
+pub use map::{ColumnMap, MapError};
+pub use recording::{Column, Gap, Recording};

@@ -1,0 +1,291 @@
+//! From rows of a file to a recording: names, units, time, maps. The same for every format.
+
+use crate::columns::{self, nearest};
+use crate::error::{Place, Problem};
+use crate::map::{ColumnMap, Mapped, Time};
+use crate::recording::{Column, Recording};
+
+/// One cell as a format has it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Cell<'a> {
+    /// Not sampled then.
+    Empty,
+    /// Text yet to be read.
+    Text(&'a str),
+    /// A number.
+    Number(f64),
+}
+
+/// A point of a settled table shows its measured values this far into its hold.
+const SETTLED_AT: f64 = 0.95;
+
+/// Takes rows one by one.
+pub(crate) struct Assembler<'m> {
+    source: Vec<String>,
+    time: TimeColumn,
+    select: Option<(usize, &'m str, Vec<String>)>,
+    takes: Vec<Take<'m>>,
+    recording: Recording,
+    last_time: Option<f64>,
+    stale_rows: u64,
+    rows: usize,
+    row: Vec<f64>,
+}
+
+enum TimeColumn {
+    Stamps { index: usize, to_s: f64, drop_stale: bool },
+    Settled { settle_s: f64 },
+}
+
+/// One column to fill, from one source column.
+struct Take<'m> {
+    index: usize,
+    how: Option<&'m Mapped>,
+    sign_of: Option<(usize, f64)>,
+    command: bool,
+}
+
+impl<'m> Assembler<'m> {
+    pub(crate) fn new(name: &str, source: Vec<String>, map: Option<&'m ColumnMap>) -> Result<Self, Problem> {
+        check_header(&source)?;
+        let mut recording = Recording { name: name.into(), ..Recording::default() };
+        let (time, select, takes) = match map {
+            Some(map) => mapped(&source, map, &mut recording)?,
+            None => native(&source, &mut recording)?,
+        };
+        Ok(Self {
+            row: Vec::with_capacity(takes.len()),
+            source,
+            time,
+            select,
+            takes,
+            recording,
+            last_time: None,
+            stale_rows: 0,
+            rows: 0,
+        })
+    }
+
+    /// Takes one row; `cell(i)` is the row's cell of source column `i`.
+    pub(crate) fn push<'c>(&mut self, place: Place, cell: impl Fn(usize) -> Cell<'c>) -> Result<(), Problem> {
+        if let Some((index, wanted, seen)) = &mut self.select {
+            let text = match cell(*index) {
+                Cell::Text(text) => text.to_string(),
+                Cell::Number(x) => x.to_string(),
+                Cell::Empty => String::new(),
+            };
+            if text != *wanted {
+                if seen.len() < 40 && !seen.contains(&text) {
+                    seen.push(text);
+                }
+                return Ok(());
+            }
+        }
+        let time_s = match &self.time {
+            TimeColumn::Settled { settle_s } => self.rows as f64 * settle_s,
+            TimeColumn::Stamps { index, to_s, drop_stale } => {
+                let raw = self.number(place, *index, cell(*index))?;
+                if raw.is_nan() {
+                    return Err(Problem::TimeEmpty { place, column: self.source[*index].clone() });
+                }
+                if let Some(before) = self.last_time.filter(|before| raw <= *before) {
+                    if *drop_stale {
+                        self.stale_rows += 1;
+                        return Ok(());
+                    }
+                    let column = self.source[*index].clone();
+                    return Err(Problem::TimeNotIncreasing { place, column, before, value: raw });
+                }
+                self.last_time = Some(raw);
+                raw * to_s
+            }
+        };
+        self.row.clear();
+        for take in &self.takes {
+            let mut value = self.number(place, take.index, cell(take.index))?;
+            if let Some(how) = take.how {
+                value = how.apply(value);
+            }
+            if let Some((index, zero)) = take.sign_of {
+                let side = self.number(place, index, cell(index))? - zero;
+                value *= if side == 0.0 { 0.0 } else { side.signum() };
+            }
+            self.row.push(value);
+        }
+        self.rows += 1;
+        match self.time {
+            TimeColumn::Stamps { .. } => self.append(time_s, true),
+            TimeColumn::Settled { settle_s } => {
+                self.append(time_s, false);
+                self.append(time_s + SETTLED_AT * settle_s, true);
+            }
+        }
+        Ok(())
+    }
+
+    fn append(&mut self, time_s: f64, measured: bool) {
+        self.recording.time_s.push(time_s);
+        for ((column, take), value) in self.recording.columns.iter_mut().zip(&self.takes).zip(&self.row) {
+            column.values.push(if measured || take.command { *value } else { f64::NAN });
+        }
+    }
+
+    fn number(&self, place: Place, index: usize, cell: Cell<'_>) -> Result<f64, Problem> {
+        let text = match cell {
+            Cell::Empty => return Ok(f64::NAN),
+            Cell::Number(x) if x.is_finite() => return Ok(x),
+            Cell::Number(x) => {
+                return Err(Problem::NotFinite {
+                    place,
+                    column: self.source[index].clone(),
+                    text: x.to_string(),
+                });
+            }
+            Cell::Text(text) => text.trim(),
+        };
+        if text.is_empty() {
+            return Ok(f64::NAN);
+        }
+        let column = || self.source[index].clone();
+        match text.parse::<f64>() {
+            Ok(x) if x.is_finite() => Ok(x),
+            Ok(_) => Err(Problem::NotFinite { place, column: column(), text: text.into() }),
+            Err(_) => {
+                let text = text.chars().take(40).collect();
+                Err(Problem::NotANumber { place, column: column(), text })
+            }
+        }
+    }
+
+    /// Ends the recording; `losses` are those of the format.
+    pub(crate) fn finish(mut self, losses: Vec<String>) -> Result<Recording, Problem> {
+        if let Some((index, wanted, mut seen)) = self.select.take().filter(|_| self.rows == 0) {
+            seen.sort();
+            let column = self.source[index].clone();
+            return Err(Problem::NothingSelected { column, wanted: wanted.into(), found: list(&seen) });
+        }
+        if self.rows < 2 {
+            return Err(Problem::TooFewRows { found: self.rows });
+        }
+        let mut recording = self.recording;
+        recording.losses = losses;
+        if self.stale_rows > 0 {
+            let rows = self.stale_rows;
+            recording.losses.push(format!("{rows} row(s) with a stale time stamp skipped"));
+        }
+        if matches!(self.time, TimeColumn::Stamps { .. }) {
+            note_gaps(&mut recording);
+        }
+        for column in &recording.columns {
+            if column.samples() == 0 {
+                recording.notes.push(format!("column `{}` has no sample", column.name));
+            }
+        }
+        Ok(recording)
+    }
+}
+
+fn note_gaps(recording: &mut Recording) {
+    let gaps = recording.gaps();
+    if let Some(longest) = gaps.iter().max_by(|a, b| (a.to_s - a.from_s).total_cmp(&(b.to_s - b.from_s))) {
+        recording.notes.push(format!(
+            "{} gap(s) in time, the longest from {} to {} s (rows are usually {:.4} s apart)",
+            gaps.len(),
+            longest.from_s,
+            longest.to_s,
+            recording.period_s(),
+        ));
+    }
+}
+
+fn check_header(source: &[String]) -> Result<(), Problem> {
+    let mut seen = std::collections::HashMap::with_capacity(source.len());
+    for (i, name) in source.iter().enumerate() {
+        if name.is_empty() {
+            return Err(Problem::UnnamedColumn { position: i + 1 });
+        }
+        if let Some(first) = seen.insert(name, i + 1) {
+            return Err(Problem::DuplicateColumn { column: name.clone(), first, second: i + 1 });
+        }
+    }
+    Ok(())
+}
+
+fn list(names: &[String]) -> String {
+    let shown: Vec<&str> = names.iter().take(30).map(String::as_str).collect();
+    let more = if names.len() > shown.len() { ", …" } else { "" };
+    format!("{}{more}", shown.join(", "))
+}
+
+type Plan<'m> = (TimeColumn, Option<(usize, &'m str, Vec<String>)>, Vec<Take<'m>>);
+
+/// Our own names.
+fn native<'m>(source: &[String], recording: &mut Recording) -> Result<Plan<'m>, Problem> {
+    let Some(time) = source.iter().position(|n| n == "time_s") else {
+        let hint = match source {
+            [one] if one.contains([';', '\t']) => {
+                "cells must be parted by commas, not by semicolons or tabs".into()
+            }
+            _ => match nearest("time_s", source.iter().map(String::as_str)) {
+                Some(near) => format!(
+                    "if `{near}` is time in seconds, rename it to time_s; a log with other names or units comes in through a column map (--columns NAME)"
+                ),
+                None => {
+                    "a log with other names or units comes in through a column map (--columns NAME)".into()
+                }
+            },
+        };
+        return Err(Problem::MissingTime { wanted: "time_s".into(), found: list(source), hint });
+    };
+    let mut takes = Vec::with_capacity(source.len());
+    for (index, name) in source.iter().enumerate().filter(|(i, _)| *i != time) {
+        if let Some(near) = columns::unit_missing(name) {
+            let allowed = near.map_or("allowed: a name that ends in its SI unit".into(), |k| {
+                format!("allowed: `{}` in {}", k.name, k.unit)
+            });
+            return Err(Problem::UnitMissing { column: name.clone(), allowed });
+        }
+        recording.columns.push(Column::new(name.as_str(), Vec::new()));
+        takes.push(Take { index, how: None, sign_of: None, command: false });
+    }
+    Ok((TimeColumn::Stamps { index: time, to_s: 1.0, drop_stale: false }, None, takes))
+}
+
+/// A foreign log through its map.
+fn mapped<'m>(source: &[String], map: &'m ColumnMap, recording: &mut Recording) -> Result<Plan<'m>, Problem> {
+    let mut used = vec![false; source.len()];
+    let mut find = |name: &str| {
+        let Some(index) = source.iter().position(|n| n == name) else {
+            let hint = match nearest(name, source.iter().map(String::as_str)) {
+                Some(near) => format!("did you mean `{near}`? Correct the map or choose another"),
+                None => "is this the right map for this log?".into(),
+            };
+            let (map, column) = (map.name.clone(), name.to_string());
+            return Err(Problem::MappedColumnMissing { map, column, found: list(source), hint });
+        };
+        used[index] = true;
+        Ok(index)
+    };
+    let time = match &map.time {
+        Time::Column { source, to_s, drop_stale } => {
+            TimeColumn::Stamps { index: find(source)?, to_s: *to_s, drop_stale: *drop_stale }
+        }
+        Time::Settled { settle_s } => TimeColumn::Settled { settle_s: *settle_s },
+    };
+    let select = match &map.select {
+        Some(select) => Some((find(&select.source)?, select.value.as_str(), Vec::new())),
+        None => None,
+    };
+    let mut takes = Vec::with_capacity(map.columns.len());
+    for column in &map.columns {
+        let sign_of = match &column.sign_of {
+            Some((source, zero)) => Some((find(source)?, *zero)),
+            None => None,
+        };
+        let command = column.name.contains("_cmd");
+        takes.push(Take { index: find(&column.source)?, how: Some(column), sign_of, command });
+        recording.columns.push(Column::new(column.name.as_str(), Vec::new()));
+    }
+    recording.unused = source.iter().zip(&used).filter(|(_, used)| !**used).map(|(n, _)| n.clone()).collect();
+    Ok((time, select, takes))
+}

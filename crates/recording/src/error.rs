@@ -1,0 +1,231 @@
+//! Why a recording cannot be used: file, place, value found, what is allowed, and a hint.
+
+use std::fmt;
+
+use thiserror::Error;
+
+/// An unusable recording.
+#[derive(Debug, Error, Clone, PartialEq)]
+#[error("{file}: {problem}\nhint: {}", problem.hint())]
+pub struct RecordingError {
+    /// The file's path, or the recording's name.
+    pub file: String,
+    /// What is wrong with it.
+    pub problem: Problem,
+}
+
+impl RecordingError {
+    pub(crate) fn new(file: &str, problem: Problem) -> Self {
+        Self { file: file.into(), problem }
+    }
+}
+
+/// Where in a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// Line of a CSV file; the header is line 1.
+    Line(u64),
+    /// Message of an MCAP file, from 1.
+    Message(u64),
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Place::Line(n) => write!(f, "line {n}"),
+            Place::Message(n) => write!(f, "message {n}"),
+        }
+    }
+}
+
+/// What is wrong with a recording.
+#[derive(Debug, Error, Clone, PartialEq)]
+pub enum Problem {
+    /// The file cannot be opened or read.
+    #[error("cannot be read: {message}")]
+    Unreadable {
+        /// The system's words.
+        message: String,
+    },
+    /// The name of a file to write ends in nothing kort writes.
+    #[error("file name ends in {found}; allowed: .csv, .csv.gz or .mcap")]
+    UnknownFormat {
+        /// The ending found.
+        found: String,
+    },
+    /// Nothing in it.
+    #[error("is empty; a recording has a header row and at least two rows")]
+    Empty,
+    /// Bytes that are no text.
+    #[error("{place} is not UTF-8 text; allowed: CSV in UTF-8 (plain or gzip), or MCAP")]
+    NotUtf8 {
+        /// Where.
+        place: Place,
+    },
+    /// A header name twice.
+    #[error("column `{column}` stands twice in the header, at positions {first} and {second}")]
+    DuplicateColumn {
+        /// The name.
+        column: String,
+        /// First position, from 1.
+        first: usize,
+        /// Second position, from 1.
+        second: usize,
+    },
+    /// A header cell without a name.
+    #[error("the header's position {position} has no name")]
+    UnnamedColumn {
+        /// Position, from 1.
+        position: usize,
+    },
+    /// No time column.
+    #[error("column `{wanted}` is missing; found: {found}")]
+    MissingTime {
+        /// The time column looked for.
+        wanted: String,
+        /// The columns there are.
+        found: String,
+        /// What to do.
+        hint: String,
+    },
+    /// A column of ours whose unit is missing or another.
+    #[error("column `{column}` has no SI unit at the end of its name; {allowed}")]
+    UnitMissing {
+        /// The column.
+        column: String,
+        /// What would be allowed.
+        allowed: String,
+    },
+    /// A row of another length than the header.
+    #[error("{place} has {found} cells, the header has {expected}")]
+    RowLength {
+        /// Where.
+        place: Place,
+        /// Cells found.
+        found: u64,
+        /// Cells in the header.
+        expected: u64,
+    },
+    /// A row without its instant.
+    #[error("{place}, column `{column}` is empty; every row needs its time")]
+    TimeEmpty {
+        /// Where.
+        place: Place,
+        /// The time column.
+        column: String,
+    },
+    /// Time stands still or runs back.
+    #[error("{place}: `{column}` = {value} does not come after {before}; time must be strictly increasing")]
+    TimeNotIncreasing {
+        /// Where.
+        place: Place,
+        /// The time column.
+        column: String,
+        /// Time of the row before.
+        before: f64,
+        /// Time found.
+        value: f64,
+    },
+    /// A cell that is no number.
+    #[error(
+        "{place}, column `{column}`: \"{text}\" is not a number; allowed: a finite decimal number, or an empty cell for \"not sampled then\""
+    )]
+    NotANumber {
+        /// Where.
+        place: Place,
+        /// Which column.
+        column: String,
+        /// The cell.
+        text: String,
+    },
+    /// NaN or infinity written out.
+    #[error(
+        "{place}, column `{column}`: \"{text}\" is not finite; allowed: a finite decimal number, or an empty cell for \"not sampled then\""
+    )]
+    NotFinite {
+        /// Where.
+        place: Place,
+        /// Which column.
+        column: String,
+        /// The cell.
+        text: String,
+    },
+    /// Not enough rows.
+    #[error("{found} row(s) of data; at least 2 are needed")]
+    TooFewRows {
+        /// Rows found.
+        found: usize,
+    },
+    /// A column map names a column that the file does not have.
+    #[error("column map `{map}` wants the column `{column}`, which the file does not have; found: {found}")]
+    MappedColumnMissing {
+        /// The map.
+        map: String,
+        /// The source column.
+        column: String,
+        /// The columns there are.
+        found: String,
+        /// What to do.
+        hint: String,
+    },
+    /// No row has the selected value.
+    #[error("no row has `{column}` = \"{wanted}\"; found: {found}")]
+    NothingSelected {
+        /// The column selected by.
+        column: String,
+        /// The value asked for.
+        wanted: String,
+        /// The values there are.
+        found: String,
+    },
+    /// An MCAP file without a usable channel.
+    #[error("no channel holds numbers kort can read: {found}; allowed: message encoding \"json\"")]
+    NoChannel {
+        /// The channels there are.
+        found: String,
+    },
+    /// Broken MCAP.
+    #[error("not a readable MCAP file: {message}")]
+    Mcap {
+        /// The reader's words.
+        message: String,
+    },
+}
+
+impl Problem {
+    /// The way out.
+    pub fn hint(&self) -> String {
+        match self {
+            Problem::Unreadable { .. } => "check the path and that the file may be read".into(),
+            Problem::UnknownFormat { .. } => "name the file REC.csv, REC.csv.gz or REC.mcap".into(),
+            Problem::Empty => "was the logger stopped before its first row?".into(),
+            Problem::NotUtf8 { .. } => {
+                "save the log as CSV in UTF-8; a spreadsheet or another log format must be exported first".into()
+            }
+            Problem::DuplicateColumn { .. } => "rename or remove one of the two".into(),
+            Problem::UnnamedColumn { .. } => {
+                "name it, or remove the column; an extra comma at the end of the header is one".into()
+            }
+            Problem::MissingTime { hint, .. } | Problem::MappedColumnMissing { hint, .. } => hint.clone(),
+            Problem::UnitMissing { .. } => {
+                "rename the column if its values are in that unit; otherwise bring the log in with a column map (--columns NAME), which states the unit"
+                    .into()
+            }
+            Problem::RowLength { .. } => {
+                "cells are parted by commas; a decimal comma or a comma in a text must be quoted".into()
+            }
+            Problem::TimeEmpty { .. } => "fill in the time, or remove the row".into(),
+            Problem::TimeNotIncreasing { .. } => {
+                "sort the rows and remove repeated stamps; separate runs belong in separate files; a column map may say [time] stale_rows = \"drop\"".into()
+            }
+            Problem::NotANumber { .. } => {
+                "a text column can be left out by a column map (--columns NAME)".into()
+            }
+            Problem::NotFinite { .. } => "leave the cell empty if there was no sample".into(),
+            Problem::TooFewRows { .. } => "was the logger stopped too early?".into(),
+            Problem::NothingSelected { .. } => "give the value after the map's name: --columns NAME:VALUE".into(),
+            Problem::NoChannel { .. } => "export the signals with JSON messages, or as CSV".into(),
+            Problem::Mcap { .. } => "a file cut off by a killed process is read up to its last complete chunk; this one has none".into(),
+        }
+    }
+}

@@ -1,0 +1,292 @@
+//! MCAP with JSON messages: one channel, one message a row, a field a column. A file of others may
+//! have several channels; their fields become columns over the common log time.
+
+use std::collections::BTreeMap;
+use std::io::{self, Read, Seek, Write};
+
+use mcap::records::{MessageHeader, Record};
+use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use serde_json::Value;
+
+use crate::assemble::{Assembler, Cell};
+use crate::columns;
+use crate::error::{Place, Problem};
+use crate::map::ColumnMap;
+use crate::recording::Recording;
+use crate::units;
+
+/// No record and no chunk of a sensible file is longer; a broken length must not eat the memory.
+const RECORD_LIMIT: usize = 1 << 30;
+
+/// Decodes from start to end; a file without its end is read up to the last complete chunk.
+pub(super) fn decode(
+    name: &str,
+    mut input: impl Read,
+    map: Option<&ColumnMap>,
+) -> Result<Recording, Problem> {
+    let options = LinearReaderOptions::default()
+        .with_prevalidate_chunk_crcs(true)
+        .with_record_length_limit(RECORD_LIMIT);
+    let mut reader = LinearReader::new_with_options(options);
+    let mut table = Table::default();
+    let mut torn = None;
+    let mut complete = false;
+    while let Some(event) = reader.next_event() {
+        match event {
+            Ok(LinearReadEvent::ReadRequest(need)) => match input.read(reader.insert(need)) {
+                Ok(n) => reader.notify_read(n),
+                Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
+                Err(e) => {
+                    torn = Some(e.to_string());
+                    break;
+                }
+            },
+            Ok(LinearReadEvent::Record { opcode, data }) => {
+                complete |= opcode == mcap::records::op::DATA_END;
+                match mcap::parse_record(opcode, data) {
+                    Ok(record) => table.take(record)?,
+                    Err(e) => return Err(Problem::Mcap { message: e.to_string() }),
+                }
+            }
+            Err(e) => {
+                torn = Some(e.to_string());
+                break;
+            }
+        }
+    }
+    let mut losses = Vec::new();
+    if let (Some(why), false) = (torn, complete) {
+        if table.rows.is_empty() {
+            return Err(Problem::Mcap { message: why });
+        }
+        losses.push(format!(
+            "the file is cut off ({why}); read up to its last complete chunk: {} messages; what followed is lost",
+            table.messages
+        ));
+    }
+    if table.bad_messages > 0 {
+        losses.push(format!("{} message(s) are no JSON objects and were skipped", table.bad_messages));
+    }
+    table.assemble(name, map, losses)
+}
+
+/// Messages as rows over (channel, field) columns.
+#[derive(Default)]
+struct Table {
+    topics: BTreeMap<u16, String>,
+    other_topics: Vec<String>,
+    fields: Vec<(u16, String)>,
+    places: BTreeMap<(u16, String), usize>,
+    rows: Vec<Row>,
+    messages: u64,
+    bad_messages: u64,
+}
+
+/// Numbers of one instant, by field.
+struct Row {
+    log_time_ns: u64,
+    message: u64,
+    cells: Vec<(usize, f64)>,
+}
+
+impl Table {
+    fn take(&mut self, record: Record<'_>) -> Result<(), Problem> {
+        match record {
+            Record::Channel(channel) => {
+                if channel.message_encoding == "json" {
+                    self.topics.insert(channel.id, channel.topic);
+                } else {
+                    let other = format!("{} ({})", channel.topic, channel.message_encoding);
+                    if !self.other_topics.contains(&other) {
+                        self.other_topics.push(other);
+                    }
+                }
+            }
+            Record::Message { header, data } if self.topics.contains_key(&header.channel_id) => {
+                self.messages += 1;
+                match serde_json::from_slice(&data) {
+                    Ok(Value::Object(fields)) => {
+                        let mut cells = Vec::with_capacity(fields.len());
+                        for (name, value) in fields {
+                            self.flatten(header.channel_id, name, value, &mut cells);
+                        }
+                        self.place(header.log_time, cells);
+                    }
+                    _ => self.bad_messages += 1,
+                }
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// Numbers and switches become cells; nested objects are joined with a dot; texts and lists
+    /// are no signals.
+    fn flatten(&mut self, channel: u16, name: String, value: Value, cells: &mut Vec<(usize, f64)>) {
+        let number = match value {
+            Value::Number(n) => n.as_f64(),
+            Value::Bool(b) => Some(f64::from(u8::from(b))),
+            Value::Null => Some(f64::NAN),
+            Value::Object(fields) => {
+                for (inner, value) in fields {
+                    self.flatten(channel, format!("{name}.{inner}"), value, cells);
+                }
+                None
+            }
+            Value::String(_) | Value::Array(_) => None,
+        };
+        let Some(number) = number else { return };
+        let next = self.fields.len();
+        let key = (channel, name);
+        let place = *self.places.entry(key.clone()).or_insert(next);
+        if place == next {
+            self.fields.push(key);
+        }
+        cells.push((place, number));
+    }
+
+    /// Messages of several channels with one log time are one row.
+    fn place(&mut self, log_time_ns: u64, cells: Vec<(usize, f64)>) {
+        if let Some(last) = self.rows.last_mut().filter(|r| r.log_time_ns == log_time_ns) {
+            if cells.iter().all(|(place, _)| last.cells.iter().all(|(there, _)| there != place)) {
+                last.cells.extend(cells);
+                return;
+            }
+        }
+        self.rows.push(Row { log_time_ns, message: self.messages, cells });
+    }
+
+    fn assemble(
+        mut self,
+        name: &str,
+        map: Option<&ColumnMap>,
+        losses: Vec<String>,
+    ) -> Result<Recording, Problem> {
+        if self.fields.is_empty() {
+            let found =
+                if self.other_topics.is_empty() { "none".into() } else { self.other_topics.join(", ") };
+            return Err(Problem::NoChannel { found });
+        }
+        let mut names = self.column_names();
+        let stamped = names.iter().any(|n| n == "time_s");
+        if !stamped {
+            // Foreign file: the log time is the instant, from the first message on.
+            self.rows.sort_by_key(|r| r.log_time_ns);
+            let start = self.rows.first().map_or(0, |r| r.log_time_ns);
+            let place = names.len();
+            names.push("time_s".into());
+            for row in &mut self.rows {
+                row.cells.push((place, (row.log_time_ns - start) as f64 * 1e-9));
+            }
+        }
+        let mut line = vec![f64::NAN; names.len()];
+        let mut rows = Assembler::new(name, names, map)?;
+        for row in self.rows {
+            line.fill(f64::NAN);
+            for (place, value) in row.cells {
+                line[place] = value;
+            }
+            rows.push(Place::Message(row.message), |i| match line[i] {
+                x if x.is_nan() => Cell::Empty,
+                x => Cell::Number(x),
+            })?;
+        }
+        let mut recording = rows.finish(losses)?;
+        if !self.other_topics.is_empty() {
+            recording.notes.push(format!(
+                "channels without JSON messages are left out: {}",
+                self.other_topics.join(", ")
+            ));
+        }
+        Ok(recording)
+    }
+
+    /// Field names; with the topic in front where two channels have the same field.
+    fn column_names(&self) -> Vec<String> {
+        self.fields
+            .iter()
+            .map(|(channel, field)| {
+                if self.fields.iter().filter(|(_, other)| other == field).count() < 2 {
+                    return field.clone();
+                }
+                let topic = self.topics.get(channel).map_or("", String::as_str);
+                format!("{}.{field}", topic.trim_start_matches('/'))
+            })
+            .collect()
+    }
+}
+
+/// Writes rows as JSON messages of one channel.
+pub(super) struct Rows<W: Write + Seek> {
+    writer: mcap::Writer<W>,
+    channel_id: u16,
+    columns: Vec<String>,
+    sequence: u32,
+    message: Vec<u8>,
+}
+
+impl<W: Write + Seek> Rows<W> {
+    pub(super) fn create(topic: &str, columns: &[&str], output: W) -> io::Result<Self> {
+        let mut writer = mcap::WriteOptions::new()
+            .library(concat!("kort ", env!("CARGO_PKG_VERSION")))
+            .compression(Some(mcap::Compression::Zstd))
+            .compression_threads(0)
+            .create(output)
+            .map_err(io::Error::other)?;
+        let schema = schema(columns).to_string();
+        let schema_id = writer
+            .add_schema("kort.recording/1", "jsonschema", schema.as_bytes())
+            .map_err(io::Error::other)?;
+        let topic = if topic.starts_with('/') { topic.to_string() } else { format!("/{topic}") };
+        let channel_id =
+            writer.add_channel(schema_id, &topic, "json", &BTreeMap::new()).map_err(io::Error::other)?;
+        let columns = columns.iter().map(|c| c.to_string()).collect();
+        Ok(Self { writer, channel_id, columns, sequence: 0, message: Vec::new() })
+    }
+
+    /// A column not sampled in this row is left out of the message.
+    pub(super) fn row(&mut self, time_s: f64, values: &[f64]) -> io::Result<()> {
+        self.message.clear();
+        write!(self.message, "{{\"time_s\":")?;
+        serde_json::to_writer(&mut self.message, &time_s)?;
+        for (name, value) in self.columns.iter().zip(values).filter(|(_, v)| !v.is_nan()) {
+            self.message.push(b',');
+            serde_json::to_writer(&mut self.message, name)?;
+            self.message.push(b':');
+            serde_json::to_writer(&mut self.message, value)?;
+        }
+        self.message.push(b'}');
+        // A recording that starts before zero keeps its order only in time_s.
+        let log_time = (time_s.max(0.0) * 1e9).round() as u64;
+        let header = MessageHeader {
+            channel_id: self.channel_id,
+            sequence: self.sequence,
+            log_time,
+            publish_time: log_time,
+        };
+        self.sequence = self.sequence.wrapping_add(1);
+        self.writer.write_to_known_channel(&header, &self.message).map_err(io::Error::other)
+    }
+
+    pub(super) fn flush(&mut self) -> io::Result<()> {
+        self.writer.flush().map_err(io::Error::other)
+    }
+
+    pub(super) fn finish(mut self) -> io::Result<()> {
+        self.writer.finish().map_err(io::Error::other)?;
+        self.writer.into_inner().flush()
+    }
+}
+
+/// JSON schema of a message, so that Foxglove lists the signals with unit and meaning.
+fn schema(columns: &[&str]) -> Value {
+    let about = |name: &str| match columns::find(name) {
+        Some(known) => format!("{} [{}]", known.meaning, known.unit),
+        None => units::of_column(name).map_or("1".into(), |u| u.symbol.to_string()),
+    };
+    let properties: serde_json::Map<String, Value> = std::iter::once(&"time_s")
+        .chain(columns)
+        .map(|name| ((*name).to_string(), serde_json::json!({"type": "number", "description": about(name)})))
+        .collect();
+    serde_json::json!({"type": "object", "title": "kort.recording/1", "properties": properties, "required": ["time_s"]})
+}

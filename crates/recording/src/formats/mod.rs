@@ -1,0 +1,177 @@
+//! File formats, recognised by content when read and by the file's name when written.
+
+mod csv;
+mod mcap;
+
+use std::io::{self, BufRead, Seek, Write};
+use std::path::Path;
+
+use flate2::Compression;
+use flate2::read::MultiGzDecoder;
+use flate2::write::GzEncoder;
+
+use crate::error::{Problem, RecordingError};
+use crate::map::ColumnMap;
+use crate::recording::Recording;
+
+const GZIP: &[u8] = &[0x1f, 0x8b];
+
+/// Decodes by content.
+pub(crate) fn decode(
+    name: &str,
+    mut input: impl BufRead,
+    map: Option<&ColumnMap>,
+) -> Result<Recording, Problem> {
+    let start = input.fill_buf().map_err(unreadable)?;
+    if start.is_empty() {
+        Err(Problem::Empty)
+    } else if start.starts_with(GZIP) {
+        decode_plain(name, io::BufReader::with_capacity(1 << 16, MultiGzDecoder::new(input)), map)
+    } else {
+        decode_plain(name, input, map)
+    }
+}
+
+fn decode_plain(name: &str, mut input: impl BufRead, map: Option<&ColumnMap>) -> Result<Recording, Problem> {
+    let start = input.fill_buf().map_err(unreadable)?;
+    if start.is_empty() {
+        Err(Problem::Empty)
+    } else if start.starts_with(::mcap::MAGIC) {
+        mcap::decode(name, input, map)
+    } else {
+        csv::decode(name, input, map)
+    }
+}
+
+fn unreadable(error: io::Error) -> Problem {
+    Problem::Unreadable { message: error.to_string() }
+}
+
+/// A format to write.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// CSV, RFC 4180.
+    Csv,
+    /// CSV, gzip.
+    CsvGz,
+    /// MCAP with JSON messages.
+    Mcap,
+}
+
+impl Format {
+    /// The format that a file's name asks for.
+    ///
+    /// # Errors
+    /// The name ends in none of `.csv`, `.csv.gz`, `.mcap`.
+    pub fn of(path: &Path) -> Result<Self, RecordingError> {
+        let name = path.to_string_lossy().to_lowercase();
+        match () {
+            () if name.ends_with(".csv") => Ok(Format::Csv),
+            () if name.ends_with(".csv.gz") => Ok(Format::CsvGz),
+            () if name.ends_with(".mcap") => Ok(Format::Mcap),
+            () => {
+                let found =
+                    path.extension().map_or("nothing".into(), |e| format!("\".{}\"", e.to_string_lossy()));
+                Err(RecordingError::new(&path.display().to_string(), Problem::UnknownFormat { found }))
+            }
+        }
+    }
+}
+
+/// Writes a recording row by row, so that a live recorder and a simulation need not hold it.
+pub struct Writer<W: Write + Seek>(Kind<W>);
+
+enum Kind<W: Write + Seek> {
+    Csv(csv::Rows<W>),
+    CsvGz(Box<csv::Rows<GzEncoder<W>>>),
+    Mcap(Box<mcap::Rows<W>>),
+}
+
+impl<W: Write + Seek> Writer<W> {
+    /// Starts a recording with these columns beside `time_s`. `topic` names the MCAP channel.
+    ///
+    /// # Errors
+    /// The output cannot be written.
+    pub fn create(format: Format, topic: &str, columns: &[&str], output: W) -> io::Result<Self> {
+        Ok(Self(match format {
+            Format::Csv => Kind::Csv(csv::Rows::create(columns, output)?),
+            Format::CsvGz => {
+                let output = GzEncoder::new(output, Compression::default());
+                Kind::CsvGz(Box::new(csv::Rows::create(columns, output)?))
+            }
+            Format::Mcap => Kind::Mcap(Box::new(mcap::Rows::create(topic, columns, output)?)),
+        }))
+    }
+
+    /// Writes a row; `values` are in the order of the columns, NaN means "not sampled then".
+    ///
+    /// # Errors
+    /// The output cannot be written.
+    pub fn row(&mut self, time_s: f64, values: &[f64]) -> io::Result<()> {
+        match &mut self.0 {
+            Kind::Csv(rows) => rows.row(time_s, values),
+            Kind::CsvGz(rows) => rows.row(time_s, values),
+            Kind::Mcap(rows) => rows.row(time_s, values),
+        }
+    }
+
+    /// Brings all rows so far to the output, so that a killed process does not lose them.
+    ///
+    /// # Errors
+    /// The output cannot be written.
+    pub fn flush(&mut self) -> io::Result<()> {
+        match &mut self.0 {
+            Kind::Csv(rows) => rows.flush(),
+            Kind::CsvGz(rows) => rows.flush(),
+            Kind::Mcap(rows) => rows.flush(),
+        }
+    }
+
+    /// Ends the file.
+    ///
+    /// # Errors
+    /// The output cannot be written.
+    pub fn finish(self) -> io::Result<()> {
+        match self.0 {
+            Kind::Csv(rows) => rows.finish().map(drop),
+            Kind::CsvGz(rows) => rows.finish()?.finish().map(drop),
+            Kind::Mcap(rows) => rows.finish(),
+        }
+    }
+}
+
+impl Recording {
+    /// Writes the whole recording.
+    ///
+    /// # Errors
+    /// The output cannot be written.
+    pub fn write(&self, format: Format, output: impl Write + Seek) -> io::Result<()> {
+        let names: Vec<&str> = self.columns.iter().map(|c| c.name.as_str()).collect();
+        let mut writer = Writer::create(format, "kort", &names, output)?;
+        let mut row = vec![f64::NAN; names.len()];
+        for (i, time_s) in self.time_s.iter().enumerate() {
+            for (cell, column) in row.iter_mut().zip(&self.columns) {
+                *cell = column.values[i];
+            }
+            writer.row(*time_s, &row)?;
+        }
+        writer.finish()
+    }
+
+    /// Writes the recording to a file, in the format its name asks for.
+    ///
+    /// # Errors
+    /// The name asks for no known format, or the file cannot be written.
+    pub fn save(&self, path: &Path) -> Result<(), RecordingError> {
+        let format = Format::of(path)?;
+        let fail = |e: io::Error| {
+            let message = format!("(for writing) {e}");
+            RecordingError::new(&path.display().to_string(), Problem::Unreadable { message })
+        };
+        let file = std::fs::File::create(path).map_err(fail)?;
+        self.write(format, io::BufWriter::new(file)).map_err(fail)
+    }
+}
+
+#[cfg(test)]
+mod tests;

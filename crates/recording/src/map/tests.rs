@@ -1,0 +1,64 @@
+use super::*;
+
+const HEAD: &str = "[time]\nsource = \"t\"\nunit = \"ms\"\n";
+
+fn message(text: &str) -> String {
+    ColumnMap::from_toml("m", text).unwrap_err().to_string()
+}
+
+#[test]
+fn a_unit_is_never_guessed() {
+    let error = message(&format!("{HEAD}[columns.shaft_speed_rad_s]\nsource = \"n\""));
+    assert!(
+        error.contains("columns.shaft_speed_rad_s.unit is missing") && error.contains("hint:"),
+        "{error}"
+    );
+    let error = message("[time]\nsource = \"t\"\n[columns.thrust_n]\nsource = \"f\"\nunit = \"N\"");
+    assert!(error.contains("time.unit is missing"), "{error}");
+}
+
+#[test]
+fn a_unit_of_another_kind_is_refused() {
+    let error = message(&format!("{HEAD}[columns.shaft_speed_rad_s]\nsource = \"n\"\nunit = \"N\""));
+    assert!(error.contains("rad/s") && error.contains("\"rpm\""), "{error}");
+    let error = message(&format!("{HEAD}[columns.thrust]\nsource = \"n\"\nunit = \"N\""));
+    assert!(error.contains("thrust_n"), "{error}");
+}
+
+#[test]
+fn bad_numbers_and_keys_are_named() {
+    for (line, word) in [
+        ("sign = 2", "sign = 2"),
+        ("scale = 0", "scale = 0"),
+        ("offset = nan", "offset"),
+        ("table = [[1, 2]]", "table"),
+        ("table = [[2, 2], [1, 0]]", "table"),
+        ("sign_zero = 3", "sign_of"),
+        ("scael = 3", "scael"),
+    ] {
+        let error = message(&format!("{HEAD}[columns.thrust_n]\nsource = \"f\"\nunit = \"N\"\n{line}"));
+        assert!(error.contains(word), "{line}: {error}");
+    }
+}
+
+#[test]
+fn values_go_through_table_scale_offset_sign_and_unit() {
+    let text = format!(
+        "{HEAD}[columns.thrust_n]\nsource = \"pwm\"\nunit = \"kgf\"\nsign = -1\nscale = 2\noffset = 1\ntable = [[0, 0], [10, 5]]"
+    );
+    let map = ColumnMap::from_toml("m", &text).unwrap();
+    let value = map.columns[0].apply(4.0);
+    assert!((value + 5.0 * 9.806_65).abs() < 1e-9, "{value}");
+    assert!((map.columns[0].apply(99.0) + 11.0 * 9.806_65).abs() < 1e-9, "held at the end");
+}
+
+#[test]
+fn every_shipped_map_reads() {
+    for name in ColumnMap::shipped() {
+        let map = ColumnMap::find(name).unwrap();
+        assert!(!map.description.is_empty(), "{name}: says where the log comes from");
+    }
+    let error = ColumnMap::find("quarter-drone").unwrap_err().to_string();
+    assert!(error.contains("quarter_drone"), "{error}");
+    assert!(ColumnMap::find("quarter_drone:x").is_err(), "has no runs to choose from");
+}
