@@ -1,0 +1,190 @@
+//! Sizes: scales of a run, strength of an effect as a share of full scale, what a re-fit absorbs.
+
+use crate::dynamics::Scale;
+use crate::hidden::Hidden;
+use crate::refit;
+use crate::stand::{ROWS_PER_FLOW, Rows, Stand};
+use crate::thruster::Thruster;
+
+/// Integration steps a tick while sizing; the recording itself takes [`FINE_STEPS`].
+const COARSE_STEPS: usize = 4;
+/// Integration steps a tick of a recording: 0.2 ms.
+pub const FINE_STEPS: usize = 10;
+
+/// Channels that a size is measured on, with the noise they carry over their largest value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Channels {
+    /// Thrust is recorded.
+    pub thrust: bool,
+    /// Torque is recorded.
+    pub torque: bool,
+    /// Flow is recorded.
+    pub flow: bool,
+    /// Current is recorded.
+    pub current: bool,
+    /// Supply voltage is recorded.
+    pub supply: bool,
+}
+
+/// One experiment whose sizes are asked for.
+pub struct Experiment<'a> {
+    /// True thruster.
+    pub thruster: &'a Thruster,
+    /// Command, a value a tick, A.
+    pub command_a: &'a [f64],
+    /// Recorded channels.
+    pub channels: Channels,
+    /// Largest values without hidden physics.
+    pub scale: Scale,
+    clean: Rows,
+}
+
+/// Response channels as (name, values, noise over full scale), flow at its own rate.
+fn responses(rows: &Rows, channels: Channels) -> Vec<(&'static str, Vec<f64>, f64)> {
+    let mut list = vec![("shaft_speed_rad_s", rows.speed_rad_s.clone(), 0.0013)];
+    if channels.thrust {
+        list.push(("thrust_n", rows.thrust_n.clone(), 0.005));
+    }
+    if channels.torque {
+        list.push(("torque_n_m", rows.torque_n_m.clone(), 0.008));
+    }
+    if channels.flow {
+        list.push(("flow_m_s", rows.flow_m_s.iter().step_by(ROWS_PER_FLOW).copied().collect(), 0.019));
+    }
+    list
+}
+
+fn largest(values: &[f64]) -> f64 {
+    values.iter().fold(0.0, |top: f64, value| top.max(value.abs()))
+}
+
+fn rms(values: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let count = values.len().max(1) as f64;
+    (values.map(|value| value * value).sum::<f64>() / count).sqrt()
+}
+
+impl<'a> Experiment<'a> {
+    /// Runs the experiment without hidden physics.
+    pub fn new(thruster: &'a Thruster, command_a: &'a [f64], channels: Channels) -> Self {
+        let unit = Scale { speed_rad_s: 1.0, flow_m_s: 1.0, thrust_n: 1.0, torque_n_m: 1.0 };
+        let clean = smooth(thruster, &Hidden::default(), unit, command_a);
+        let scale = Scale {
+            speed_rad_s: largest(&clean.speed_rad_s),
+            flow_m_s: largest(&clean.flow_m_s),
+            thrust_n: largest(&clean.thrust_n),
+            torque_n_m: largest(&clean.torque_n_m),
+        };
+        Experiment { thruster, command_a, channels, scale, clean }
+    }
+
+    /// Change that `hidden` makes on each channel, over that channel's largest value.
+    fn change(&self, hidden: &Hidden) -> Vec<(&'static str, Vec<f64>, f64)> {
+        let with = responses(&smooth(self.thruster, hidden, self.scale, self.command_a), self.channels);
+        let clean = responses(&self.clean, self.channels);
+        with.into_iter()
+            .zip(clean)
+            .map(|((name, with, noise), (_, clean, _))| {
+                let full = largest(&clean);
+                (name, with.iter().zip(&clean).map(|(w, c)| (w - c) / full).collect(), noise)
+            })
+            .collect()
+    }
+
+    /// Root-mean-square change on the best channel over its full scale, and that channel.
+    pub fn share(&self, hidden: &Hidden) -> (f64, &'static str) {
+        let sizes = self.change(hidden).into_iter().map(|(name, change, _)| (rms(change.into_iter()), name));
+        sizes.fold((0.0, "none"), |best, next| if next.0 > best.0 { next } else { best })
+    }
+
+    /// Strength at which `make(strength)` changes the best channel by `wanted` of its full scale.
+    /// An effect that saturates below that stays at full strength.
+    pub fn strength(&self, wanted: f64, make: impl Fn(f64) -> Hidden) -> f64 {
+        let (mut low, mut high, mut guess): (f64, f64, f64) = (1e-5, 1.0, 0.04);
+        for _ in 0..14 {
+            let (size, _) = self.share(&make(guess));
+            if (size / wanted - 1.0).abs() < 0.03 {
+                break;
+            }
+            if size < wanted {
+                low = guess;
+                if guess >= 0.999 {
+                    break;
+                }
+            } else {
+                high = guess;
+            }
+            let scaled = if size > 0.02 * wanted { guess * (wanted / size).powf(0.8) } else { guess * 5.0 };
+            let inside = scaled > low && scaled < high;
+            guess = if inside {
+                scaled
+            } else if high >= 1.0 && scaled >= 1.0 {
+                1.0
+            } else {
+                (low * high).sqrt()
+            };
+        }
+        guess
+    }
+
+    /// The share of [`Self::share`] that a re-fit of the seven base parameters leaves (linearised,
+    /// channels weighed by their noise, the stated two-sigma tolerances as priors).
+    pub fn visible(&self, hidden: &Hidden, tolerances: &[f64; 7]) -> f64 {
+        let change = self.change(hidden);
+        let weigh = |list: &[(&'static str, Vec<f64>, f64)]| -> Vec<f64> {
+            list.iter().flat_map(|(_, values, noise)| values.iter().map(move |value| value / noise)).collect()
+        };
+        let full: Vec<f64> =
+            responses(&self.clean, self.channels).iter().map(|(_, values, _)| largest(values)).collect();
+        let step = 1e-3;
+        let columns: Vec<Vec<f64>> = (0..7)
+            .map(|index| {
+                let moved = varied(self.thruster, index, 1.0 + step);
+                let moved =
+                    responses(&smooth(&moved, &Hidden::default(), self.scale, self.command_a), self.channels);
+                let clean = responses(&self.clean, self.channels);
+                let slopes: Vec<_> = moved
+                    .into_iter()
+                    .zip(clean)
+                    .zip(&full)
+                    .map(|(((name, m, noise), (_, c, _)), full)| {
+                        (
+                            name,
+                            m.iter().zip(&c).map(|(m, c)| (m - c) / step / full).collect::<Vec<f64>>(),
+                            noise,
+                        )
+                    })
+                    .collect();
+                weigh(&slopes)
+            })
+            .collect();
+        let target = weigh(&change);
+        let precision = tolerances.map(|tol| 2.0 / tol);
+        let absorbed = refit::project(&columns, &target, &precision);
+        let energy = |values: &[f64]| values.iter().map(|value| value * value).sum::<f64>();
+        let rest: Vec<f64> = (0..target.len())
+            .map(|row| target[row] - columns.iter().zip(&absorbed).map(|(c, z)| c[row] * z).sum::<f64>())
+            .collect();
+        self.share(hidden).0 * (energy(&rest) / energy(&target).max(1e-30)).sqrt()
+    }
+}
+
+/// A thruster with one of its seven base parameters scaled.
+fn varied(thruster: &Thruster, index: usize, factor: f64) -> Thruster {
+    let mut t = thruster.clone();
+    match index {
+        0 => t.sections.iter_mut().for_each(|section| section.pitch_rad *= factor),
+        1 => t.section_gain.0 *= factor,
+        2 => t.section_gain.1 *= factor,
+        3 => t.flux_coefficient *= factor,
+        4 => t.added_mass_coefficient *= factor,
+        5 => t.inertia_kg_m2 *= factor,
+        _ => t.torque_constant_nm_a *= factor,
+    }
+    t
+}
+
+fn smooth(thruster: &Thruster, hidden: &Hidden, scale: Scale, command_a: &[f64]) -> Rows {
+    let stand =
+        Stand { thruster, hidden, scale, thrust_full_scale_n: f64::INFINITY, steps_per_tick: COARSE_STEPS };
+    stand.record_smooth(command_a)
+}
