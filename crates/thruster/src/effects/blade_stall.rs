@@ -22,7 +22,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     starts: |_| vec![vec![0.1, 0.17, 1.0], vec![0.1, 0.28, 1.0], vec![0.1, 0.35, 1.0], vec![0.1, 0.28, 4.0]],
     needs: wet,
     build: |values, context| {
-        Box::new(BladeStall { loss: values[0], stall_rad: values[1], lag_m: values[2] * context.parameters.get(P::RadiusM) })
+        Box::new(BladeStall { loss: values[0], stall_rad: values[1], lag_m: values[2] * context.parameters.get(P::RadiusM), tick_s: context.tick_s })
     },
 };
 
@@ -38,6 +38,7 @@ struct BladeStall {
     loss: f64,
     stall_rad: f64,
     lag_m: f64,
+    tick_s: f64,
 }
 
 impl Effect for BladeStall {
@@ -53,8 +54,10 @@ impl Effect for BladeStall {
         foil.lift *= 1.0 - self.loss * own[0];
     }
 
+    /// The lag is never shorter than a tick, which the integrator could not follow.
     fn balance(&self, _: &Local, own: &[f64], balance: &mut Balance, rates: &mut [f64]) {
         let past = (balance.foil.attack_rad().abs() - self.stall_rad) / WIDTH_RAD;
-        rates[0] = balance.foil.speed_m_s / self.lag_m * (super::logistic(past) - own[0]);
+        let speed = balance.foil.speed_m_s;
+        rates[0] = speed / (self.lag_m + speed * self.tick_s) * (super::logistic(past) - own[0]);
     }
 }

@@ -24,15 +24,15 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     separated_by: "the same run at several depths; a voltage limit caps speed but leaves thrust over speed squared alone",
     reference: "physics.md C4",
     parameters,
-    starts: |scale| [1.2, 2.0, 4.0].iter().map(|factor| vec![0.1, onset(scale, *factor)]).collect(),
+    starts: |scale| [1.3, 3.0, 5.0].iter().map(|factor| vec![0.1, onset(scale, *factor)]).collect(),
     needs: wet,
     build: |values, _| Box::new(Cavitation { loss: values[0], onset: values[1] }),
 };
 
 /// Onset at a multiple of the smallest cavitation number in the recording; the speed through the
-/// water at 0.7 radius is taken from the axial flow at a common inflow angle of 0.21 rad.
+/// water at 0.7 radius is taken from the axial flow at a common inflow angle of 0.25 rad.
 fn onset(scale: &Scale, factor: f64) -> f64 {
-    let speed_m_s = scale.flow_m_s / 0.21;
+    let speed_m_s = scale.flow_m_s / 0.25;
     let smallest = (PRESSURE_PA + 998.0 * GRAVITY_M_S2 * DEPTH_M) / (0.5 * 998.0 * speed_m_s * speed_m_s);
     (factor * smallest).clamp(0.3, 40.0)
 }
@@ -40,7 +40,7 @@ fn onset(scale: &Scale, factor: f64) -> f64 {
 fn parameters(scale: &Scale) -> Vec<Spec> {
     vec![
         Spec::strength("loss", "1", 0.1, 0.0, 3.0),
-        Spec::shape("onset_sigma", "1", onset(scale, 1.5), 0.2, 50.0),
+        Spec::shape("onset_sigma", "1", onset(scale, 2.0), 0.2, 50.0),
     ]
 }
 

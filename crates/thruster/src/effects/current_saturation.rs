@@ -16,7 +16,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     separated_by: "steps of rising size; the supply voltage varied (a current limit stays)",
     reference: "physics.md C2",
     parameters,
-    starts: |_| [0.02, 0.2, 0.3, 0.45, 0.6].iter().map(|cut| vec![*cut]).collect(),
+    starts: |_| [0.05, 0.25, 0.4, 0.6].iter().map(|cut| vec![*cut]).collect(),
     needs,
     build: |values, _| Box::new(CurrentSaturation { cut: values[0] }),
 };
@@ -24,7 +24,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 /// The limit is sharp, as a drive's is; a recording's response is still smooth in it, since each
 /// sample crosses it at another time.
 fn parameters(_: &Scale) -> Vec<Spec> {
-    vec![Spec::strength("limit_cut", "1", 0.1, 0.0, 0.9)]
+    vec![Spec::strength("limit_cut", "1", 0.15, 0.0, 0.9)]
 }
 
 fn needs(rig: &Rig, available: &Available) -> Result<(), &'static str> {

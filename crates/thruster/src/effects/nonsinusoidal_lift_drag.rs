@@ -20,11 +20,12 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     build: |values, _| Box::new(NonsinusoidalLiftDrag { profile_drag: values[0], drag_4: values[1], lift_4: values[2] }),
 };
 
+/// Bounded where the blade would begin to pull energy out of still water.
 fn parameters(_: &Scale) -> Vec<Spec> {
     vec![
-        Spec::strength("profile_drag", "1", 0.01, -0.1, 0.5),
-        Spec::strength("drag_harmonic", "1", 0.02, -1.0, 1.0),
-        Spec::strength("lift_harmonic", "1", 0.01, -1.0, 1.0),
+        Spec::strength("profile_drag", "1", 0.01, -0.02, 0.5),
+        Spec::strength("drag_harmonic", "1", 0.02, -0.25, 1.0),
+        Spec::strength("lift_harmonic", "1", 0.01, -0.25, 1.0),
     ]
 }
 

@@ -27,6 +27,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
             flux_kg_m: p.get(P::DensityKgM3) * p.area_m2(),
             mass_kg: values[1] * p.duct_mass_kg(),
             lever_m: REFERENCE_RADIUS * p.get(P::RadiusM),
+            tick_s: context.tick_s,
         })
     },
 };
@@ -44,6 +45,7 @@ struct RotationalFlow {
     flux_kg_m: f64,
     mass_kg: f64,
     lever_m: f64,
+    tick_s: f64,
 }
 
 impl Effect for RotationalFlow {
@@ -59,9 +61,10 @@ impl Effect for RotationalFlow {
         inflow.tangential_m_s -= own[0];
     }
 
+    /// The swirl's lag is never shorter than a tick, which the integrator could not follow.
     fn balance(&self, at: &Local, own: &[f64], balance: &mut Balance, rates: &mut [f64]) {
-        rates[0] = (self.share * balance.blade_torque_n_m / self.lever_m
-            - self.flux_kg_m * at.axial_m_s.abs() * own[0])
-            / self.mass_kg;
+        let washed = self.flux_kg_m * at.axial_m_s.abs();
+        rates[0] = (self.share * balance.blade_torque_n_m / self.lever_m - washed * own[0])
+            / (self.mass_kg + washed * self.tick_s);
     }
 }

@@ -1,6 +1,7 @@
 //! The supply sags under the thruster's own load.
 
 use super::memory::FirstOrder;
+use super::voltage_limit_backemf::{self, emf_share};
 use super::{Descriptor, Effect, Hooks, Path, Scale, Spec};
 use crate::plant::{Drive, Tick};
 
@@ -17,8 +18,8 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     separated_by: "the recorded bus voltage; the supply voltage varied",
     reference: "physics.md C2",
     parameters,
-    starts: |scale| [0.2, 0.4].iter().map(|share| vec![share * source_ohm(scale), 0.01]).collect(),
-    needs: super::voltage_limit_backemf::needs,
+    starts: |scale| [0.05, 0.2, 0.4].iter().map(|share| vec![share * source_ohm(scale), 0.01]).collect(),
+    needs: voltage_limit_backemf::needs,
     build: |values, context| {
         Box::new(SupplySag {
             source_ohm: values[0],
@@ -36,10 +37,12 @@ fn source_ohm(scale: &Scale) -> f64 {
     scale.supply_v.max(1e-3) / bus_a
 }
 
+/// The start lets a current drive meet its voltage limit just below the top of the recording.
 fn parameters(scale: &Scale) -> Vec<Spec> {
     let full = source_ohm(scale);
+    let share = (1.0 - 1.1 * emf_share(scale)).clamp(0.02, 0.6);
     vec![
-        Spec::strength("source_resistance_ohm", "ohm", 0.05 * full, 0.0, 2.0 * full),
+        Spec::strength("source_resistance_ohm", "ohm", share * full, 0.0, 2.0 * full),
         Spec::shape("recovery_s", "s", 0.01, 0.0, 20.0),
     ]
 }

@@ -27,6 +27,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
             share: values[0],
             per_m: 2.0 / (values[1] * p.get(P::RadiusM)),
             lift_max: p.get(P::LiftMax),
+            tick_s: context.tick_s,
         })
     },
 };
@@ -39,6 +40,7 @@ struct UnsteadyLift {
     share: f64,
     per_m: f64,
     lift_max: f64,
+    tick_s: f64,
 }
 
 impl UnsteadyLift {
@@ -63,10 +65,12 @@ impl Effect for UnsteadyLift {
         foil.lift -= self.share * missing / foil.speed_m_s;
     }
 
+    /// No lag is shorter than a tick, which the integrator could not follow.
     fn balance(&self, _: &Local, own: &[f64], balance: &mut Balance, rates: &mut [f64]) {
         let now = self.circulation_m_s(&balance.foil);
         for (i, (_, b)) in WAGNER.iter().enumerate() {
-            rates[i] = b * self.per_m * balance.foil.speed_m_s * (now - own[i]);
+            let rate = b * self.per_m * balance.foil.speed_m_s;
+            rates[i] = rate / (1.0 + rate * self.tick_s) * (now - own[i]);
         }
     }
 }

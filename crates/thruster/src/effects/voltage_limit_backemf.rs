@@ -22,7 +22,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 };
 
 /// Back-EMF at the largest speed as a share of the supply; bounded, since both are only stated.
-fn emf_share(scale: &Scale) -> f64 {
+pub(super) fn emf_share(scale: &Scale) -> f64 {
     let torque_constant_nm_a = scale.torque_n_m / scale.current_a;
     (torque_constant_nm_a * scale.shaft_speed_rad_s / scale.supply_v.max(1e-3)).clamp(0.1, 0.9)
 }

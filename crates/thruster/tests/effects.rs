@@ -1,0 +1,395 @@
+//! One suite over every entry of the catalogue: names, parameters, and what each does to the
+//! standard rigs of both classes.
+
+use std::f64::consts::TAU;
+
+use kort_thruster::effects::{self, ALL, Descriptor, Path, Scale, Spec};
+use kort_thruster::models::ModelName;
+use kort_thruster::parameters::{Parameter as P, Parameters};
+use kort_thruster::plant::{Local, Plant, Response, Sensed, Stimulus, Tick, simulate};
+use kort_thruster::rig::{AmplifierKind, Rig};
+
+const TICK_S: f64 = 0.002;
+const DURATION_S: f64 = 14.0;
+
+const WORK: &str = r#"
+[rig]
+class = "ducted work-class, geared"
+[propeller]
+radius_m = 0.13
+duct_length_m = 0.1271
+pitch_rad = 0.39
+lift_max = 0.542
+drag_max = 1.25
+[flow]
+density_kg_m3 = 998.0
+flux_coefficient = 1.86
+added_mass_coefficient = 2.0
+[motor]
+inertia_kg_m2 = 0.01
+torque_constant_nm_a = 1.25
+winding_resistance_ohm = 2.2
+[amplifier]
+kind = "current"
+time_constant_s = 0.002
+current_limit_a = 9.0
+supply_v = 120.0
+[sensors]
+speed_filter_time_constant_s = 0.010
+thrust_filter_hz = 163.0
+torque_filter_hz = 99.5
+torque = "propeller-side transducer"
+"#;
+
+const SMALL: &str = r#"
+[rig]
+class = "small brushless, geared"
+[propeller]
+radius_m = 0.038
+duct_length_m = 0.04
+pitch_rad = 0.4379
+lift_max = 0.8331
+drag_max = 0.93677
+[flow]
+density_kg_m3 = 998.0
+flux_coefficient = 1.95783
+added_mass_coefficient = 2.21715
+[motor]
+inertia_kg_m2 = 6.414e-5
+torque_constant_nm_a = 0.01986
+winding_resistance_ohm = 0.11
+[amplifier]
+kind = "current"
+time_constant_s = 0.002
+current_limit_a = 34.0
+supply_v = 14.8
+[sensors]
+speed_filter_time_constant_s = 0.010
+thrust_filter_hz = 163.0
+torque_filter_hz = 99.5
+torque = "propeller-side transducer"
+"#;
+
+/// All that is wrong at once, rather than the first.
+#[derive(Default)]
+struct Failures(Vec<String>);
+
+impl Failures {
+    fn unless(&mut self, good: bool, what: impl FnOnce() -> String) {
+        if !good {
+            self.0.push(what());
+        }
+    }
+}
+
+impl Drop for Failures {
+    fn drop(&mut self) {
+        if !std::thread::panicking() {
+            assert!(self.0.is_empty(), "{}", self.0.join("\n"));
+        }
+    }
+}
+
+/// A rig with a programme that uses all of it: steps both ways, a ramp through zero, reversals.
+struct Bench {
+    name: &'static str,
+    rig: Rig,
+    parameters: Parameters,
+    stimulus: Stimulus,
+    scale: Scale,
+    base: Vec<Sensed>,
+    base_truth: Vec<Local>,
+}
+
+fn bench(name: &'static str, text: &str) -> Bench {
+    let rig = Rig::from_toml(text).unwrap();
+    let parameters = Parameters::stated(&rig);
+    let top = 0.9 * rig.amplifier.current_limit_a;
+    let levels = [0.0, 0.3, -0.3, 1.0, -1.0, 0.6, 0.0, 0.15, -0.6, 0.9];
+    let ticks: Vec<Tick> = (0..(DURATION_S / TICK_S) as usize)
+        .map(|k| {
+            let time_s = k as f64 * TICK_S;
+            let share = if time_s < 10.0 {
+                levels[time_s as usize]
+            } else {
+                ((time_s - 10.0) / 2.0 - 1.0).clamp(-1.0, 1.0)
+            };
+            Tick { time_s, command: top * share, extra: (TAU * 0.2 * time_s).sin(), ..Tick::default() }
+        })
+        .collect();
+    let logs = (0..ticks.len()).step_by(5).map(|k| (k, 0.0)).collect();
+    let stimulus = Stimulus { ticks, logs };
+    let mut bench = Bench {
+        name,
+        scale: Scale {
+            shaft_speed_rad_s: 1.0,
+            torque_n_m: parameters.get(P::TorqueConstantNmA) * top,
+            thrust_n: 1.0,
+            flow_m_s: 1.0,
+            current_a: top,
+            command: top,
+            supply_v: rig.amplifier.supply_v.unwrap_or(0.0),
+            inertia_kg_m2: parameters.get(P::InertiaKgM2),
+            tick_s: TICK_S,
+            duration_s: DURATION_S,
+        },
+        rig,
+        parameters,
+        stimulus,
+        base: Vec::new(),
+        base_truth: Vec::new(),
+    };
+    // The recorded angle keeps what follows the angle in phase, as in a fit.
+    let mut angle_rad = 0.0;
+    for (k, at) in bench.truth(&[]).iter().enumerate() {
+        bench.stimulus.ticks[k].shaft_angle_rad = Some((angle_rad, at.shaft_angle_rad));
+        angle_rad = at.shaft_angle_rad;
+    }
+    bench.base = bench.respond(&[]).rows;
+    bench.base_truth = bench.truth(&[]);
+    let largest = |f: fn(&Sensed) -> f64| bench.base.iter().map(|s| f(s).abs()).fold(0.0, f64::max);
+    bench.scale.shaft_speed_rad_s = largest(|s| s.shaft_speed_rad_s);
+    bench.scale.thrust_n = largest(|s| s.thrust_n);
+    bench.scale.flow_m_s = largest(|s| s.flow_m_s);
+    bench
+}
+
+fn benches() -> [Bench; 2] {
+    [bench("work class", WORK), bench("small brushless", SMALL)]
+}
+
+impl Bench {
+    fn plant(&self, effects: &[(&Descriptor, &[f64])]) -> Plant {
+        let mut plant = Plant::new(ModelName::Model2, &self.rig, &self.parameters, effects, TICK_S);
+        plant.start(0.0, 0.0, 0.0, 0.0, 0.0);
+        plant
+    }
+
+    fn respond(&self, effects: &[(&Descriptor, &[f64])]) -> Response {
+        simulate(&mut self.plant(effects), &self.stimulus)
+    }
+
+    /// The true motion, whatever the sensors show.
+    fn truth(&self, effects: &[(&Descriptor, &[f64])]) -> Vec<Local> {
+        let mut plant = self.plant(effects);
+        self.stimulus
+            .ticks
+            .iter()
+            .map(|tick| {
+                plant.step(tick);
+                *plant.truth()
+            })
+            .collect()
+    }
+
+    /// Largest difference (RMS of a channel over its full scale) between two responses.
+    fn difference(&self, a: &[Sensed], b: &[Sensed]) -> f64 {
+        let channels: [fn(&Sensed) -> f64; 5] =
+            [|s| s.thrust_n, |s| s.shaft_speed_rad_s, |s| s.flow_m_s, |s| s.torque_n_m, |s| s.current_a];
+        channels
+            .iter()
+            .map(|f| {
+                let full = self.base.iter().map(|s| f(s).abs()).fold(0.0, f64::max);
+                let sum: f64 = a.iter().zip(b).map(|(x, y)| (f(x) - f(y)).powi(2)).sum();
+                (sum / a.len() as f64).sqrt() / full
+            })
+            .fold(0.0, f64::max)
+    }
+}
+
+fn starting(specs: &[Spec]) -> Vec<f64> {
+    specs.iter().map(|s| s.start).collect()
+}
+
+#[test]
+fn identifiers_are_unique_and_name_their_files() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src/effects");
+    for (i, effect) in ALL.iter().enumerate() {
+        assert!(folder.join(format!("{}.rs", effect.id)).exists(), "{} has no file", effect.id);
+        assert!(ALL[..i].iter().all(|other| other.id != effect.id), "{} twice", effect.id);
+        assert_eq!(effects::find(effect.id).unwrap().what, effect.what);
+    }
+    let files = std::fs::read_dir(&folder).unwrap().filter_map(|f| f.ok()?.file_name().into_string().ok());
+    for file in files.filter(|f| f != "mod.rs" && f != "memory.rs") {
+        assert!(effects::find(file.trim_end_matches(".rs")).is_some(), "{file} is not in the catalogue");
+    }
+}
+
+#[test]
+fn words_are_whole_and_rivals_exist() {
+    for effect in ALL {
+        for text in [effect.what, effect.equation, effect.signature, effect.separated_by, effect.reference] {
+            assert!(text.len() > 10 && !text.contains("  "), "{}: {text:?}", effect.id);
+        }
+        assert!(!effect.confused_with.is_empty(), "{}", effect.id);
+        for rival in effect.confused_with {
+            assert!(effects::find(rival).is_some() && *rival != effect.id, "{} names {rival}", effect.id);
+        }
+    }
+}
+
+#[test]
+fn bounds_hold_the_starts() {
+    let mut failures = Failures::default();
+    for bench in benches() {
+        for effect in ALL {
+            let specs = (effect.parameters)(&bench.scale);
+            assert!(specs.iter().any(|s| !s.shape), "{} has no strength", effect.id);
+            for start in (effect.starts)(&bench.scale).into_iter().chain([starting(&specs)]) {
+                assert_eq!(start.len(), specs.len(), "{}", effect.id);
+                for (spec, value) in specs.iter().zip(start) {
+                    failures.unless(spec.low <= value && value <= spec.high, || {
+                        format!("{} {} {value} {spec:?}", bench.name, effect.id)
+                    });
+                    failures.unless(spec.shape || value != 0.0, || {
+                        format!("{} {}: a fit sees nothing at zero", effect.id, spec.name)
+                    });
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn an_effect_of_no_strength_changes_nothing() {
+    let mut failures = Failures::default();
+    for bench in benches() {
+        for effect in ALL {
+            let specs = (effect.parameters)(&bench.scale);
+            let values: Vec<f64> = specs.iter().map(|s| if s.shape { s.start } else { 0.0 }).collect();
+            let change = bench.difference(&bench.respond(&[(effect, &values)]).rows, &bench.base);
+            failures.unless(change < 1e-9, || format!("{} {}: {change}", bench.name, effect.id));
+        }
+    }
+}
+
+#[test]
+fn starts_are_visible_and_small() {
+    let mut failures = Failures::default();
+    for bench in benches() {
+        for effect in ALL {
+            let specs = (effect.parameters)(&bench.scale);
+            let response = bench.respond(&[(effect, &starting(&specs))]).rows;
+            let change = bench.difference(&response, &bench.base);
+            failures
+                .unless((0.001..0.3).contains(&change), || format!("{} {}: {change}", bench.name, effect.id));
+        }
+    }
+}
+
+#[test]
+fn each_strength_alone_is_visible() {
+    let mut failures = Failures::default();
+    for bench in benches() {
+        for effect in ALL {
+            let specs = (effect.parameters)(&bench.scale);
+            for (k, spec) in specs.iter().enumerate().filter(|(_, s)| !s.shape) {
+                let values: Vec<f64> = specs
+                    .iter()
+                    .enumerate()
+                    .map(|(j, s)| if s.shape || j == k { s.start } else { 0.0 })
+                    .collect();
+                let change = bench.difference(&bench.respond(&[(effect, &values)]).rows, &bench.base);
+                failures.unless(change > 1e-5, || {
+                    format!("{} {} {}: {change}", bench.name, effect.id, spec.name)
+                });
+            }
+        }
+    }
+}
+
+#[test]
+fn responses_are_continuous_in_the_parameters() {
+    let mut failures = Failures::default();
+    for bench in benches() {
+        for effect in ALL {
+            let specs = (effect.parameters)(&bench.scale);
+            let start = starting(&specs);
+            let from = bench.respond(&[(effect, &start)]).rows;
+            let reach = bench.difference(&from, &bench.base);
+            for (k, spec) in specs.iter().enumerate().filter(|(_, s)| !s.held) {
+                let step = 1e-3 * spec.start.abs().max(1e-3 * (spec.high - spec.low));
+                let at = |h: f64| {
+                    let mut values = start.clone();
+                    values[k] += h;
+                    bench.difference(&bench.respond(&[(effect, &values)]).rows, &from)
+                };
+                // Both halves of a small step count: no jump hides in either.
+                let (whole, half) = (at(step), at(0.5 * step));
+                failures.unless(whole < 0.1 * reach + 1e-7, || {
+                    format!("{} {} {}: {whole}", bench.name, effect.id, spec.name)
+                });
+                failures.unless(half < 0.75 * whole + 1e-8, || {
+                    format!("{} {} {}: {half} of {whole}", bench.name, effect.id, spec.name)
+                });
+            }
+        }
+    }
+}
+
+#[test]
+fn every_bound_and_every_start_stays_finite() {
+    let mut failures = Failures::default();
+    for bench in benches() {
+        for effect in ALL {
+            let specs = (effect.parameters)(&bench.scale);
+            let mut tries = (effect.starts)(&bench.scale);
+            tries.push(specs.iter().map(|s| s.low).collect());
+            tries.push(specs.iter().map(|s| s.high).collect());
+            for k in 0..specs.len() {
+                for bound in [specs[k].low, specs[k].high] {
+                    let mut values = starting(&specs);
+                    values[k] = bound;
+                    tries.push(values);
+                }
+            }
+            // Many alike parameters: the first few stand for all.
+            for values in tries.iter().take(24) {
+                let rows = bench.respond(&[(effect, values)]).rows;
+                let finite = rows
+                    .iter()
+                    .all(|s| (s.thrust_n + s.shaft_speed_rad_s + s.flow_m_s + s.torque_n_m).is_finite());
+                failures.unless(finite, || format!("{} {} {values:?}", bench.name, effect.id));
+            }
+        }
+    }
+}
+
+#[test]
+fn sensors_never_move_the_shaft() {
+    let mut failures = Failures::default();
+    for bench in benches() {
+        for effect in ALL.iter().filter(|e| e.path == Path::Sensor) {
+            let mut values = starting(&(effect.parameters)(&bench.scale));
+            if effect.id == "torque_channel_bias" {
+                // A drive that regulates a wrong zero is no sensor alone.
+                values[0] = 0.0;
+            }
+            let still = bench.truth(&[(effect, &values)]) == bench.base_truth;
+            failures.unless(still, || format!("{} {}", bench.name, effect.id));
+        }
+    }
+}
+
+#[test]
+fn all_small_effects_work_together_in_pairs() {
+    let bench = bench("work class", WORK);
+    for pair in ALL.windows(2) {
+        let values = pair.iter().map(|e| starting(&(e.parameters)(&bench.scale))).collect::<Vec<_>>();
+        let rows = bench.respond(&[(pair[0], &values[0]), (pair[1], &values[1])]).rows;
+        let change = bench.difference(&rows, &bench.base);
+        assert!(change.is_finite() && change < 0.6, "{} and {}: {change}", pair[0].id, pair[1].id);
+    }
+}
+
+#[test]
+fn a_voltage_drive_sags_below_its_command() {
+    let mut bench = bench("voltage drive", WORK);
+    bench.rig.amplifier.kind = AmplifierKind::Voltage;
+    bench.stimulus.ticks.iter_mut().for_each(|t| t.command *= 10.0);
+    bench.base = bench.respond(&[]).rows;
+    let sag = effects::find("supply_sag").unwrap();
+    let rows = bench.respond(&[(sag, &[1.0, 0.0])]).rows;
+    let end = |rows: &[Sensed]| rows[390].shaft_speed_rad_s.abs();
+    assert!(end(&rows) < 0.99 * end(&bench.base) && end(&rows) > 0.8 * end(&bench.base));
+}
