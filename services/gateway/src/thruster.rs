@@ -337,7 +337,7 @@ impl Thruster {
         ThrusterState {
             id: self.id.clone(),
             armed: heard.armed(now),
-            controller: controller.map(|c| c.law.as_str().to_owned()).unwrap_or_default(),
+            controller: controller.map(|c| c.law.as_str().to_owned()),
             observer: controller.map(|c| c.observer.as_str().to_owned()).filter(|name| !name.is_empty()),
             estimator: controller.map(|c| c.estimator.as_str().to_owned()).filter(|name| !name.is_empty()),
             estimator_frozen: controller.is_some_and(|c| c.estimator_frozen != 0),

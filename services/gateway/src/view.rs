@@ -15,9 +15,9 @@ pub struct ThrusterState {
     pub id: String,
     /// Is the drive armed? Disarmed means zero torque.
     pub armed: bool,
-    /// Control law that runs.
+    /// Control law that runs; null while the controller is away.
     #[schema(example = "velocity_servo")]
-    pub controller: String,
+    pub controller: Option<String>,
     /// Observer that runs beside it; null while the controller is away.
     #[schema(example = "ekf")]
     pub observer: Option<String>,
