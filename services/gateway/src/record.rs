@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
-use std::io::{self, Write};
+use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
@@ -15,6 +15,7 @@ use std::time::{Duration, Instant, SystemTime};
 
 use kort_proto::messages::Telemetry;
 use kort_proto::signals::{SIGNALS, Signals};
+use kort_recording::{Format, Writer};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -143,8 +144,7 @@ impl Recorder {
             lost_samples: 0,
             bytes: BTreeMap::new(),
         };
-        let writer =
-            Files::create(&self.folder, &info, now).map_err(|error| self.failed(&info.name, &error))?;
+        let writer = Files::create(&self.folder, &info).map_err(|error| self.failed(&info.name, &error))?;
         let (samples, inbox) = sync_channel(QUEUE_ROWS);
         let shared = Arc::new(Mutex::new(info.clone()));
         let (folder, theirs) = (self.folder.clone(), Arc::clone(&shared));
@@ -304,38 +304,32 @@ fn write_rows(
 }
 
 /// The files of one recording.
-struct Files {
-    csv: io::BufWriter<File>,
-}
+struct Files(Vec<Writer<BufWriter<File>>>);
 
 impl Files {
-    fn create(folder: &Path, info: &RecordingInfo, _started: SystemTime) -> io::Result<Files> {
-        let mut csv = io::BufWriter::new(File::create_new(folder.join(format!("{}.csv", info.name)))?);
-        File::create_new(folder.join(format!("{}.mcap", info.name)))?;
+    fn create(folder: &Path, info: &RecordingInfo) -> io::Result<Files> {
+        let columns: Vec<&str> = SIGNALS.iter().map(|signal| signal.name).collect();
+        let create = |ending: &&str| {
+            let path = folder.join(format!("{}.{ending}", info.name));
+            let format = Format::of(&path).map_err(io::Error::other)?;
+            Writer::create(format, &info.thruster, &columns, BufWriter::new(File::create_new(path)?))
+        };
+        let files = FORMATS.iter().map(create).collect::<io::Result<_>>()?;
         write_info(folder, info)?;
-        write!(csv, "time_s")?;
-        for signal in SIGNALS {
-            write!(csv, ",{}", signal.name)?;
-        }
-        writeln!(csv)?;
-        Ok(Files { csv })
+        Ok(Files(files))
     }
 
     fn write(&mut self, time_s: f64, row: &Signals) -> io::Result<()> {
-        write!(self.csv, "{time_s}")?;
-        for signal in SIGNALS {
-            let value = (signal.get)(row);
-            if value.is_nan() { write!(self.csv, ",")? } else { write!(self.csv, ",{value}")? }
-        }
-        writeln!(self.csv)
+        let values: Vec<f64> = SIGNALS.iter().map(|signal| (signal.get)(row)).collect();
+        self.0.iter_mut().try_for_each(|file| file.row(time_s, &values))
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        self.csv.flush()
+        self.0.iter_mut().try_for_each(Writer::flush)
     }
 
-    fn finish(mut self) -> io::Result<()> {
-        self.csv.flush()
+    fn finish(self) -> io::Result<()> {
+        self.0.into_iter().try_for_each(Writer::finish)
     }
 }
 
