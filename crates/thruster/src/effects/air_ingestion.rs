@@ -20,7 +20,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: |scale| {
         let full = scale.shaft_speed_rad_s;
-        vec![vec![0.05, 0.4 * full, 0.5], vec![0.05, 0.4 * full, 5.0], vec![0.05, 0.8 * full, 0.5]]
+        vec![vec![0.05, 0.05 * full, 0.1], vec![0.05, 0.4 * full, 0.5], vec![0.05, 0.4 * full, 5.0], vec![0.05, 0.8 * full, 0.5]]
     },
     needs: wet,
     build: |values, _| Box::new(AirIngestion { fraction: values[0], onset_rad_s: values[1], lag_s: values[2] }),
@@ -30,7 +30,7 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
     let full = scale.shaft_speed_rad_s;
     vec![
         Spec::strength("air_fraction", "1", 0.05, 0.0, 0.7),
-        Spec::shape("onset_speed_rad_s", "rad/s", 0.6 * full, 0.1 * full, 1.3 * full),
+        Spec::shape("onset_speed_rad_s", "rad/s", 0.6 * full, 0.02 * full, 1.3 * full),
         Spec::shape("lag_s", "s", 2.0, 0.02, 60.0),
     ]
 }

@@ -1,41 +1,45 @@
 //! Flow across the axis takes thrust.
 
-use super::{Available, Descriptor, Effect, Hooks, Path, Scale, Spec, one_start, wet};
+use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, wet};
 use crate::plant::{Balance, Drive, Local, Tick};
-use crate::rig::Rig;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
     id: "cross_flow",
     path: Path::Flow,
-    what: "flow across the axis, as when the vehicle sways or yaws, takes thrust whichever side it comes from",
-    equation: "T/(1 + c (n - n0)^2); n the recorded transverse flow (standardised), c, n0 [1]; to first order T (1 - c n^2)",
-    signature: "thrust falls with the square of transverse speed, alike to both sides",
-    confused_with: &["ambient_axial_flow", "thrust_deduction_interaction"],
-    separated_by: "a yaw sweep in towed runs",
-    reference: "physics.md C3",
+    what: "flow across the axis, from a current or as the vehicle sways or yaws, takes thrust whichever side it comes from",
+    equation: "T (1 - c vt^2/(vp^2 + vt^2)), vt = v0 + v1 n; c [1], v0, v1 [m/s], n a recorded signal of the transverse \
+               flow (standardised; 0 where none is recorded)",
+    signature: "thrust is low in proportion at small axial flow and less so at full thrust, alike in both directions and \
+                for flow from both sides",
+    confused_with: &["ambient_axial_flow", "thrust_deduction_interaction", "duct_loss"],
+    separated_by: "a yaw sweep in towed runs; the transverse flow recorded",
+    reference: "physics.md C3, T (1 - c (vt/vp)^2), here bounded where vp is small",
     parameters,
-    starts: one_start,
-    needs,
-    build: |values, _| Box::new(CrossFlow { loss: values[0], centre: values[1], across: 0.0 }),
+    starts: |scale| {
+        let full = scale.flow_m_s;
+        vec![vec![0.1, 0.1 * full, 0.1 * full], vec![0.1, 0.5 * full, 0.5 * full]]
+    },
+    needs: wet,
+    build: |values, _| {
+        Box::new(CrossFlow { loss: values[0], steady_m_s: values[1], per_signal_m_s: values[2], across_m2_s2: 0.0 })
+    },
 };
 
-fn parameters(_: &Scale) -> Vec<Spec> {
+fn parameters(scale: &Scale) -> Vec<Spec> {
+    let full = scale.flow_m_s;
     vec![
-        Spec::strength("loss", "1", 0.02, 0.0, 1.0),
-        Spec::shape("centre", "1", 0.0, -3.0, 3.0),
+        Spec::strength("thrust_loss", "1", 0.1, 0.0, 1.0),
+        Spec::shape("cross_flow_m_s", "m/s", 0.25 * full, 0.02 * full, 2.0 * full),
+        Spec::shape("cross_flow_per_signal_m_s", "m/s", 0.25 * full, -2.0 * full, 2.0 * full),
     ]
-}
-
-fn needs(rig: &Rig, available: &Available) -> Result<(), &'static str> {
-    wet(rig, available)?;
-    if available.has(super::EXTRA) { Ok(()) } else { Err("no flow across the axis is recorded") }
 }
 
 struct CrossFlow {
     loss: f64,
-    centre: f64,
-    across: f64,
+    steady_m_s: f64,
+    per_signal_m_s: f64,
+    across_m2_s2: f64,
 }
 
 impl Effect for CrossFlow {
@@ -44,10 +48,12 @@ impl Effect for CrossFlow {
     }
 
     fn drive(&mut self, tick: &Tick, _: &mut Drive) {
-        self.across = tick.extra - self.centre;
+        self.across_m2_s2 = (self.steady_m_s + self.per_signal_m_s * tick.extra).powi(2);
     }
 
-    fn balance(&self, _: &Local, _: &[f64], balance: &mut Balance, _: &mut [f64]) {
-        balance.thrust_n /= 1.0 + self.loss * self.across * self.across;
+    fn balance(&self, at: &Local, _: &[f64], balance: &mut Balance, _: &mut [f64]) {
+        // The small term keeps still water without cross flow from dividing by zero.
+        let all = at.axial_m_s * at.axial_m_s + self.across_m2_s2 + 1e-12;
+        balance.thrust_n *= 1.0 - self.loss * self.across_m2_s2 / all;
     }
 }

@@ -12,14 +12,14 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     id: "unsteady_lift_lag",
     path: Path::Blade,
     what: "circulation, and with it lift, builds up only as the blade travels some chords (Wagner's function)",
-    equation: "V CL = w - g sum Ai (w - yi), yi' = bi (2V/c)(w - yi), w = V CL quasi-steady [m/s]; A 0.165, 0.335, \
+    equation: "CL = w - g sum Ai (w - yi), yi' = bi (2V/c)(w - yi), w the quasi-steady CL; A 0.165, 0.335, \
                b 0.0455, 0.3; c [radii], g = 1 a flat plate",
     signature: "thrust and torque lag fast changes by a time that shrinks with speed; the gain of thrust at high frequency is low",
     confused_with: &["thrust_sensor_lag", "inertia_added_mass_error", "rotational_flow", "blade_stall"],
     separated_by: "a chirp at two mean speeds (a sensor's lag stays the same in seconds)",
     reference: "Wagner 1925; R. T. Jones 1940 (NACA TR 681); physics.md C4",
     parameters,
-    starts: |_| vec![vec![0.3, 0.2], vec![0.3, 1.5]],
+    starts: |_| vec![vec![0.5, 0.2], vec![0.5, 1.5]],
     needs: wet,
     build: |values, context| {
         let p = context.parameters;
@@ -33,7 +33,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 };
 
 fn parameters(_: &Scale) -> Vec<Spec> {
-    vec![Spec::strength("wagner_share", "1", 0.3, 0.0, 1.9), Spec::shape("chord_radii", "1", 0.5, 0.05, 5.0)]
+    vec![Spec::strength("wagner_share", "1", 0.5, 0.0, 1.9), Spec::shape("chord_radii", "1", 0.5, 0.05, 5.0)]
 }
 
 struct UnsteadyLift {
@@ -43,11 +43,10 @@ struct UnsteadyLift {
     tick_s: f64,
 }
 
-impl UnsteadyLift {
-    /// Quasi-steady `V CL` in proportion to the circulation, m/s.
-    fn circulation_m_s(&self, foil: &Foil) -> f64 {
-        self.lift_max * foil.sin_2a * foil.speed_m_s
-    }
+/// Which end of the chord leads, going over smoothly where the flow turns round: circulation
+/// keeps its sense when the lift coefficient's axes turn over.
+fn leading(foil: &Foil) -> f64 {
+    (8.0 * foil.chordwise_m_s / foil.speed_m_s).tanh()
 }
 
 impl Effect for UnsteadyLift {
@@ -60,16 +59,21 @@ impl Effect for UnsteadyLift {
     }
 
     fn foil(&self, _: &Local, own: &[f64], foil: &mut Foil) {
-        let now = self.circulation_m_s(foil);
+        let side = leading(foil);
+        let now = side * self.lift_max * foil.sin_2a;
         let missing: f64 = WAGNER.iter().zip(own).map(|((a, _), y)| a * (now - y)).sum();
-        foil.lift -= self.share * missing / foil.speed_m_s;
+        foil.lift -= self.share * side * missing;
     }
 
     /// No lag is shorter than a tick, which the integrator could not follow.
     fn balance(&self, _: &Local, own: &[f64], balance: &mut Balance, rates: &mut [f64]) {
-        let now = self.circulation_m_s(&balance.foil);
+        let foil = &balance.foil;
+        if foil.speed_m_s == 0.0 {
+            return;
+        }
+        let now = leading(foil) * self.lift_max * foil.sin_2a;
         for (i, (_, b)) in WAGNER.iter().enumerate() {
-            let rate = b * self.per_m * balance.foil.speed_m_s;
+            let rate = b * self.per_m * foil.speed_m_s;
             rates[i] = rate / (1.0 + rate * self.tick_s) * (now - own[i]);
         }
     }
