@@ -205,7 +205,12 @@ fn a_wrong_configuration_is_refused_with_the_nearest_key() {
         let role = if words[0] == "velocity" { "controller" } else { "servo" };
         let out = run(&mut site.command(role));
         let error = String::from_utf8_lossy(&out.stderr);
-        assert!(!out.status.success(), "{error}");
+        assert_eq!(out.status.code(), Some(2), "{error}");
         assert!(words.iter().all(|w| error.contains(w)) && error.contains("kort.toml"), "{error}");
+        // The supervisor does not try again what no second try makes right.
+        let out = run(&mut site.command("up"));
+        let error = String::from_utf8_lossy(&out.stderr);
+        assert_eq!(out.status.code(), Some(2), "{error}");
+        assert!(words.iter().all(|w| error.contains(w)), "{error}");
     }
 }

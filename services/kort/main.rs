@@ -25,9 +25,12 @@ const UP_EXAMPLE: &str =
 #[command(
     after_help = "Without a command: kort up, on a simulated copy of a real test stand.\n\nExample: kort"
 )]
+#[command(args_conflicts_with_subcommands = true)]
 struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
+    #[command(flatten)]
+    up: Service,
 }
 
 #[derive(Subcommand)]
@@ -57,6 +60,8 @@ enum Command {
     /// The gateway alone: console, REST API, WebSocket, metrics, recordings
     #[command(after_help = "Example: kort gateway --config config/kort.toml")]
     Gateway(Service),
+    #[command(flatten)]
+    Lab(kort_lab::Command),
 }
 
 #[derive(Args, Clone)]
@@ -93,8 +98,7 @@ fn main() -> ExitCode {
             return ExitCode::from(if e.use_stderr() { USAGE } else { DONE });
         }
     };
-    let none = Service { config: None, root: None };
-    dispatch(cli.command.unwrap_or(Command::Up(none))).unwrap_or_else(|code| code)
+    dispatch(cli.command.unwrap_or(Command::Up(cli.up))).unwrap_or_else(|code| code)
 }
 
 fn dispatch(command: Command) -> Result<ExitCode, ExitCode> {
@@ -119,11 +123,41 @@ fn dispatch(command: Command) -> Result<ExitCode, ExitCode> {
             let (config, deployment) = service.load()?;
             finish(kort_gateway::run(&config, &deployment))
         }
+        Command::Lab(command) => Ok(kort_lab::run(command)),
     }
 }
 
-fn finish<E: std::fmt::Display>(result: Result<(), E>) -> Result<ExitCode, ExitCode> {
-    result.map(|()| ExitCode::from(DONE)).map_err(|e| fail(FAILED, &e))
+fn finish<E: std::fmt::Display + Blames>(result: Result<(), E>) -> Result<ExitCode, ExitCode> {
+    result.map(|()| ExitCode::from(DONE)).map_err(|e| fail(if e.blames_input() { USAGE } else { FAILED }, &e))
+}
+
+/// Whether an error is about what the user wrote, or about what happened.
+trait Blames {
+    fn blames_input(&self) -> bool;
+}
+
+impl Blames for up::UpError {
+    fn blames_input(&self) -> bool {
+        matches!(self, Self::Config(_) | Self::Refused { .. })
+    }
+}
+
+impl Blames for kort_servo::ServoError {
+    fn blames_input(&self) -> bool {
+        matches!(self, Self::Config(_) | Self::Rig { .. })
+    }
+}
+
+impl Blames for kort_controller::ControllerError {
+    fn blames_input(&self) -> bool {
+        matches!(self, Self::Config(_) | Self::Rig { .. } | Self::Law { .. } | Self::Model { .. })
+    }
+}
+
+impl Blames for kort_gateway::GatewayError {
+    fn blames_input(&self) -> bool {
+        matches!(self, Self::Config(_))
+    }
 }
 
 fn fail(code: u8, error: &dyn std::fmt::Display) -> ExitCode {

@@ -43,6 +43,12 @@ pub enum UpError {
         /// The system's words.
         error: std::io::Error,
     },
+    /// A child cannot use the configuration.
+    #[error("{name} cannot use this deployment; its reason stands above")]
+    Refused {
+        /// The child.
+        name: String,
+    },
     /// A child does not start.
     #[error("{name} does not start\nhint: its reason stands above; `kort {name}` alone shows it again")]
     DoesNotStart {
@@ -100,6 +106,9 @@ pub fn run(config: &Config, deployment: &Deployment) -> Result<(), UpError> {
                 generations = 0;
             }
             continue;
+        }
+        if let Some(role) = roles.iter().find(|role| role.refused) {
+            break Err(UpError::Refused { name: role.name.to_owned() });
         }
         // What the dead held in shared memory is freed before anyone takes their place.
         owner.clear_up_after_the_dead();
@@ -164,6 +173,7 @@ struct Role {
     child: Option<Child>,
     started: Instant,
     failed_starts: u32,
+    refused: bool,
 }
 
 impl Role {
@@ -174,6 +184,7 @@ impl Role {
             child: None,
             started: Instant::now(),
             failed_starts: 0,
+            refused: false,
         }
     }
 
@@ -231,7 +242,9 @@ impl Role {
         // Killed from outside is no failed start: whoever killed it may do so at any instant.
         let killed = status.signal() == Some(Signal::KILL.as_raw());
         self.failed_starts = if killed || self.is_up() { 0 } else { self.failed_starts + 1 };
-        warn!(thruster = self.thruster, "{} ended ({status}), starting another", self.name);
+        // Exit code 2: wrong input, and no restart makes it right.
+        self.refused = status.code() == Some(2) && !self.is_up();
+        warn!(thruster = self.thruster, "{} ended ({status})", self.name);
         self.child = None;
         true
     }
