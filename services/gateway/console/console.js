@@ -163,7 +163,8 @@ document.querySelectorAll("input[name=kind]").forEach((radio) => radio.addEventL
 function showKind() {
   const bound = limitsOf[kind()] ?? 100;
   $("unit").textContent = kind() === "thrust_n" ? "N" : "rad/s";
-  $("slider").min = -bound; $("slider").max = bound; $("slider").step = bound > 20 ? 0.5 : 0.01;
+  const step = bound > 20 ? 0.5 : 0.01, end = Math.floor(bound / step) * step; // steps count from min: zero must be one
+  $("slider").min = -end; $("slider").max = end; $("slider").step = step;
   $("slider").value = 0; $("entry").value = 0; $("entry").min = -bound; $("entry").max = bound;
 }
 
