@@ -205,7 +205,7 @@ impl Plant {
         self.filters.last_angle_rad = angle_rad - shaft_speed_rad_s * self.tick_s;
         self.filters.speed_rad_s = shaft_speed_rad_s;
         self.at = self.local(0.0, &Tick::default());
-        let (_, balance) = self.rates(&self.x, &self.at);
+        let (_, balance) = self.rates::<true>(&self.x, &self.at);
         self.filters.last_thrust_n = balance.thrust_n + balance.stand_n;
         self.filters.thrust_n = balance.thrust_n + balance.stand_n;
         self.filters.last_torque_n_m = balance.blade_torque_n_m;
@@ -230,6 +230,15 @@ impl Plant {
 
     /// One control tick: the command acts from now to the next tick.
     pub fn step(&mut self, tick: &Tick) {
+        // Two copies of the inner loop: the one without hooks keeps everything in registers.
+        if self.inflow_hooks.is_empty() && self.foil_hooks.is_empty() && self.balance_hooks.is_empty() {
+            self.step_as::<false>(tick);
+        } else {
+            self.step_as::<true>(tick);
+        }
+    }
+
+    fn step_as<const HOOKED: bool>(&mut self, tick: &Tick) {
         let dt = self.tick_s;
         let mut drive = Drive {
             command: tick.command,
@@ -268,18 +277,18 @@ impl Plant {
         let start = x;
         let k1 = match self.last_rates {
             Some(rates) => rates,
-            None => self.rates(&x, &self.local_at(&x, from, 0.0, tick, &drive)).0,
+            None => self.rates::<HOOKED>(&x, &self.local_at(&x, from, 0.0, tick, &drive)).0,
         };
-        x = self.advance(&start, &k1, 0.5 * dt);
+        x = self.advance(HOOKED, &start, &k1, 0.5 * dt);
         prescribe(&mut x, 0.5);
-        let (k2, _) = self.rates(&x, &self.local_at(&x, half, 0.5, tick, &drive));
-        x = self.advance(&start, &k2, 0.5 * dt);
+        let (k2, _) = self.rates::<HOOKED>(&x, &self.local_at(&x, half, 0.5, tick, &drive));
+        x = self.advance(HOOKED, &start, &k2, 0.5 * dt);
         prescribe(&mut x, 0.5);
-        let (k3, _) = self.rates(&x, &self.local_at(&x, half, 0.5, tick, &drive));
-        x = self.advance(&start, &k3, dt);
+        let (k3, _) = self.rates::<HOOKED>(&x, &self.local_at(&x, half, 0.5, tick, &drive));
+        x = self.advance(HOOKED, &start, &k3, dt);
         prescribe(&mut x, 1.0);
-        let (k4, _) = self.rates(&x, &self.local_at(&x, full, 1.0, tick, &drive));
-        for i in 0..self.used_states {
+        let (k4, _) = self.rates::<HOOKED>(&x, &self.local_at(&x, full, 1.0, tick, &drive));
+        for i in 0..if HOOKED { self.used_states } else { OWN } {
             self.x[i] = start[i] + dt / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]);
         }
         prescribe(&mut self.x, 1.0);
@@ -287,7 +296,7 @@ impl Plant {
         self.time_s = tick.time_s + dt;
 
         let end = self.local_at(&self.x, full, 1.0, tick, &drive);
-        let (rates, balance) = self.rates(&self.x, &end);
+        let (rates, balance) = self.rates::<HOOKED>(&self.x, &end);
         self.last_rates = Some(rates);
         self.at = end;
         self.at.thrust_n = balance.thrust_n;
@@ -332,9 +341,10 @@ impl Plant {
         target + (self.current_a - target) * left
     }
 
-    fn advance(&self, from: &States, rate: &States, dt: f64) -> States {
+    #[inline(always)]
+    fn advance(&self, hooked: bool, from: &States, rate: &States, dt: f64) -> States {
         let mut x = *from;
-        for i in 0..self.used_states {
+        for i in 0..if hooked { self.used_states } else { OWN } {
             x[i] += dt * rate[i];
         }
         x
@@ -352,6 +362,7 @@ impl Plant {
         }
     }
 
+    #[inline(always)]
     fn local_at(&self, x: &States, current_a: f64, part: f64, tick: &Tick, drive: &Drive) -> Local {
         Local {
             time_s: tick.time_s + part * self.tick_s,
@@ -370,7 +381,8 @@ impl Plant {
     }
 
     /// Rates of all states, and the loads they follow from.
-    fn rates(&self, x: &States, at: &Local) -> (States, Balance) {
+    #[inline(always)]
+    fn rates<const HOOKED: bool>(&self, x: &States, at: &Local) -> (States, Balance) {
         let c = &self.constants;
         let (speed, flow) = (x[SPEED], x[FLOW]);
         let mut balance = Balance {
@@ -399,10 +411,10 @@ impl Plant {
                 balance.blade_torque_n_m = 0.5 * force * c.yoerger_slip_m;
                 balance.inertia_kg_m2 = c.yoerger_slip_m * c.yoerger_slip_m * c.added_mass_kg;
             }
-            _ => self.blade_loads(at, x, flow, speed, &mut balance),
+            _ => self.blade_loads::<HOOKED>(at, x, flow, speed, &mut balance),
         }
         let mut rates = [0.0; STATES];
-        for i in &self.balance_hooks {
+        for i in self.balance_hooks.iter().take(if HOOKED { usize::MAX } else { 0 }) {
             let hooked = &self.effects[*i];
             hooked.effect.balance(at, &x[hooked.own.clone()], &mut balance, &mut rates[hooked.own.clone()]);
         }
@@ -429,10 +441,11 @@ impl Plant {
     }
 
     /// (14)-(17) without angles, with the hooks of inflow and foil.
-    fn blade_loads(&self, at: &Local, x: &States, flow: f64, speed: f64, balance: &mut Balance) {
+    #[inline(always)]
+    fn blade_loads<const HOOKED: bool>(&self, at: &Local, x: &States, flow: f64, speed: f64, balance: &mut Balance) {
         let c = &self.constants;
         let mut inflow = Inflow { tangential_m_s: c.lever_m * speed - x[SWIRL], axial_m_s: flow };
-        for i in &self.inflow_hooks {
+        for i in self.inflow_hooks.iter().take(if HOOKED { usize::MAX } else { 0 }) {
             let hooked = &self.effects[*i];
             hooked.effect.inflow(at, &x[hooked.own.clone()], &mut inflow);
         }
@@ -455,12 +468,14 @@ impl Plant {
             drag: c.drag_max * one_minus_cos_2a,
             density_kg_m3: c.density_kg_m3,
         };
-        for i in &self.foil_hooks {
+        for i in self.foil_hooks.iter().take(if HOOKED { usize::MAX } else { 0 }) {
             let hooked = &self.effects[*i];
             hooked.effect.foil(at, &x[hooked.own.clone()], &mut foil);
         }
         let q = foil.density_kg_m3 * c.half_area_m2 * foil.speed_m_s;
-        balance.foil = foil;
+        if HOOKED {
+            balance.foil = foil;
+        }
         balance.thrust_n = q * (foil.lift * ut - foil.drag * vp);
         balance.blade_torque_n_m = c.lever_m * q * (foil.lift * vp + foil.drag * ut);
     }
