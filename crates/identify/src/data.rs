@@ -209,6 +209,7 @@ impl Prepared {
             }
             _ => row_s / (row_s / COARSEST_TICK_S).ceil().max(1.0),
         };
+        let recorded = filled(series.column(driving.column()).unwrap_or(&[]));
         let mut prepared = Self {
             name: recording,
             time_s: series.time_s.clone(),
@@ -216,7 +217,7 @@ impl Prepared {
             driving,
             channels,
             edges: Vec::new(),
-            command: filled(series.column(driving.column()).unwrap_or(&[])),
+            command: if driving == Driving::Current { steps_of(&recorded) } else { recorded },
             ticks_per_row: (row_s / tick_s).round() as usize,
             tick_s,
             start: [0.0; 4],
@@ -285,8 +286,13 @@ impl Prepared {
             });
         }
         self.stimulus.ticks = ticks;
-        if let Driving::Command(_) = self.driving {
+        let stepped = matches!(self.driving, Driving::Command(_))
+            || self.driving == Driving::Current && rig.amplifier.kind == AmplifierKind::Current;
+        if stepped {
             self.edges = find_edges(&self.command);
+            if self.driving == Driving::Current {
+                smooth_between(&mut self.command, &self.edges);
+            }
             self.lay_command();
         }
     }
@@ -413,16 +419,66 @@ fn choose_driving(series: &Series, rig: &Rig, speed_driven: bool) -> Option<Driv
     varies("shaft_speed_rad_s").then_some(Driving::Speed)
 }
 
+/// A measured current as the command that made it: a sample caught in the middle of a jump (the
+/// drive's lag) takes the value that follows, so that every step has one edge.
+fn steps_of(current: &[f64]) -> Vec<f64> {
+    let mut out = current.to_vec();
+    let mut sizes: Vec<f64> = current.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
+    sizes.sort_by(f64::total_cmp);
+    let usual = sizes.get(sizes.len() / 2).copied().unwrap_or(0.0);
+    let range = current.iter().fold(0.0_f64, |m, c| m.max(c.abs()));
+    let jump = (8.0 * usual).max(0.02 * range);
+    let mut k = 1;
+    while k + 1 < current.len() {
+        let (to, on) = (current[k] - current[k - 1], current[k + 1] - current[k]);
+        if to.abs() > jump && on.abs() > 4.0 * usual && to * on > 0.0 {
+            out[k] = current[k + 1];
+            k += 1;
+        }
+        k += 1;
+    }
+    out
+}
+
+/// Takes a measured command's noise out: a parabola through the neighbours at each row, never
+/// across an edge. Noise in the drive would pass for noise of the shaft.
+fn smooth_between(command: &mut [f64], edges: &[Edge]) {
+    const REACH: usize = 8;
+    let raw = command.to_vec();
+    let mut bounds: Vec<usize> = std::iter::once(0).chain(edges.iter().map(|e| e.row)).collect();
+    bounds.push(raw.len());
+    for segment in bounds.windows(2) {
+        for k in segment[0]..segment[1] {
+            let (from, to) = (k.saturating_sub(REACH).max(segment[0]), (k + REACH + 1).min(segment[1]));
+            if to - from < 4 {
+                command[k] = raw[from..to].iter().sum::<f64>() / (to - from) as f64;
+                continue;
+            }
+            let rows = to - from;
+            let x = nalgebra::DMatrix::from_fn(rows, 3, |i, j| ((from + i) as f64 - k as f64).powi(j as i32));
+            let y = nalgebra::DVector::from_column_slice(&raw[from..to]);
+            let normal = x.tr_mul(&x);
+            if let Some(c) = normal.cholesky() {
+                command[k] = c.solve(&x.tr_mul(&y))[0];
+            }
+        }
+    }
+}
+
 /// Rows where the command jumps: it holds on at least one side, so the change is a step.
 fn find_edges(command: &[f64]) -> Vec<Edge> {
     let n = command.len();
     let range = command.iter().fold(0.0_f64, |m, c| m.max(c.abs()));
+    let mut sizes: Vec<f64> = command.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
+    sizes.sort_by(f64::total_cmp);
+    // Noise of a measured command; zero for a logged one that holds.
+    let usual = sizes.get(sizes.len() / 2).copied().unwrap_or(0.0);
     (1..n)
         .filter(|k| {
             let jump = (command[*k] - command[k - 1]).abs();
             let before = if *k >= 2 { (command[k - 1] - command[k - 2]).abs() } else { 0.0 };
             let after = if k + 1 < n { (command[k + 1] - command[*k]).abs() } else { 0.0 };
-            jump > 0.004 * range && jump > 4.0 * before.max(after)
+            jump > 0.004 * range && jump > 4.0 * before.max(after).max(usual)
         })
         .map(|row| Edge { row, ticks_before: 0 })
         .collect()

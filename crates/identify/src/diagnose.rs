@@ -284,6 +284,11 @@ fn write(
             why_not: format!("would lower the misfit by {gain:.0} (in twice the log-likelihood), but {why}"),
         });
     }
+    if outcome.places.is_empty()
+        && let Some((channel, size)) = outcome.excess
+    {
+        mismatch.push(bare_mismatch(search, &outcome.baseline, &baseline_full, channel, size, &speed));
+    }
     findings.sort_by(|a, b| b.probability.total_cmp(&a.probability));
     let verdict = verdict(&outcome, thin.is_some());
     if let (Some(why), Verdict::InsufficientData) = (&thin, verdict) {
@@ -328,7 +333,9 @@ fn write(
 fn verdict(outcome: &Outcome, thin: bool) -> Verdict {
     let total: f64 = outcome.places.iter().map(|p| p.gain).sum();
     let unnamed: f64 = outcome.places.iter().filter(|p| is_term(p.chosen)).map(|p| p.gain).sum();
-    if outcome.places.is_empty() {
+    if outcome.places.is_empty() && outcome.excess.is_some() && !thin {
+        Verdict::Unexplained
+    } else if outcome.places.is_empty() {
         if thin { Verdict::InsufficientData } else { Verdict::NoMismatch }
     } else if unnamed > 0.15 * total {
         Verdict::Unexplained
@@ -336,6 +343,35 @@ fn verdict(outcome: &Outcome, thin: bool) -> Verdict {
         Verdict::Ambiguous
     } else {
         Verdict::Explained
+    }
+}
+
+/// A mismatch that neither name nor term describes: located by its error alone, on the path whose
+/// effects and terms point at it most.
+fn bare_mismatch(
+    search: &Search,
+    fit: &Fit,
+    residual: &Stack,
+    channel: &'static str,
+    size: f64,
+    speed: &[Vec<f64>],
+) -> Mismatch {
+    let nothing: Stack = residual.iter().map(|r| r.iter().map(|c| vec![0.0; c.len()]).collect()).collect();
+    let located = locate(&search.problem, residual, &nothing, speed);
+    let sum = fit.chi2.max(1.0);
+    Mismatch {
+        path: match channel {
+            "current_a" => "drive",
+            "shaft_speed_rad_s" => "shaft",
+            "flow_m_s" => "flow",
+            _ => "blade",
+        }
+        .into(),
+        channel: channel.into(),
+        regime: format!("{} ({:.1} % of full scale above the noise)", located.regime, 100.0 * size),
+        time_s: located.spans,
+        significance_sigma: sum.sqrt(),
+        share_of_excess_error: 1.0,
     }
 }
 

@@ -20,7 +20,7 @@ impl Problem<'_> {
         let mut costs: Vec<Vec<Vec<f64>>> = Vec::new();
         for ticks in 0..longest.unwrap_or(1) {
             for recording in &mut self.recordings {
-                if matches!(recording.driving, Driving::Command(_)) && ticks < recording.ticks_per_row {
+                if recording.driving != Driving::Speed && ticks < recording.ticks_per_row {
                     recording.edges.iter_mut().for_each(|e| e.ticks_before = ticks);
                     recording.lay_command();
                 }
@@ -38,7 +38,7 @@ impl Problem<'_> {
         }
         let mut moved = false;
         for (r, recording) in self.recordings.iter_mut().enumerate() {
-            if !matches!(recording.driving, Driving::Command(_)) {
+            if recording.driving == Driving::Speed || recording.edges.is_empty() {
                 continue;
             }
             for (e, edge) in recording.edges.iter_mut().enumerate() {

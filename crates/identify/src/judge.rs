@@ -4,7 +4,8 @@ use kort_thruster::effects::Descriptor;
 
 use crate::baseline::{Member, members, recompose};
 use crate::data::{Series, available};
-use crate::fit::Fit;
+use crate::errors;
+use crate::fit::{Fit, Problem};
 use crate::library::is_term;
 use crate::search::{Candidate, Search, criterion, rules};
 
@@ -31,6 +32,8 @@ pub struct Outcome {
     pub places: Vec<Place>,
     /// Best candidate that was not believed, and why.
     pub doubt: Option<(&'static Descriptor, f64, &'static str)>,
+    /// Error above the noise that nothing explains: channel, root mean square over full scale.
+    pub excess: Option<(&'static str, f64)>,
 }
 
 /// Margin within which two explanations cannot be told apart.
@@ -101,14 +104,51 @@ pub fn run(
         search.problem.fit(&hypothesis, &columns, 8)
     };
     if rounds.is_empty() && term.is_none() {
-        return Outcome { baseline: current.clone(), last: current, places: Vec::new(), doubt };
+        // Nothing named: is there anything at all? Terms that switch on have not been tried yet.
+        let excess = excess(&search.problem, &current);
+        if excess.1 > rules::LEAST_EXCESS {
+            term = switched(search, &mut current);
+        }
+        if term.is_none() {
+            let excess = Some(excess).filter(|e| e.1 > rules::REAL_EXCESS);
+            return Outcome { baseline: current.clone(), last: current, places: Vec::new(), doubt, excess };
+        }
     }
     progress("weighing rivals");
     prune(search, &mut current, &mut rounds);
     let mut places = settle(search, &mut current, &rounds);
     let baseline = plain(search, &current);
     unnamed(search, &baseline, &mut current, &mut places, term);
-    Outcome { baseline, last: current, places, doubt }
+    let excess = Some(excess(&search.problem, &current)).filter(|e| e.1 > rules::REAL_EXCESS);
+    Outcome { baseline, last: current, places, doubt, excess }
+}
+
+/// The channel with most error above its noise: root mean square over full scale.
+fn excess(problem: &Problem, fit: &Fit) -> (&'static str, f64) {
+    let residual = problem.residual(&problem.respond(&fit.hypothesis, &fit.values));
+    let floor = errors::noise_floor(problem, &residual);
+    let full = errors::full_scales(problem);
+    errors::sums(problem, &residual, |r, row| !problem.masked[r][row])
+        .into_iter()
+        .map(|(name, (sum, n))| (name, (sum / n.max(1) as f64 - floor[name]).max(0.0).sqrt() / full[name]))
+        .max_by(|a, b| a.1.total_cmp(&b.1))
+        .unwrap_or(("", 0.0))
+}
+
+/// The best term of the whole library on the baseline, under the noise it leaves.
+fn switched(search: &mut Search, current: &mut Fit) -> Option<Candidate> {
+    let best = search.best_term(current)?;
+    let saved = (search.problem.recordings.clone(), search.problem.whiteners.clone());
+    search.problem.learn_noise(&best.fit.hypothesis, &best.fit.values);
+    let before = search.again(current);
+    let fit = search.again(&best.fit);
+    let gain = criterion(&before) - criterion(&fit);
+    if gain > rules::BELIEVE && search.size(&before, &fit) > rules::LEAST_SIZE {
+        *current = before;
+        return Some(Candidate { criterion: criterion(&fit), fit, ..best });
+    }
+    (search.problem.recordings, search.problem.whiteners) = saved;
+    None
 }
 
 /// Lets terms without a name judge what the names explain.

@@ -113,7 +113,7 @@ fn power(name: &'static str, unit: &'static str, size: f64, reference: f64) -> V
     vec![
         Spec::strength(name, unit, size, -reach, reach),
         Spec::shape("reference", "SI", reference, reference, reference),
-        Spec::shape("exponent", "1", 1.5, 0.0, 4.0),
+        Spec::shape("exponent", "1", 0.7, 0.0, 4.0),
     ]
 }
 
@@ -133,7 +133,7 @@ fn switch(name: &'static str, unit: &'static str, size: f64, scale: &Scale) -> V
 }
 
 fn exponents(specs: Vec<Spec>) -> Vec<Vec<f64>> {
-    [0.5, 3.0].into_iter().map(|p| vec![specs[0].start, specs[1].start, p]).collect()
+    [3.0].into_iter().map(|p| vec![specs[0].start, specs[1].start, p]).collect()
 }
 
 fn times(specs: Vec<Spec>, scale: &Scale) -> Vec<Vec<f64>> {

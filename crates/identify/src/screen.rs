@@ -7,6 +7,8 @@
 use kort_thruster::effects::{Descriptor, Scale};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
+use std::collections::HashMap;
+use std::sync::Arc;
 
 use crate::baseline::with_effect;
 use crate::fit::{Fit, Problem, Stack, Target};
@@ -96,71 +98,102 @@ impl Projector {
     }
 }
 
+/// Responses to the starts of effects, one stack a strength; they change little while further
+/// effects are found, so a search computes them once.
+pub type Known = HashMap<(&'static str, usize), Arc<Vec<Stack>>>;
+
 /// Screens effects on top of a fit, best first.
 pub fn screen(
     problem: &Problem,
     fit: &mut Fit,
     effects: &[&'static Descriptor],
     scale: &Scale,
+    known: &mut Known,
 ) -> Vec<Screened> {
     let projector = Projector::new(problem, fit);
     let fit = &*fit;
-    let base = problem.respond(&fit.hypothesis, &fit.values);
-    let mut found: Vec<Screened> = effects
-        .par_iter()
-        .flat_map_iter(|effect| {
+    let starts: Vec<(&'static Descriptor, usize, Vec<f64>)> = effects
+        .iter()
+        .flat_map(|effect| {
             let default: Vec<f64> = (effect.parameters)(scale).iter().map(|s| s.start).collect();
             std::iter::once(default)
                 .chain((effect.starts)(scale))
-                .map(|start| (*effect, start))
+                .enumerate()
+                .map(|(k, start)| (*effect, k, start))
                 .collect::<Vec<_>>()
         })
-        .filter_map(|(effect, start)| score(problem, fit, &projector, &base, effect, start, scale))
+        .collect();
+    let base = problem.respond(&fit.hypothesis, &fit.values);
+    let fresh: Vec<_> = starts
+        .par_iter()
+        .filter(|(effect, k, _)| !known.contains_key(&(effect.id, *k)))
+        .map(|(effect, k, start)| {
+            ((effect.id, *k), Arc::new(respond_to(problem, fit, &base, effect, start, scale)))
+        })
+        .collect();
+    known.extend(fresh);
+    let known = &*known;
+    let mut found: Vec<Screened> = starts
+        .into_par_iter()
+        .filter_map(|(effect, k, start)| {
+            score(problem, fit, &projector, &known[&(effect.id, k)], effect, start, scale)
+        })
         .collect();
     found.sort_by(|a, b| b.gain.total_cmp(&a.gain).then(a.effect.id.cmp(b.effect.id)));
     found
+}
+
+/// What changes when one strength of an effect is at its start and the others are zero, for
+/// every strength.
+fn respond_to(
+    problem: &Problem,
+    fit: &Fit,
+    base: &Stack,
+    effect: &'static Descriptor,
+    start: &[f64],
+    scale: &Scale,
+) -> Vec<Stack> {
+    let specs = (effect.parameters)(scale);
+    let strengths: Vec<usize> = (0..specs.len()).filter(|j| !specs[*j].shape).collect();
+    let hypothesis = with_effect(&fit.hypothesis, &fit.values, effect, scale, Some(start));
+    // Place of each of the effect's values among the free parameters (fixed ones have none).
+    let slot = hypothesis.effects.len() - 1;
+    let place = |j: usize| hypothesis.free.iter().position(|f| f.target == Target::Effect(slot, j));
+    strengths
+        .iter()
+        .map(|s| {
+            let mut values = hypothesis.start.clone();
+            for other in strengths.iter().filter(|o| *o != s) {
+                if let Some(k) = place(*other) {
+                    values[k] = 0.0_f64.clamp(specs[*other].low, specs[*other].high);
+                }
+            }
+            let mut response = problem.respond(&hypothesis, &values);
+            for (channels, base) in response.iter_mut().zip(base) {
+                for (samples, base) in channels.iter_mut().zip(base) {
+                    samples.iter_mut().zip(base).for_each(|(v, b)| *v -= b);
+                }
+            }
+            response
+        })
+        .collect()
 }
 
 fn score(
     problem: &Problem,
     fit: &Fit,
     projector: &Projector,
-    base: &Stack,
+    responses: &[Stack],
     effect: &'static Descriptor,
     start: Vec<f64>,
     scale: &Scale,
 ) -> Option<Screened> {
     let specs = (effect.parameters)(scale);
     let mut strengths: Vec<usize> = (0..specs.len()).filter(|j| !specs[*j].shape).collect();
-    let hypothesis = with_effect(&fit.hypothesis, &fit.values, effect, scale, Some(&start));
-    // Place of each of the effect's values among the free parameters (fixed ones have none).
-    let slot = hypothesis.effects.len() - 1;
-    let place: Vec<usize> = (0..specs.len())
-        .map(|j| {
-            hypothesis.free.iter().position(|f| f.target == Target::Effect(slot, j)).unwrap_or(usize::MAX)
-        })
-        .collect();
-    let mut directions = Vec::new();
-    let mut sizes = Vec::new();
-    for s in &strengths {
-        let mut values = hypothesis.start.clone();
-        for other in &strengths {
-            if other != s {
-                values[place[*other]] = 0.0_f64.clamp(specs[*other].low, specs[*other].high);
-            }
-        }
-        let mut response = problem.respond(&hypothesis, &values);
-        for (r, channels) in response.iter_mut().enumerate() {
-            for (c, samples) in channels.iter_mut().enumerate() {
-                samples.iter_mut().zip(&base[r][c]).for_each(|(v, b)| *v -= b);
-            }
-        }
-        sizes.push(problem.size(&response));
-        let direction = problem.whiten(&response);
-        if !direction.iter().all(|v| v.is_finite()) {
-            return None;
-        }
-        directions.push(direction);
+    let sizes: Vec<f64> = responses.iter().map(|r| problem.size(r)).collect();
+    let directions: Vec<DVector<f64>> = responses.iter().map(|r| problem.whiten(r)).collect();
+    if directions.is_empty() || directions.iter().any(|d| !d.iter().all(|v| v.is_finite())) {
+        return None;
     }
     let (gram, gradient) = projector.project(fit, &directions);
     let mut active: Vec<usize> = (0..strengths.len())

@@ -12,7 +12,7 @@ use crate::data::{Series, possible_drivers};
 use crate::fit::{Fit, Problem};
 use crate::heldout;
 use crate::library::{self, is_term};
-use crate::screen::{Screened, screen};
+use crate::screen::{Known, Screened, screen};
 
 /// Thresholds of the search, in units of whitened sums of squares (twice log-likelihoods). Set
 /// on tuning seeds (`kort prove --seed` below 1000), never on reported ones.
@@ -36,6 +36,11 @@ pub mod rules {
     pub const TERM_SHARE: f64 = 0.06;
     /// ... and at least this much.
     pub const TERM_LEAST: f64 = 20.0;
+    /// Error above the noise, root mean square over full scale, below which nothing is sought:
+    /// light turbulence of the inflow leaves as much.
+    pub const LEAST_EXCESS: f64 = 0.002;
+    /// ... and above which a mismatch is real even if nothing describes it.
+    pub const REAL_EXCESS: f64 = 0.006;
     /// A name must explain at least this share of what the best term explains to be followed.
     pub const LEAST_OF_TERM: f64 = 0.35;
     /// Most effects found in one recording.
@@ -93,6 +98,7 @@ pub struct Search<'a> {
     pub terms: Vec<&'static Descriptor>,
     /// The further column that promises most as a driver of what the baseline leaves.
     pub driver: Option<String>,
+    known: Known,
 }
 
 impl<'a> Search<'a> {
@@ -108,7 +114,7 @@ impl<'a> Search<'a> {
         }
         let terms =
             library::TERMS.iter().copied().filter(|t| (t.needs)(problem.rig, available).is_ok()).collect();
-        Self { problem, scale, named, unfit, terms, driver: None }
+        Self { problem, scale, named, unfit, terms, driver: None, known: Known::new() }
     }
 
     /// Fits the baseline: edges, noise and parameters in turn until they agree.
@@ -142,7 +148,9 @@ impl<'a> Search<'a> {
         let mut best: Option<(f64, String)> = None;
         for name in possible_drivers(series) {
             self.lay_extra(series, &name);
-            let gain = screen(&self.problem, current, &usable, &self.scale).first().map_or(0.0, |s| s.gain);
+            let gain = screen(&self.problem, current, &usable, &self.scale, &mut Known::new())
+                .first()
+                .map_or(0.0, |s| s.gain);
             if gain > rules::BELIEVE && best.as_ref().is_none_or(|b| gain > b.0) {
                 best = Some((gain, name));
             }
@@ -165,10 +173,12 @@ impl<'a> Search<'a> {
     /// Looks for one more effect on top of a fit that already gained `so_far`.
     pub fn round(&mut self, current: &mut Fit, so_far: f64) -> Option<Round> {
         let taken: Vec<&str> = current.hypothesis.effects.iter().map(|e| e.id).collect();
-        let terms: &[&'static Descriptor] = if taken.is_empty() { &self.terms } else { &[] };
+        // Loads that switch on at some time have many starts: they are tried at the end only.
+        let terms: Vec<&'static Descriptor> =
+            self.terms.iter().copied().filter(|t| taken.is_empty() && !t.id.ends_with("_switched")).collect();
         let everything: Vec<&'static Descriptor> =
-            self.named.iter().chain(terms).copied().filter(|e| !taken.contains(&e.id)).collect();
-        let screened = screen(&self.problem, current, &everything, &self.scale);
+            self.named.iter().chain(&terms).copied().filter(|e| !taken.contains(&e.id)).collect();
+        let screened = screen(&self.problem, current, &everything, &self.scale, &mut self.known);
         let least = (0.5 * rules::BELIEVE).max(0.5 * rules::SHARE_OF_FIRST * so_far);
         let chosen = choose(&screened, least);
         let mut candidates = self.refit(current, &chosen);
@@ -185,7 +195,8 @@ impl<'a> Search<'a> {
             self.problem.learn_noise(&best.fit.hypothesis, &best.fit.values);
             let base = criterion(&before);
             let worth = base - candidates[0].criterion;
-            candidates.retain(|c| base - c.criterion > 0.2 * worth);
+            candidates.retain(|c| base - c.criterion > 0.4 * worth);
+            candidates.truncate(6);
             before = self.again(&before);
             candidates = candidates
                 .into_par_iter()
@@ -214,8 +225,8 @@ impl<'a> Search<'a> {
     }
 
     /// The best term without a name on top of a fit, if any promises something.
-    pub fn best_term(&self, current: &mut Fit) -> Option<Candidate> {
-        let screened = screen(&self.problem, current, &self.terms, &self.scale);
+    pub fn best_term(&mut self, current: &mut Fit) -> Option<Candidate> {
+        let screened = screen(&self.problem, current, &self.terms, &self.scale, &mut self.known);
         let chosen: Vec<Screened> = screened
             .into_iter()
             .filter(|s| s.gain > 0.5 * rules::TERM_LEAST && s.size > rules::LEAST_SIZE)
