@@ -7,7 +7,7 @@ use crate::stand::{ROWS_PER_FLOW, Rows, Stand};
 use crate::thruster::Thruster;
 
 /// Integration steps a tick while sizing; the recording itself takes [`FINE_STEPS`].
-const COARSE_STEPS: usize = 4;
+const COARSE_STEPS: usize = 2;
 /// Integration steps a tick of a recording: 0.2 ms.
 pub const FINE_STEPS: usize = 10;
 
@@ -127,7 +127,7 @@ impl<'a> Experiment<'a> {
     }
 
     /// The share of [`Self::share`] that a re-fit of the seven base parameters leaves (linearised,
-    /// channels weighed by their noise, the stated two-sigma tolerances as priors).
+    /// channels weighed by their noise, none moved beyond its stated tolerance).
     pub fn visible(&self, hidden: &Hidden, tolerances: &[f64; 7]) -> f64 {
         let change = self.change(hidden);
         let weigh = |list: &[(&'static str, Vec<f64>, f64)]| -> Vec<f64> {
@@ -158,12 +158,8 @@ impl<'a> Experiment<'a> {
             })
             .collect();
         let target = weigh(&change);
-        let precision = tolerances.map(|tol| 2.0 / tol);
-        let absorbed = refit::project(&columns, &target, &precision);
         let energy = |values: &[f64]| values.iter().map(|value| value * value).sum::<f64>();
-        let rest: Vec<f64> = (0..target.len())
-            .map(|row| target[row] - columns.iter().zip(&absorbed).map(|(c, z)| c[row] * z).sum::<f64>())
-            .collect();
+        let rest = refit::residual_within(&columns, &target, tolerances);
         self.share(hidden).0 * (energy(&rest) / energy(&target).max(1e-30)).sqrt()
     }
 }

@@ -5,6 +5,7 @@ use crate::hidden::{Hidden, SkewChannel};
 use crate::thruster::Thruster;
 use rand::Rng;
 use serde::Serialize;
+use std::f64::consts::TAU;
 
 /// Hidden effects of the catalogue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
@@ -245,7 +246,7 @@ impl Effect {
             }
             TorqueRippleCogging => {
                 h.cogging_order = [4.0, 6.0, 7.0, 12.0, 14.0, 24.0][(u[0] * 5.99) as usize];
-                h.cogging_phase_rad = between(1, 0.0, 6.28);
+                h.cogging_phase_rad = between(1, 0.0, TAU);
                 h.cogging_nm = s * torque;
                 h.ripple_ratio = between(2, 0.0, 0.6) * s;
             }
@@ -254,7 +255,7 @@ impl Effect {
             AmbientFlowUnsteady => {
                 h.wave_m_s = 1.5 * s * vp;
                 h.wave_hz = [between(0, 0.05, 0.12), between(1, 0.1, 0.2), between(2, 0.18, 0.3)];
-                h.wave_phase_rad = [between(3, 0.0, 6.28), between(4, 0.0, 6.28), between(5, 0.0, 6.28)];
+                h.wave_phase_rad = [between(3, 0.0, TAU), between(4, 0.0, TAU), between(5, 0.0, TAU)];
             }
             TankRecirculation => {
                 h.recirculation = 0.9 * s;
@@ -313,7 +314,7 @@ impl Effect {
             EncoderFilterLag => h.speed_lag_s = 0.3 * s,
             EncoderEccentricity => {
                 h.encoder_order = if u[0] < 0.5 { 1.0 } else { 2.0 };
-                h.encoder_phase_rad = between(1, 0.0, 6.28);
+                h.encoder_phase_rad = between(1, 0.0, TAU);
                 h.encoder_error_rad = 0.4 * s;
             }
             TorqueChannelBias => h.torque_bias_nm = side(0) * 0.5 * s * torque,

@@ -52,3 +52,53 @@ pub fn project(columns: &[Vec<f64>], target: &[f64], precision: &[f64]) -> Vec<f
     }
     solution
 }
+
+/// What remains of `target` after the best combination of `columns` whose coefficients stay within
+/// plus and minus `bounds` (active set: the worst offender is fixed at its bound, one at a time).
+pub fn residual_within(columns: &[Vec<f64>], target: &[f64], bounds: &[f64]) -> Vec<f64> {
+    let mut rest = target.to_vec();
+    let mut free: Vec<usize> = (0..columns.len()).collect();
+    loop {
+        let chosen: Vec<Vec<f64>> = free.iter().map(|&index| columns[index].clone()).collect();
+        let precision: Vec<f64> = free.iter().map(|&index| 2.0 / bounds[index]).collect();
+        let found = project(&chosen, &rest, &precision);
+        let excess = |place: usize| found[place].abs() / bounds[free[place]];
+        let worst = (0..free.len()).max_by(|&a, &b| excess(a).total_cmp(&excess(b)));
+        match worst.filter(|&place| excess(place) > 1.0) {
+            Some(place) => {
+                let index = free.remove(place);
+                subtract(&mut rest, &columns[index], found[place].signum() * bounds[index]);
+            }
+            None => {
+                for (column, value) in chosen.iter().zip(&found) {
+                    subtract(&mut rest, column, *value);
+                }
+                return rest;
+            }
+        }
+    }
+}
+
+fn subtract(rest: &mut [f64], column: &[f64], factor: f64) {
+    for (value, slope) in rest.iter_mut().zip(column) {
+        *value -= factor * slope;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bounded_refit_leaves_what_lies_beyond_the_bound() {
+        let columns = [vec![1.0, 0.0, 1.0], vec![0.0, 1.0, 0.0]];
+        let rest = residual_within(&columns, &[3000.0, 0.1, 3000.0], &[1000.0, 1000.0]);
+        assert!((rest[0] - 2000.0).abs() < 1e-6 && rest[1].abs() < 1e-6, "{rest:?}");
+    }
+
+    #[test]
+    fn a_step_solves_a_linear_problem() {
+        let solved = gauss_newton_step(vec![1.0, 2.0], &mut |v| vec![v[0] - 3.0, v[1] - 5.0], &[0.0, 0.0]);
+        assert!((solved[0] - 3.0).abs() < 1e-6 && (solved[1] - 5.0).abs() < 1e-6, "{solved:?}");
+    }
+}

@@ -132,7 +132,7 @@ pub fn state(
     text += &quantity("inertia_kg_m2", truth.inertia_kg_m2, inertia, if small { 11 } else { 9 });
     text +=
         &quantity("torque_constant_nm_a", truth.torque_constant_nm_a, constant, if small { 7 } else { 5 });
-    let _ = write!(text, "winding_resistance_ohm = {}\n", truth.winding_resistance_ohm);
+    let _ = writeln!(text, "winding_resistance_ohm = {}", truth.winding_resistance_ohm);
     let _ = write!(
         text,
         "[amplifier]\nkind = \"current\"\ntime_constant_s = {:.4}\ncurrent_limit_a = {:.3}\nsupply_v = {:.2}\n",
