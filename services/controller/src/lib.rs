@@ -6,6 +6,8 @@
 
 #[cfg(feature = "process")]
 mod process;
+#[cfg(test)]
+mod tests;
 pub mod tick;
 
 #[cfg(feature = "process")]

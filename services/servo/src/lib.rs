@@ -6,7 +6,8 @@
 //!
 //! [`tick`] is the pure step, [`guard`] holds limits and trips, [`amplifier`] the drives; the
 //! process (feature `process`) adds the clock, real-time scheduling and shared memory. Once the
-//! loop runs it allocates nothing, takes no lock and has no path that panics.
+//! loop runs it allocates nothing, takes no lock and has no path that panics; `tests/no_allocation.rs`
+//! counts, and says what iceoryx2 does when a sample is sent.
 
 pub mod amplifier;
 pub mod guard;

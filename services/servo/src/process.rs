@@ -80,7 +80,7 @@ pub fn run(config: &Config, deployment: &Deployment, id: &str, join: bool) -> Re
     Ok(())
 }
 
-/// The loop. From here on nothing allocates, waits for another process or panics.
+/// The loop. From here on nothing of ours allocates, waits for another process or panics.
 fn tick_until_stopped(
     mut servo: Servo,
     amplifier: &mut dyn Amplifier,
