@@ -144,6 +144,8 @@ fn every_error_is_a_problem_document_with_its_type() {
         ("POST", "/v1/recordings", &[JSON], r#"{"name": "../x"}"#, 422, "out-of-range"),
         ("POST", "/v1/recordings", &[JSON], r#"{"rate_hz": 0}"#, 422, "out-of-range"),
         ("POST", "/v1/recordings", &[JSON], r#"{"thruster": "t9"}"#, 404, "unknown-thruster"),
+        ("POST", "/v1/thrusters/t1/arm", &[("Origin", "http://elsewhere.example")], "", 403, "foreign-origin"),
+        ("GET", "/v1/thrusters/t1/stream", &[("Origin", "null")], "", 403, "foreign-origin"),
         ("GET", "/v1/faults/9999", &[], "", 404, "unknown-fault"),
         ("GET", "/v1/faults/x", &[], "", 400, "malformed-path"),
     ];

@@ -98,12 +98,9 @@ impl Desk {
         }
     }
 
-    /// A request that may come without the lease, but not against it.
+    /// A request that may come without the lease, but not against it; with it, it renews it.
     pub fn may(&mut self, id: Option<&str>, now: Instant) -> Result<(), Problem> {
-        match id {
-            Some(_) => self.lease.check(&self.thruster, id, now),
-            None => Ok(()),
-        }
+        id.map_or(Ok(()), |id| self.renew(Some(id), now).map(drop))
     }
 
     /// Ends a lease whose time is over, and with it its setpoint.

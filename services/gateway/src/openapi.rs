@@ -1,6 +1,6 @@
 //! The frame of the OpenAPI document; the routes fill it in from their own code.
 
-use utoipa::openapi::schema::{AdditionalProperties, Schema};
+use utoipa::openapi::schema::{AdditionalProperties, ObjectBuilder, Schema, Type};
 use utoipa::openapi::{Info, OpenApi, OpenApiBuilder, RefOr, tag::TagBuilder};
 
 use crate::App;
@@ -44,6 +44,16 @@ pub fn finish(document: &mut OpenApi, app: &App) {
     let range = |pick: fn(&SetpointRange) -> f64| {
         app.thrusters().iter().map(|thruster| pick(&thruster.range)).fold(f64::INFINITY, f64::min)
     };
+    let ids: Vec<&str> = app.thrusters().iter().map(|thruster| thruster.id.as_str()).collect();
+    for item in document.paths.paths.values_mut() {
+        let operations = [&mut item.get, &mut item.put, &mut item.post, &mut item.delete];
+        for parameter in operations.into_iter().flatten().flat_map(|operation| operation.parameters.iter_mut().flatten()) {
+            if parameter.name == "id" {
+                let known = ObjectBuilder::new().schema_type(Type::String).enum_values(Some(ids.iter().copied()));
+                parameter.schema = Some(known.into());
+            }
+        }
+    }
     let bounds = [("thrust_n", range(|r| r.thrust_n)), ("speed_rad_s", range(|r| r.speed_rad_s))];
     let Some(components) = &mut document.components else { return };
     let Some(RefOr::T(Schema::OneOf(setpoint))) = components.schemas.get_mut("Setpoint") else { return };

@@ -16,6 +16,7 @@ pub enum Kind {
     MalformedHeader,
     MalformedBody,
     LeaseRequired,
+    ForeignOrigin,
     UnknownRoute,
     UnknownThruster,
     UnknownRecording,
@@ -42,13 +43,14 @@ pub enum Kind {
 
 impl Kind {
     /// All kinds, for the documentation and the tests.
-    pub const ALL: [Kind; 28] = [
+    pub const ALL: [Kind; 29] = [
         Kind::MalformedJson,
         Kind::MalformedPath,
         Kind::MalformedQuery,
         Kind::MalformedHeader,
         Kind::MalformedBody,
         Kind::LeaseRequired,
+        Kind::ForeignOrigin,
         Kind::UnknownRoute,
         Kind::UnknownThruster,
         Kind::UnknownRecording,
@@ -83,6 +85,7 @@ impl Kind {
             Kind::MalformedHeader => (S::BAD_REQUEST, "malformed-header", "A header cannot be read"),
             Kind::MalformedBody => (S::BAD_REQUEST, "malformed-body", "The body cannot be read"),
             Kind::LeaseRequired => (S::FORBIDDEN, "lease-required", "This needs the lease"),
+            Kind::ForeignOrigin => (S::FORBIDDEN, "foreign-origin", "A page of another site may not command"),
             Kind::UnknownRoute => (S::NOT_FOUND, "unknown-route", "No such route"),
             Kind::UnknownThruster => (S::NOT_FOUND, "unknown-thruster", "No such thruster"),
             Kind::UnknownRecording => (S::NOT_FOUND, "unknown-recording", "No such recording"),

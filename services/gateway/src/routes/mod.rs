@@ -20,7 +20,7 @@ use std::time::Duration;
 
 use axum::Router;
 use axum::extract::{DefaultBodyLimit, Request, State};
-use axum::http::{StatusCode, header};
+use axum::http::{HeaderMap, StatusCode, header};
 use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Response};
 use tower_http::timeout::TimeoutLayer;
@@ -52,6 +52,7 @@ pub fn router(app: Arc<App>) -> Router {
         .fallback(unknown_route)
         .layer(DefaultBodyLimit::max(BODY_BYTES_MAX))
         .layer(TimeoutLayer::with_status_code(StatusCode::REQUEST_TIMEOUT, Duration::from_secs(10)))
+        .layer(middleware::from_fn(same_origin))
         .layer(middleware::from_fn_with_state(Arc::clone(&app), problems_only))
         .with_state(app)
 }
@@ -59,6 +60,22 @@ pub fn router(app: Arc<App>) -> Router {
 async fn unknown_route(request: Request) -> Problem {
     Problem::new(Kind::UnknownRoute, format!("there is no route {}", request.uri().path()))
         .hint("GET /openapi.json lists every route; /docs shows them")
+}
+
+/// A browser lets any site send simple requests and open WebSockets to this machine; it names that site in `Origin`.
+async fn same_origin(request: Request, next: Next) -> Result<Response, Problem> {
+    match foreign_origin(request.headers()) {
+        Some(origin) => Err(Problem::new(Kind::ForeignOrigin, format!("the request comes from a page of {origin}"))
+            .hint("open the console of this gateway itself; programs need send no Origin")),
+        None => Ok(next.run(request).await),
+    }
+}
+
+fn foreign_origin(headers: &HeaderMap) -> Option<String> {
+    let origin = headers.get(header::ORIGIN)?.to_str().unwrap_or("an unreadable origin");
+    let host = headers.get(header::HOST).and_then(|host| host.to_str().ok());
+    let ours = origin.split_once("://").is_some_and(|(_, named)| Some(named) == host);
+    (!ours).then(|| origin.to_owned())
 }
 
 /// Errors that axum or a layer answers by itself (405, time-out, a missing page of the docs) become
