@@ -1,7 +1,7 @@
 "use strict";
 const $ = (id) => document.getElementById(id);
 const LEASE_TTL_MS = 2000, RENEW_EVERY_MS = 500, STREAM_HZ = 25;
-let thruster = null, lease = null, socket = null, state = null, heard_ms = 0, paused_s = null, limitsOf = {}, recording = null, dragging = false;
+let thruster = null, lease = null, socket = null, state = null, heard_ms = 0, paused_s = null, limitsOf = {}, recording = null, dragging = false, taken_ms = 0;
 
 const charts = [
   new StripChart($("plot-thrust"), "thrust", "N", [
@@ -98,7 +98,8 @@ function showState(s, live) {
   $("arm").disabled = s.armed || !live; $("disarm").disabled = !live;
 
   const mine = lease && s.lease;
-  if (lease && !s.lease) { lease = null; log("the lease ran out", true); }
+  // A state that was on its way when the lease was granted does not know of it.
+  if (lease && !s.lease && heard_ms > taken_ms + 500) { lease = null; log("the lease ran out", true); }
   $("lease-text").textContent = !s.lease ? "Nobody has the lease."
     : mine ? "You have the lease." : `“${s.lease.holder}” has the lease.`;
   $("lease-bar").style.width = s.lease ? `${Math.min(100, s.lease.expires_in_ms / LEASE_TTL_MS * 100)}%` : "0";
@@ -132,7 +133,7 @@ function chip(id, words, kind) { $(id).textContent = words; $(id).className = `c
 // Command ------------------------------------------------------------------------------------------------
 click("take", async () => {
   const granted = await call("POST", `${base()}/lease`, { holder: $("holder").value, ttl_ms: LEASE_TTL_MS });
-  lease = granted.lease_id; log(`lease taken as “${$("holder").value}”`);
+  lease = granted.lease_id; taken_ms = performance.now(); log(`lease taken as “${$("holder").value}”`);
 });
 click("give", async () => { await call("DELETE", `${base()}/lease`); lease = null; log("lease given up"); });
 setInterval(() => { if (lease) call("PUT", `${base()}/lease`).catch(() => { lease = null; }); }, RENEW_EVERY_MS);

@@ -47,9 +47,12 @@ pub fn finish(document: &mut OpenApi, app: &App) {
     let ids: Vec<&str> = app.thrusters().iter().map(|thruster| thruster.id.as_str()).collect();
     for item in document.paths.paths.values_mut() {
         let operations = [&mut item.get, &mut item.put, &mut item.post, &mut item.delete];
-        for parameter in operations.into_iter().flatten().flat_map(|operation| operation.parameters.iter_mut().flatten()) {
+        for parameter in
+            operations.into_iter().flatten().flat_map(|operation| operation.parameters.iter_mut().flatten())
+        {
             if parameter.name == "id" {
-                let known = ObjectBuilder::new().schema_type(Type::String).enum_values(Some(ids.iter().copied()));
+                let known =
+                    ObjectBuilder::new().schema_type(Type::String).enum_values(Some(ids.iter().copied()));
                 parameter.schema = Some(known.into());
             }
         }

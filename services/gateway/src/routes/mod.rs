@@ -65,8 +65,10 @@ async fn unknown_route(request: Request) -> Problem {
 /// A browser lets any site send simple requests and open WebSockets to this machine; it names that site in `Origin`.
 async fn same_origin(request: Request, next: Next) -> Result<Response, Problem> {
     match foreign_origin(request.headers()) {
-        Some(origin) => Err(Problem::new(Kind::ForeignOrigin, format!("the request comes from a page of {origin}"))
-            .hint("open the console of this gateway itself; programs need send no Origin")),
+        Some(origin) => {
+            Err(Problem::new(Kind::ForeignOrigin, format!("the request comes from a page of {origin}"))
+                .hint("open the console of this gateway itself; programs need send no Origin"))
+        }
         None => Ok(next.run(request).await),
     }
 }
