@@ -1,16 +1,23 @@
 //! One file a subcommand.
 
+mod explain;
+
 use clap::Subcommand;
 
 use crate::failure::{Failure, Outcome};
 
 /// The laboratory's subcommands.
 #[derive(Debug, Subcommand)]
-pub enum Command {}
+pub enum Command {
+    /// Look up the physics a model may leave out: what it is, how it shows, what it is confused with
+    Explain(explain::Args),
+}
 
 impl Command {
     /// Does it.
     pub fn run(self) -> Result<Outcome, Failure> {
-        match self {}
+        match self {
+            Command::Explain(args) => explain::run(&args),
+        }
     }
 }

@@ -1,0 +1,255 @@
+//! `kort explain`: the catalogue of omitted physics, or one effect in full.
+
+use std::fmt::Write;
+
+use kort_thruster::effects::{self, ALL, Descriptor, Scale};
+use serde::Serialize;
+
+use crate::failure::{Failure, Outcome, print, print_json};
+
+const EXAMPLE: &str = "\
+Example: kort explain rotational_flow
+         kort explain --json | jq '.effects[] | select(.path == \"shaft\") | .effect'
+         kort explain --markdown > docs/catalogue.md";
+
+/// Width of the text, columns.
+const WIDTH: usize = 96;
+
+/// Look up the physics a model may leave out: what it is, how it shows, what it is confused with
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLE)]
+pub struct Args {
+    /// One effect by its name in reports [default: the whole catalogue]
+    effect: Option<String>,
+    /// Print one JSON document (kort.explain/1)
+    #[arg(long, conflicts_with = "markdown")]
+    json: bool,
+    /// Print the whole catalogue in full as Markdown
+    #[arg(long, conflicts_with = "effect")]
+    markdown: bool,
+}
+
+/// Does it.
+///
+/// # Errors
+/// The effect is not in the catalogue; the message names the nearest one.
+pub fn run(args: &Args) -> Result<Outcome, Failure> {
+    let chosen = match &args.effect {
+        Some(id) => vec![find(id)?],
+        None => ALL.to_vec(),
+    };
+    if args.json {
+        let effects = chosen.iter().map(|effect| Entry::of(effect)).collect();
+        print_json(&Document { schema: "kort.explain/1", effects })?;
+    } else if args.markdown {
+        print(&markdown(&chosen));
+    } else if args.effect.is_some() {
+        print(&in_full(&Entry::of(chosen[0])));
+    } else {
+        print(&table(&chosen));
+    }
+    Ok(Outcome::Done)
+}
+
+/// An effect by its identifier; case and hyphens are forgiven.
+fn find(id: &str) -> Result<&'static Descriptor, Failure> {
+    let wanted = id.to_lowercase().replace(['-', ' '], "_");
+    effects::find(&wanted).ok_or_else(|| {
+        let likeness = |d: &Descriptor| {
+            let whole = strsim::jaro_winkler(d.id, &wanted);
+            // A part of the name is the usual near miss: `backlash`, `friction`.
+            if wanted.len() > 2 && d.id.contains(&wanted) { 1.0 + whole } else { whole }
+        };
+        let nearest = ALL.iter().max_by(|a, b| likeness(a).total_cmp(&likeness(b)));
+        let hint = match nearest.filter(|d| likeness(d) > 0.7) {
+            Some(d) => format!("did you mean `{}`?", d.id),
+            None => "`kort explain` lists the catalogue".into(),
+        };
+        Failure::input(format!(
+            "effect: `{id}` is not one of the {} in the catalogue\nhint: {hint}",
+            ALL.len()
+        ))
+    })
+}
+
+#[derive(Serialize)]
+struct Document {
+    schema: &'static str,
+    effects: Vec<Entry>,
+}
+
+/// An effect as it is printed.
+#[derive(Serialize)]
+struct Entry {
+    effect: &'static str,
+    path: &'static str,
+    what: &'static str,
+    equation: &'static str,
+    signature: &'static str,
+    confused_with: &'static [&'static str],
+    separated_by: &'static str,
+    reference: &'static str,
+    parameters: Vec<Parameter>,
+}
+
+#[derive(Serialize)]
+struct Parameter {
+    name: &'static str,
+    unit: &'static str,
+    /// "strength": the effect vanishes when all strengths are zero; "shape": where, how fast.
+    role: &'static str,
+}
+
+impl Entry {
+    fn of(effect: &Descriptor) -> Self {
+        // Names and units do not depend on the rig.
+        let any = Scale {
+            shaft_speed_rad_s: 1.0,
+            torque_n_m: 1.0,
+            thrust_n: 1.0,
+            flow_m_s: 1.0,
+            current_a: 1.0,
+            command: 1.0,
+            supply_v: 1.0,
+            inertia_kg_m2: 1.0,
+            tick_s: 0.002,
+            duration_s: 1.0,
+        };
+        let role = |shape| if shape { "shape" } else { "strength" };
+        Self {
+            effect: effect.id,
+            path: effect.path.name(),
+            what: effect.what,
+            equation: effect.equation,
+            signature: effect.signature,
+            confused_with: effect.confused_with,
+            separated_by: effect.separated_by,
+            reference: effect.reference,
+            parameters: (effect.parameters)(&any)
+                .into_iter()
+                .map(|s| Parameter { name: s.name, unit: s.unit, role: role(s.shape) })
+                .collect(),
+        }
+    }
+
+    /// Parameters with unit, strengths first in words.
+    fn parameter_list(&self) -> String {
+        let one = |p: &Parameter| match p.unit {
+            "1" => format!("{} ({})", p.name, p.role),
+            unit => format!("{} [{unit}] ({})", p.name, p.role),
+        };
+        self.parameters.iter().map(one).collect::<Vec<_>>().join(", ")
+    }
+
+    /// Headings and texts, in the order of reading.
+    fn sections(&self) -> [(&'static str, String); 7] {
+        [
+            ("What it is", self.what.into()),
+            ("Equation", self.equation.into()),
+            ("What it looks like", self.signature.into()),
+            ("Confused with", self.confused_with.join(", ")),
+            ("Separated by", self.separated_by.into()),
+            ("Parameters", self.parameter_list()),
+            ("Reference", self.reference.into()),
+        ]
+    }
+}
+
+fn table(effects: &[&Descriptor]) -> String {
+    let mut text = format!("{} effects that a thruster model may leave out\n", effects.len());
+    let name_width = effects.iter().map(|e| e.id.len()).max().unwrap_or(0);
+    for effect in effects {
+        let head = format!("{:name_width$}  {:6}  ", effect.id, effect.path.name());
+        let indent = " ".repeat(head.len());
+        let options = textwrap::Options::new(WIDTH.max(head.len() + 48))
+            .initial_indent(&head)
+            .subsequent_indent(&indent);
+        text += &format!("\n{}", textwrap::fill(effect.what, options));
+    }
+    text + "\n\nOne in full: kort explain EFFECT\n"
+}
+
+fn in_full(entry: &Entry) -> String {
+    let mut text = format!("{} ({} path)\n", entry.effect, entry.path);
+    for (heading, body) in entry.sections() {
+        let options = textwrap::Options::new(WIDTH).initial_indent("  ").subsequent_indent("  ");
+        let _ = write!(text, "\n{heading}\n{}\n", textwrap::fill(&body, options));
+    }
+    text
+}
+
+fn markdown(effects: &[&Descriptor]) -> String {
+    let mut text = format!(
+        "# Physics a model may leave out\n\n\
+         Written by `kort explain --markdown` from `crates/thruster/src/effects/`; do not edit here.\n\
+         {} effects in five paths: shaft, drive, flow, blade, sensor. A *strength* is a parameter at whose zero \
+         the effect vanishes; a *shape* says where, how fast, how sharp.\n\n| effect | path | what it is |\n| --- | --- | --- |\n",
+        effects.len()
+    );
+    // A bar would end the cell.
+    let cell = |s: &str| s.replace('|', "\\|");
+    for effect in effects {
+        let _ =
+            writeln!(text, "| [`{0}`](#{0}) | {1} | {2} |", effect.id, effect.path.name(), cell(effect.what));
+    }
+    for effect in effects {
+        let entry = Entry::of(effect);
+        let _ = write!(text, "\n## {}\n\n", entry.effect);
+        for (heading, body) in entry.sections() {
+            let body = match heading {
+                "Equation" => format!("`{body}`"),
+                "Confused with" => {
+                    let links: Vec<String> =
+                        entry.confused_with.iter().map(|id| format!("[`{id}`](#{id})")).collect();
+                    links.join(", ")
+                }
+                _ => body.replace('|', "\\|"),
+            };
+            let _ = writeln!(text, "- **{heading}:** {body}");
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_near_miss_names_the_nearest() {
+        for (asked, meant) in [
+            ("rotational_flows", "rotational_flow"),
+            ("coulomb", "coulomb_friction"),
+            ("backlash", "gear_backlash"),
+            ("tranport_delay", "transport_delay"),
+        ] {
+            let failure = find(asked).map(|d| d.id).unwrap_err();
+            assert_eq!(failure.code(), 2);
+            assert!(failure.to_string().contains(&format!("hint: did you mean `{meant}`?")), "{failure}");
+        }
+        assert!(find("xyz").map(|d| d.id).unwrap_err().to_string().contains("lists the catalogue"));
+        assert_eq!(find("Rotational-Flow").unwrap().id, "rotational_flow");
+    }
+
+    #[test]
+    fn the_table_names_every_effect() {
+        let text = table(ALL);
+        assert!(ALL.iter().all(|e| text.lines().any(|l| l.starts_with(e.id))));
+        assert!(text.lines().all(|l| l.chars().count() <= WIDTH), "{text}");
+    }
+
+    #[test]
+    fn one_effect_shows_all_that_is_known_of_it() {
+        for effect in ALL {
+            let text = in_full(&Entry::of(effect));
+            for id in effect.confused_with {
+                assert!(text.contains(id), "{text}");
+            }
+            for heading in
+                ["What it is", "Equation", "What it looks like", "Separated by", "Parameters", "Reference"]
+            {
+                assert!(text.contains(heading), "{text}");
+            }
+        }
+    }
+}
