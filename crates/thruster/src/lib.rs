@@ -12,3 +12,4 @@ pub mod models;
 pub mod parameters;
 pub mod plant;
 pub mod rig;
+pub mod scenario;

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::rig::{Quantity, Rig};
 
 /// One parameter of the plant.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Parameter {
     /// Radius of the duct, m.

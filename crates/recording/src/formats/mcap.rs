@@ -147,11 +147,11 @@ impl Table {
 
     /// Messages of several channels with one log time are one row.
     fn place(&mut self, log_time_ns: u64, cells: Vec<(usize, f64)>) {
-        if let Some(last) = self.rows.last_mut().filter(|r| r.log_time_ns == log_time_ns) {
-            if cells.iter().all(|(place, _)| last.cells.iter().all(|(there, _)| there != place)) {
-                last.cells.extend(cells);
-                return;
-            }
+        let free =
+            |row: &Row| cells.iter().all(|(place, _)| row.cells.iter().all(|(there, _)| there != place));
+        if let Some(last) = self.rows.last_mut().filter(|r| r.log_time_ns == log_time_ns && free(r)) {
+            last.cells.extend(cells);
+            return;
         }
         self.rows.push(Row { log_time_ns, message: self.messages, cells });
     }

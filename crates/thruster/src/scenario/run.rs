@@ -1,0 +1,461 @@
+//! A scenario at work: rows of a recording, one by one.
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+use super::{Command, Excitation, Measuring, Replays, Scenario, ScenarioError, Turbulence};
+use crate::effects::{self, Descriptor, Scale, Spec};
+use crate::models::ModelName;
+use crate::parameters::{Parameter, Parameters};
+use crate::plant::{Plant, Sensed, Tick};
+use crate::rig::{AmplifierKind, Rig};
+
+/// Control and log rates of a rig that states none, Hz.
+const CONTROL_RATE_HZ: f64 = 500.0;
+const LOG_RATE_HZ: f64 = 100.0;
+/// Longest run: a day.
+const LONGEST_S: f64 = 86_400.0;
+
+/// A prepared scenario.
+pub struct Run {
+    plant: Plant,
+    measuring: Measuring,
+    signals: Signals,
+    tick_s: f64,
+    log_rate_hz: f64,
+    tick: u64,
+    row: u64,
+    rows: u64,
+    before: Sensed,
+    command: f64,
+    asked: f64,
+    ambient_m_s: f64,
+    columns: Vec<&'static str>,
+}
+
+struct Signals {
+    command: Excitation,
+    drive: DriveMap,
+    ambient: Option<Excitation>,
+    turbulence: Option<Turbulent>,
+    supply: Option<Excitation>,
+    depth: Option<Excitation>,
+    temperature: Option<Excitation>,
+}
+
+/// From a command's value to the drive's.
+struct DriveMap {
+    command: Command,
+    kind: AmplifierKind,
+    /// Drive command at share 1.
+    full: f64,
+    torque_constant_nm_a: f64,
+    resistance_ohm: f64,
+    thrust_n_s2: f64,
+    torque_nm_s2: f64,
+}
+
+impl Run {
+    /// Prepares a scenario on a rig.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] names the key, the value found and what is allowed.
+    pub fn new(scenario: &Scenario, rig: &Rig, replays: &mut dyn Replays) -> Result<Self, ScenarioError> {
+        let value = |key: &str, found: f64, allowed: &str| ScenarioError::Value {
+            key: key.into(),
+            found: found.to_string(),
+            allowed: allowed.into(),
+        };
+        let mut parameters = Parameters::stated(rig);
+        for (parameter, number) in &scenario.parameters {
+            if !number.is_finite() || (parameter.positive() && *number < 0.0) {
+                return Err(value(
+                    &format!("parameters.{}", parameter.name()),
+                    *number,
+                    "a finite number, 0 or above",
+                ));
+            }
+            parameters.set(*parameter, *number);
+        }
+        if !scenario.noise.is_finite() || scenario.noise < 0.0 {
+            return Err(value("noise", scenario.noise, "0 (off) or a factor above 0"));
+        }
+        if scenario.segments.is_empty() {
+            return Err(ScenarioError::Missing {
+                key: "segments".into(),
+                hint: "at least one, for example { kind = \"hold\", value = 0.5, duration_s = 5.0 }".into(),
+            });
+        }
+        let seed = scenario.seed;
+        let command = Excitation::new("segments", &scenario.segments, seed, replays)?;
+        let duration_s = scenario.duration_s.unwrap_or(command.duration_s());
+        if !(duration_s > 0.0 && duration_s <= LONGEST_S) {
+            return Err(value("duration_s", duration_s, "above 0, at most 86400"));
+        }
+        let mut signal = |name: &str, segments: &[_], salt: u64| match segments {
+            [] => Ok(None),
+            some => Excitation::new(name, some, seed.wrapping_add(salt), replays).map(Some),
+        };
+        let ambient = signal("ambient", &scenario.ambient, 11)?;
+        let supply = signal("supply", &scenario.supply, 13)?;
+        let depth = signal("depth", &scenario.depth, 17)?;
+        let temperature = signal("temperature", &scenario.temperature, 19)?;
+        let turbulence = scenario.turbulence.map(|t| Turbulent::new(t, seed)).transpose()?;
+        let drive = DriveMap::new(scenario.command, rig, &parameters)?;
+        let tick_s = 1.0 / rig.sensors.control_rate_hz.unwrap_or(CONTROL_RATE_HZ);
+        let log_rate_hz = rig.sensors.log_rate_hz.unwrap_or(LOG_RATE_HZ);
+        let peak = drive.to_drive(command.peak(1.0 / log_rate_hz)).abs();
+        let scale = scale(rig, &parameters, peak, tick_s, duration_s);
+        let effects = used(scenario, &scale)?;
+        let effects: Vec<(&Descriptor, &[f64])> = effects.iter().map(|(d, v)| (*d, v.as_slice())).collect();
+        let columns = columns(scenario, rig);
+        let plant =
+            Plant::new(scenario.model, rig, &parameters, &effects, tick_s).with_encoder_quantised(true);
+        Ok(Self {
+            before: *plant.sensed(),
+            plant,
+            measuring: Measuring::new(&rig.sensors, scale, scenario.noise, seed.wrapping_add(23)),
+            signals: Signals { command, drive, ambient, turbulence, supply, depth, temperature },
+            tick_s,
+            log_rate_hz,
+            tick: 0,
+            row: 0,
+            rows: (duration_s * log_rate_hz + 1e-6).floor() as u64 + 1,
+            command: 0.0,
+            asked: 0.0,
+            ambient_m_s: 0.0,
+            columns,
+        })
+    }
+
+    /// Columns of a row, beside `time_s`.
+    pub fn columns(&self) -> &[&'static str] {
+        &self.columns
+    }
+
+    /// Number of rows in all.
+    pub fn rows(&self) -> u64 {
+        self.rows
+    }
+
+    /// The next row into `values` (one a column); its time, or `None` at the end. The row at an
+    /// instant shows the command that acts from then on and the state that it finds.
+    pub fn next_row(&mut self, values: &mut Vec<f64>) -> Option<f64> {
+        if self.row == self.rows {
+            return None;
+        }
+        let time_s = self.row as f64 / self.log_rate_hz;
+        self.row += 1;
+        // The tick in which the instant lies; one on the grid shows the state before that tick.
+        let within = time_s / self.tick_s;
+        let tick = (within + 1e-6).floor() as u64;
+        while self.tick < tick {
+            self.step();
+        }
+        let part = (within - tick as f64).max(0.0);
+        let sensed = if part < 1e-6 {
+            self.show(tick as f64 * self.tick_s);
+            *self.plant.sensed()
+        } else {
+            self.step();
+            between(&self.before, self.plant.sensed(), part)
+        };
+        let read = self.measuring.read(time_s, &sensed);
+        values.clear();
+        values.extend(self.columns.iter().map(|name| self.cell(name, time_s, &read)));
+        Some(time_s)
+    }
+
+    /// Takes over what the signals ask for at a tick's start.
+    fn show(&mut self, time_s: f64) {
+        self.asked = self.signals.command.value(time_s);
+        self.command = self.signals.drive.to_drive(self.asked);
+    }
+
+    fn step(&mut self) {
+        let time_s = self.tick as f64 * self.tick_s;
+        self.show(time_s);
+        self.before = *self.plant.sensed();
+        let at = |s: &Option<Excitation>, t: f64| s.as_ref().map(|s| s.value(t));
+        let s = &mut self.signals;
+        let gust = s.turbulence.as_mut().map_or((0.0, 0.0), |t| t.next(self.tick_s));
+        let ambient = (
+            at(&s.ambient, time_s).unwrap_or(0.0) + gust.0,
+            at(&s.ambient, time_s + self.tick_s).unwrap_or(0.0) + gust.1,
+        );
+        self.ambient_m_s = ambient.1;
+        self.plant.step(&Tick {
+            time_s,
+            command: self.command,
+            ambient_m_s: ambient,
+            supply_v: at(&s.supply, time_s),
+            depth_m: at(&s.depth, time_s),
+            temperature_c: at(&s.temperature, time_s),
+            ..Tick::default()
+        });
+        self.tick += 1;
+    }
+
+    fn cell(&self, name: &str, time_s: f64, read: &Sensed) -> f64 {
+        let at = |s: &Option<Excitation>| s.as_ref().map_or(f64::NAN, |s| s.value(time_s));
+        match name {
+            "current_cmd_a" | "voltage_cmd_v" | "speed_cmd_rad_s" => self.command,
+            "duty_cmd" | "thrust_cmd_n" => self.asked,
+            "current_a" => read.current_a,
+            "shaft_angle_rad" => read.shaft_angle_rad,
+            "shaft_speed_rad_s" => read.shaft_speed_rad_s,
+            "thrust_n" => read.thrust_n,
+            "torque_n_m" => read.torque_n_m,
+            "flow_m_s" => read.flow_m_s,
+            "ambient_m_s" => self.ambient_m_s,
+            "supply_v" => read.supply_v,
+            "depth_m" => at(&self.signals.depth),
+            "temperature_c" => at(&self.signals.temperature),
+            _ => f64::NAN,
+        }
+    }
+}
+
+fn between(a: &Sensed, b: &Sensed, part: f64) -> Sensed {
+    let mix = |x: f64, y: f64| x + (y - x) * part;
+    Sensed {
+        current_a: mix(a.current_a, b.current_a),
+        shaft_angle_rad: mix(a.shaft_angle_rad, b.shaft_angle_rad),
+        shaft_speed_rad_s: mix(a.shaft_speed_rad_s, b.shaft_speed_rad_s),
+        thrust_n: mix(a.thrust_n, b.thrust_n),
+        torque_n_m: mix(a.torque_n_m, b.torque_n_m),
+        flow_m_s: mix(a.flow_m_s, b.flow_m_s),
+        ..*b
+    }
+}
+
+fn columns(scenario: &Scenario, rig: &Rig) -> Vec<&'static str> {
+    let wet = rig.propeller.is_some();
+    let axial = wet && scenario.model != ModelName::Model0;
+    let speed_drive = rig.amplifier.kind == AmplifierKind::Speed;
+    let drive = match rig.amplifier.kind {
+        AmplifierKind::Current => "current_cmd_a",
+        AmplifierKind::Voltage => "voltage_cmd_v",
+        AmplifierKind::Speed => "speed_cmd_rad_s",
+    };
+    [
+        (drive, true),
+        ("duty_cmd", scenario.command == Command::DutyCmd),
+        ("thrust_cmd_n", scenario.command == Command::ThrustCmdN),
+        ("current_a", !speed_drive),
+        ("shaft_angle_rad", rig.sensors.encoder_counts_per_rev.is_some()),
+        ("shaft_speed_rad_s", true),
+        ("thrust_n", wet),
+        ("torque_n_m", wet && rig.sensors.torque_transducer),
+        ("flow_m_s", axial),
+        ("ambient_m_s", wet && rig.sensors.ambient_flow_recorded),
+        ("supply_v", rig.amplifier.supply_v.is_some() || !scenario.supply.is_empty()),
+        ("depth_m", !scenario.depth.is_empty()),
+        ("temperature_c", !scenario.temperature.is_empty()),
+    ]
+    .into_iter()
+    .filter_map(|(name, there)| there.then_some(name))
+    .collect()
+}
+
+/// Sizes in use: from the largest command through the steady map.
+fn scale(rig: &Rig, p: &Parameters, peak: f64, tick_s: f64, duration_s: f64) -> Scale {
+    let kt = p.get(Parameter::TorqueConstantNmA);
+    let (ct, cq) = if rig.propeller.is_some() { p.bollard_coefficients() } else { (0.0, 0.0) };
+    let limit = rig.amplifier.current_limit_a;
+    let speed_at = |torque: f64| if cq > 0.0 { (torque / cq).sqrt() } else { 100.0 };
+    let (current, speed) = match rig.amplifier.kind {
+        AmplifierKind::Current => (peak.min(limit), speed_at(kt * peak.min(limit))),
+        AmplifierKind::Voltage => {
+            // V = R i + kt Om, kt i = cq Om^2
+            let r = p.get(Parameter::WindingResistanceOhm);
+            let a = r * cq / kt;
+            let speed =
+                if a > 0.0 { ((kt * kt + 4.0 * a * peak).sqrt() - kt) / (2.0 * a) } else { peak / kt };
+            ((cq * speed * speed / kt).min(limit), speed)
+        }
+        AmplifierKind::Speed => (cq * peak * peak / kt, peak),
+    };
+    let thrust = ct * speed * speed;
+    let flux = p.get(Parameter::FluxCoefficient) * p.get(Parameter::DensityKgM3) * p.area_m2();
+    Scale {
+        shaft_speed_rad_s: speed.max(1e-6),
+        torque_n_m: (kt * current).max(1e-9),
+        thrust_n: thrust.max(1e-9),
+        flow_m_s: if flux > 0.0 { (thrust / flux).sqrt() } else { 1.0 },
+        current_a: current.max(1e-9),
+        command: peak.max(1e-9),
+        supply_v: rig.amplifier.supply_v.unwrap_or(0.0),
+        inertia_kg_m2: p.get(Parameter::InertiaKgM2),
+        tick_s,
+        duration_s,
+    }
+}
+
+/// The scenario's effects with a value for every parameter.
+fn used(scenario: &Scenario, scale: &Scale) -> Result<Vec<(&'static Descriptor, Vec<f64>)>, ScenarioError> {
+    let near = |wanted: &str, names: &[&str]| {
+        let best = names
+            .iter()
+            .max_by(|a, b| strsim::jaro_winkler(wanted, a).total_cmp(&strsim::jaro_winkler(wanted, b)));
+        best.map_or("it has none".to_string(), |n| {
+            format!("did you mean `{n}`? known are {}", names.join(", "))
+        })
+    };
+    let mut all = Vec::with_capacity(scenario.effects.len());
+    for (i, wanted) in scenario.effects.iter().enumerate() {
+        let at = format!("effects[{i}]");
+        let Some(descriptor) = effects::find(&wanted.effect) else {
+            let ids: Vec<&str> = effects::ALL.iter().map(|d| d.id).collect();
+            return Err(ScenarioError::Unknown {
+                key: format!("{at}.effect"),
+                found: format!("\"{}\"", wanted.effect),
+                hint: near(&wanted.effect, &ids),
+            });
+        };
+        let specs = (descriptor.parameters)(scale);
+        if let Some(name) = wanted.parameters.keys().find(|name| !specs.iter().any(|s| s.name == *name)) {
+            let names: Vec<&str> = specs.iter().map(|s| s.name).collect();
+            let (key, found) = (format!("{at}.parameters"), format!("\"{name}\""));
+            return Err(ScenarioError::Unknown { key, found, hint: near(name, &names) });
+        }
+        let value = |spec: &Spec| {
+            let key = format!("{at}.parameters.{}", spec.name);
+            let range = format!("{} to {} {}", spec.low, spec.high, spec.unit);
+            match wanted.parameters.get(spec.name) {
+                None => {
+                    Err(ScenarioError::Missing { key, hint: format!("{range}, for example {}", spec.start) })
+                }
+                Some(v) if *v >= spec.low && *v <= spec.high => Ok(*v),
+                Some(v) => Err(ScenarioError::Value { key, found: v.to_string(), allowed: range }),
+            }
+        };
+        all.push((descriptor, specs.iter().map(value).collect::<Result<Vec<_>, _>>()?));
+    }
+    Ok(all)
+}
+
+impl DriveMap {
+    fn new(command: Command, rig: &Rig, p: &Parameters) -> Result<Self, ScenarioError> {
+        let kind = rig.amplifier.kind;
+        let fail = |why: &str, hint: &str| {
+            Err(ScenarioError::Command { command: command.name(), why: why.into(), hint: hint.into() })
+        };
+        let own = match kind {
+            AmplifierKind::Current => Command::CurrentCmdA,
+            AmplifierKind::Voltage => Command::VoltageCmdV,
+            AmplifierKind::Speed => Command::SpeedCmdRadS,
+        };
+        let (ct, cq) = if rig.propeller.is_some() { p.bollard_coefficients() } else { (0.0, 0.0) };
+        let mut map = Self {
+            command,
+            kind,
+            full: f64::NAN,
+            torque_constant_nm_a: p.get(Parameter::TorqueConstantNmA),
+            resistance_ohm: p.get(Parameter::WindingResistanceOhm),
+            thrust_n_s2: ct,
+            torque_nm_s2: cq,
+        };
+        match command {
+            Command::CurrentCmdA | Command::VoltageCmdV | Command::SpeedCmdRadS if command != own => {
+                return fail(
+                    &format!("its drive takes {}", own.name()),
+                    "command = \"share\" fits any drive",
+                );
+            }
+            Command::TorqueCmdNM if kind != AmplifierKind::Current => {
+                return fail(
+                    "a torque needs amplifier.kind = \"current\"",
+                    "command = \"share\" fits any drive",
+                );
+            }
+            Command::DutyCmd if kind != AmplifierKind::Voltage => {
+                return fail(
+                    "a duty needs amplifier.kind = \"voltage\"",
+                    "command = \"share\" fits any drive",
+                );
+            }
+            Command::ThrustCmdN if ct <= 0.0 => {
+                return fail("it has no propeller that gives thrust", "command it by torque or current");
+            }
+            Command::DutyCmd | Command::Share => {
+                let kt = map.torque_constant_nm_a;
+                let limit = match (kind, rig.amplifier.supply_v) {
+                    (AmplifierKind::Current, _) => {
+                        Some(rig.amplifier.current_limit_a).filter(|a| a.is_finite())
+                    }
+                    (AmplifierKind::Voltage, supply) => supply,
+                    // Speed at which the supply just drives the propeller, winding neglected.
+                    (AmplifierKind::Speed, supply) => supply.map(|v| v / kt),
+                };
+                match limit {
+                    Some(limit) => map.full = limit,
+                    None => {
+                        let key = if kind == AmplifierKind::Current { "current_limit_a" } else { "supply_v" };
+                        return fail(
+                            &format!("its largest command is not stated (amplifier.{key})"),
+                            &format!("state amplifier.{key}, or give the values as {}", own.name()),
+                        );
+                    }
+                }
+            }
+            _ => {}
+        }
+        Ok(map)
+    }
+
+    fn to_drive(&self, value: f64) -> f64 {
+        match self.command {
+            Command::CurrentCmdA | Command::VoltageCmdV | Command::SpeedCmdRadS => value,
+            Command::DutyCmd | Command::Share => value * self.full,
+            Command::TorqueCmdNM => value / self.torque_constant_nm_a,
+            Command::ThrustCmdN => {
+                let speed = value.signum() * (value.abs() / self.thrust_n_s2).sqrt();
+                let current = self.torque_nm_s2 * speed * speed.abs() / self.torque_constant_nm_a;
+                match self.kind {
+                    AmplifierKind::Current => current,
+                    AmplifierKind::Voltage => {
+                        self.resistance_ohm * current + self.torque_constant_nm_a * speed
+                    }
+                    AmplifierKind::Speed => speed,
+                }
+            }
+        }
+    }
+}
+
+/// Gauss-Markov noise, exact at any step.
+struct Turbulent {
+    sigma_m_s: f64,
+    time_constant_s: f64,
+    now: f64,
+    random: ChaCha8Rng,
+}
+
+impl Turbulent {
+    fn new(wanted: Turbulence, seed: u64) -> Result<Self, ScenarioError> {
+        for (key, value) in [("sigma_m_s", wanted.sigma_m_s), ("time_constant_s", wanted.time_constant_s)] {
+            if !(value.is_finite() && value > 0.0) {
+                let (key, found) = (format!("turbulence.{key}"), value.to_string());
+                return Err(ScenarioError::Value { key, found, allowed: "a finite number above 0".into() });
+            }
+        }
+        let mut random = ChaCha8Rng::seed_from_u64(seed.wrapping_add(29));
+        let draw: f64 = StandardNormal.sample(&mut random);
+        let Turbulence { sigma_m_s, time_constant_s } = wanted;
+        Ok(Self { sigma_m_s, time_constant_s, now: sigma_m_s * draw, random })
+    }
+
+    /// Values at the start and the end of the next step.
+    fn next(&mut self, dt: f64) -> (f64, f64) {
+        let keep = (-dt / self.time_constant_s).exp();
+        let draw: f64 = StandardNormal.sample(&mut self.random);
+        let from = self.now;
+        self.now = keep * from + self.sigma_m_s * (1.0 - keep * keep).sqrt() * draw;
+        (from, self.now)
+    }
+}
+
+#[cfg(test)]
+mod tests;
