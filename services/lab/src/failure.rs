@@ -81,14 +81,6 @@ pub fn read_text(path: &Path) -> Result<String, Failure> {
         .map_err(|e| Failure::input(format!("{}: cannot be read: {e}\nhint: check the path", path.display())))
 }
 
-/// Reads a rig description.
-///
-/// # Errors
-/// Names the file, the key, the value found and what is allowed.
-pub fn read_rig(path: &Path) -> Result<kort_thruster::rig::Rig, Failure> {
-    kort_thruster::rig::Rig::from_toml(&read_text(path)?).map_err(|e| Failure::in_file(path, e))
-}
-
 /// Writes a result file.
 ///
 /// # Errors

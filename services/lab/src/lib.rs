@@ -5,6 +5,7 @@
 
 pub mod commands;
 pub mod failure;
+pub mod input;
 pub mod progress;
 pub mod render;
 

@@ -1,6 +1,7 @@
 //! One file a subcommand.
 
 mod explain;
+mod simulate;
 
 use clap::Subcommand;
 
@@ -11,6 +12,8 @@ use crate::failure::{Failure, Outcome};
 pub enum Command {
     /// Look up the physics a model may leave out: what it is, how it shows, what it is confused with
     Explain(explain::Args),
+    /// Make a recording from a model, with the stand's sensors
+    Simulate(simulate::Args),
 }
 
 impl Command {
@@ -18,6 +21,7 @@ impl Command {
     pub fn run(self) -> Result<Outcome, Failure> {
         match self {
             Command::Explain(args) => explain::run(&args),
+            Command::Simulate(args) => simulate::run(&args),
         }
     }
 }

@@ -1,0 +1,161 @@
+//! `kort simulate`: a recording from a model, with the stand's sensors.
+
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+
+use clap::Args as ClapArgs;
+use kort_recording::{Format, Writer};
+use kort_thruster::rig::Rig;
+use kort_thruster::scenario::{Replayed, Replays, Run, Scenario};
+use serde::Serialize;
+
+use crate::failure::{Failure, Outcome, print, print_json};
+use crate::{input, progress};
+
+/// Arguments of `kort simulate`.
+#[derive(Debug, ClapArgs)]
+#[command(after_help = "\
+Example: kort simulate --rig whitcomb-yoerger-1999 --scenario identification-prbs -o prbs.csv
+         kort simulate --rig my-rig.toml --scenario report.json -o next.mcap
+
+A scenario is a TOML or JSON file, the JSON report of kort diagnose (its next experiment is run), or
+the name of a shipped one: chirp, identification-prbs, identification-random-levels, joystick-replay,
+multisine, slow-reversal-ramp, staircase, torque-step-9.2, torque-steps-18, tow.")]
+pub struct Args {
+    /// Rig description: a file, or the name of a shipped one
+    #[arg(long, value_name = "RIG")]
+    rig: PathBuf,
+    /// What is run: a file, or the name of a shipped scenario
+    #[arg(long, value_name = "FILE")]
+    scenario: PathBuf,
+    /// The recording to write: .csv, .csv.gz or .mcap
+    #[arg(short, long, value_name = "REC")]
+    output: PathBuf,
+    /// Seed of noise and random signals, before the scenario's
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Factor on the usual sensor noise, before the scenario's; 0 is off
+    #[arg(long, value_name = "FACTOR")]
+    noise: Option<f64>,
+    /// Print what was written as one JSON document
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct Report<'a> {
+    schema: &'static str,
+    kort_version: &'static str,
+    recording: String,
+    rig: &'a str,
+    scenario: &'a str,
+    model: &'static str,
+    seed: u64,
+    rows: u64,
+    duration_s: f64,
+    columns: Vec<&'static str>,
+}
+
+/// Runs it.
+pub fn run(args: &Args) -> Result<Outcome, Failure> {
+    let format = Format::of(&args.output).map_err(Failure::input)?;
+    let rig = input::read_rig(&args.rig)?;
+    let mut scenario = read_scenario(&args.scenario)?;
+    scenario.seed = args.seed.unwrap_or(scenario.seed);
+    scenario.noise = args.noise.unwrap_or(scenario.noise);
+    let mut files = Files { beside: args.scenario.parent().map(Path::to_path_buf), lost: false };
+    let mut run = Run::new(&scenario, &rig, &mut files).map_err(|e| Failure::in_file(&args.scenario, e))?;
+    let columns = run.columns().to_vec();
+    let duration_s = write(&mut run, format, &args.output, &rig)?;
+    let report = Report {
+        schema: "kort.simulate/1",
+        kort_version: env!("CARGO_PKG_VERSION"),
+        recording: args.output.display().to_string(),
+        rig: &rig.name,
+        scenario: &scenario.name,
+        model: scenario.model.name(),
+        seed: scenario.seed,
+        rows: run.rows(),
+        duration_s,
+        columns,
+    };
+    if args.json {
+        print_json(&report)?;
+    } else {
+        let Report { recording, rows, model, .. } = &report;
+        print(&format!(
+            "{recording}: {rows} rows, {duration_s} s of {model}: {}\n",
+            report.columns.join(", ")
+        ));
+    }
+    Ok(Outcome::with_loss(files.lost))
+}
+
+/// Writes the rows; nothing half-written stays behind when that fails.
+fn write(run: &mut Run, format: Format, path: &Path, rig: &Rig) -> Result<f64, Failure> {
+    let bar = progress::bar(run.rows(), "simulating");
+    let mut go = || -> std::io::Result<f64> {
+        let output = BufWriter::new(File::create(path)?);
+        let mut writer = Writer::create(format, &rig.name, run.columns(), output)?;
+        let (mut values, mut last_s) = (Vec::new(), 0.0);
+        while let Some(time_s) = run.next_row(&mut values) {
+            writer.row(time_s, &values)?;
+            bar.inc(1);
+            last_s = time_s;
+        }
+        writer.finish()?;
+        Ok(last_s)
+    };
+    let done = go().map_err(|e| {
+        let _ = std::fs::remove_file(path);
+        Failure::unwritten(path, e)
+    });
+    bar.finish_and_clear();
+    done
+}
+
+/// A scenario in TOML or JSON, or the next experiment of a diagnosis report.
+fn read_scenario(wanted: &Path) -> Result<Scenario, Failure> {
+    let text = input::scenario_text(wanted)?;
+    let fail = |e: &dyn std::fmt::Display| Failure::in_file(wanted, e);
+    if !text.trim_start().starts_with('{') {
+        return Scenario::from_toml(&text).map_err(|e| fail(&e));
+    }
+    let mut json: serde_json::Value = serde_json::from_str(&text).map_err(|e| fail(&e))?;
+    if let Some(next) = json.get_mut("next_experiment") {
+        json = next.get_mut("scenario").map(serde_json::Value::take).ok_or_else(|| {
+            fail(&"`next_experiment` is null: this report asks for no further run\nhint: choose a scenario yourself")
+        })?;
+    }
+    serde_json::from_value(json)
+        .map_err(|e| fail(&format!("{e}\nhint: docs/recordings.md lists the keys of a scenario")))
+}
+
+/// Replays from files and built-in recordings.
+struct Files {
+    beside: Option<PathBuf>,
+    lost: bool,
+}
+
+impl Replays for Files {
+    fn column(&mut self, name: &str, column: &str, columns: Option<&str>) -> Result<Replayed, String> {
+        let map = input::read_columns(columns).map_err(|e| e.to_string())?;
+        let recording = input::replayed_recording(name, self.beside.as_deref(), map.as_ref())
+            .map_err(|e| e.to_string())?;
+        self.lost |= !recording.losses.is_empty();
+        let Some(values) = recording.column(column) else {
+            let names: Vec<&str> = recording.columns.iter().map(|c| c.name.as_str()).collect();
+            return Err(format!("{name} has no column `{column}`\nhint: it has {}", names.join(", ")));
+        };
+        let start = recording.time_s[0];
+        let (time_s, values) = recording
+            .time_s
+            .iter()
+            .zip(values)
+            .filter(|(_, v)| !v.is_nan())
+            .map(|(t, v)| (t - start, *v))
+            .unzip();
+        Ok(Replayed { time_s, values })
+    }
+}
