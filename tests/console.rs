@@ -176,7 +176,7 @@ fn an_operator_takes_command_thrusts_records_and_stops() {
     page.click("send");
     page.until("Math.abs(state.measured.thrust_n - 60) < 12");
     page.until("Math.abs(parseFloat(document.querySelector('#tiles .tile i').textContent) - 60) < 12");
-    std::thread::sleep(Duration::from_millis(2500)); // longer than the lease: the page renews it
+    std::thread::sleep(Duration::from_millis(3500)); // longer than the lease: the page renews it
     assert_eq!(stack.state().unwrap()["lease"]["holder"], "bridge");
 
     for chart in ["thrust", "speed", "current", "flow"] {

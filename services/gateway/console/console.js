@@ -1,7 +1,7 @@
 "use strict";
 const $ = (id) => document.getElementById(id);
-const LEASE_TTL_MS = 2000, RENEW_EVERY_MS = 500, STREAM_HZ = 25;
-let thruster = null, lease = null, socket = null, state = null, heard_ms = 0, paused_s = null, limitsOf = {}, recording = null, dragging = false, taken_ms = 0;
+const LEASE_TTL_MS = 3000, RENEW_EVERY_MS = 500, STREAM_HZ = 25, DRAW_EVERY_MS = 50;
+let thruster = null, lease = null, socket = null, state = null, heard_ms = 0, paused_s = null, limitsOf = {}, recording = null, dragging = false, taken_ms = 0, drawn_ms = 0;
 
 const charts = [
   new StripChart($("plot-thrust"), "thrust", "N", [
@@ -82,7 +82,10 @@ function show() {
   chip("link", live ? "live" : "no link", live ? "good" : "bad");
   if (state) {
     const end_s = paused_s ?? state.time_s + (live ? Math.min(0.2, (performance.now() - heard_ms) / 1000) : 0);
-    charts.forEach((chart) => chart.draw(end_s, Number($("span").value)));
+    if (performance.now() - drawn_ms >= DRAW_EVERY_MS) { // not every frame: renewing the lease comes first
+      drawn_ms = performance.now();
+      charts.forEach((chart) => chart.draw(end_s, Number($("span").value)));
+    }
     showState(state, live);
   }
   requestAnimationFrame(show);
