@@ -84,6 +84,9 @@ fn assert_problem(answer: &Answer, status: u16, slug: &str, what: &str) {
     );
 }
 
+/// Method, path, headers and body of a request; status and type of its answer.
+type Case<'a> = (&'a str, &'a str, &'a [(&'a str, &'a str)], &'a str, u16, &'a str);
+
 #[test]
 fn every_error_is_a_problem_document_with_its_type() {
     let stack = Stack::start();
@@ -91,7 +94,7 @@ fn every_error_is_a_problem_document_with_its_type() {
     let t1 = "/v1/thrusters/t1";
     let lease = format!("{t1}/lease");
     let big = format!("{{\"holder\": \"{}\"}}", "x".repeat(100_000));
-    let cases: &[(&str, &str, &[(&str, &str)], &str, u16, &str)] = &[
+    let cases: &[Case] = &[
         ("GET", "/nowhere", &[], "", 404, "unknown-route"),
         ("GET", "/v1", &[], "", 404, "unknown-route"),
         ("GET", "/docs/nothing.js", &[], "", 404, "unknown-route"),
@@ -144,7 +147,14 @@ fn every_error_is_a_problem_document_with_its_type() {
         ("POST", "/v1/recordings", &[JSON], r#"{"name": "../x"}"#, 422, "out-of-range"),
         ("POST", "/v1/recordings", &[JSON], r#"{"rate_hz": 0}"#, 422, "out-of-range"),
         ("POST", "/v1/recordings", &[JSON], r#"{"thruster": "t9"}"#, 404, "unknown-thruster"),
-        ("POST", "/v1/thrusters/t1/arm", &[("Origin", "http://elsewhere.example")], "", 403, "foreign-origin"),
+        (
+            "POST",
+            "/v1/thrusters/t1/arm",
+            &[("Origin", "http://elsewhere.example")],
+            "",
+            403,
+            "foreign-origin",
+        ),
         ("GET", "/v1/thrusters/t1/stream", &[("Origin", "null")], "", 403, "foreign-origin"),
         ("GET", "/v1/faults/9999", &[], "", 404, "unknown-fault"),
         ("GET", "/v1/faults/x", &[], "", 400, "malformed-path"),

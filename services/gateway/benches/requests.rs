@@ -80,7 +80,7 @@ fn stand_in_for_servo_and_controller(
             telemetry.signals.thrust_n = 80.0 + angle.cos();
             telemetry.signals.current_a = 5.0 + 0.1 * angle.sin();
             servo.telemetry.send(telemetry).expect("sent");
-            if ticker.timing.ticks % 4 == 0 {
+            if ticker.timing.ticks.is_multiple_of(4) {
                 let mut state =
                     ControllerState { law: Text::new("velocity_servo"), ..ControllerState::default() };
                 state.estimates.thrust_n = 80.0;

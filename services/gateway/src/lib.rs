@@ -3,9 +3,15 @@
 //! One thread ([`bus`]) talks to shared memory; a recording has a thread of its own; everything else
 //! is async. Nothing here is trusted by the controller: it goes to zero when the gateway falls silent.
 
+#![expect(
+    clippy::result_large_err,
+    reason = "a problem is made at most once a request; a box would only add a step"
+)]
+
 mod bus;
 mod desk;
 mod extract;
+mod heard;
 mod lease;
 mod openapi;
 mod problem;
@@ -24,10 +30,11 @@ use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 use axum::body::Bytes;
+use axum::serve::ListenerExt;
 use kort_proto::config::{Config, ConfigError};
 use kort_proto::transport::Deployment;
 use thiserror::Error;
-use tokio::net::TcpListener;
+use tokio::net::{TcpListener, TcpStream};
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::watch;
 use utoipa::openapi::OpenApi;
@@ -131,6 +138,13 @@ impl App {
     }
 }
 
+/// States and setpoints are small and urgent: no waiting for more to send.
+fn at_once(stream: &mut TcpStream) {
+    if let Err(error) = stream.set_nodelay(true) {
+        tracing::debug!(%error, "a connection keeps its delay");
+    }
+}
+
 /// Serves until SIGINT or SIGTERM; then disarms every thruster, closes a running recording and returns.
 ///
 /// # Errors
@@ -207,7 +221,7 @@ async fn serve(
         let _ = rested.send(());
     };
     tokio::select! {
-        served = axum::serve(listener, router).with_graceful_shutdown(graceful) => served?,
+        served = axum::serve(listener.tap_io(at_once), router).with_graceful_shutdown(graceful) => served?,
         () = async { let _ = resting.await; tokio::time::sleep(Duration::from_millis(500)).await } => (),
     }
     let _ = recorder.stop();

@@ -39,7 +39,7 @@ pub struct RecordingInfo {
     /// The thruster.
     #[schema(example = "t1")]
     pub thruster: String,
-    /// Is it running, complete, or torn by a killed gateway?
+    /// Is it running, complete, or torn?
     pub state: RecordingState,
     /// Wall time of the first row, RFC 3339.
     pub started: String,
@@ -64,7 +64,7 @@ pub enum RecordingState {
     Recording,
     /// Stopped, whole.
     Complete,
-    /// The gateway was killed while it ran: readable up to the last flush.
+    /// The gateway was killed while it ran, or the disk refused: readable up to the last flush.
     Torn,
 }
 
@@ -150,7 +150,13 @@ impl Recorder {
         let (folder, theirs) = (self.folder.clone(), Arc::clone(&shared));
         let thread = std::thread::Builder::new()
             .name("record".into())
-            .spawn(move || write_rows(&folder, writer, &theirs, &inbox))
+            .spawn(move || {
+                let ended = write_rows(&folder, writer, &theirs, &inbox);
+                let mut info = lock(&theirs);
+                info.state = if ended.is_ok() { RecordingState::Complete } else { RecordingState::Torn };
+                let noted = write_info(&folder, &info);
+                ended.and(noted)
+            })
             .map_err(|error| self.failed(&info.name, &error))?;
         *active = Some(Active { samples, info: shared, thread });
         Ok(info)
@@ -297,10 +303,7 @@ fn write_rows(
             write_info(folder, &now)?;
         }
     }
-    files.finish()?;
-    let mut info = lock(info);
-    info.state = RecordingState::Complete;
-    write_info(folder, &info)
+    files.finish()
 }
 
 /// The files of one recording.

@@ -7,13 +7,14 @@ use axum::body::Bytes;
 use kort_proto::faults::Fault;
 use kort_proto::limits::Limit;
 use kort_proto::messages::{
-    ControllerState, Outcome, PARAMETERS, Parameter, Process, Reply, Request, RequestKind, Telemetry,
+    ControllerState, Outcome, PARAMETERS, Parameter, Process, Reply, Request, RequestKind,
 };
 use kort_proto::signals::Kind as SignalKind;
 use kort_proto::text::Text;
 use tokio::sync::oneshot;
 
 use crate::desk::{Desk, check_range};
+use crate::heard::Heard;
 use crate::lease::Lease;
 use crate::problem::{Kind, Problem};
 use crate::routes::{ControllerRequest, ControllerView, LawParameter};
@@ -22,57 +23,8 @@ use crate::view::{
     Values,
 };
 
-/// A process not heard for this long is away.
-pub const AWAY_AFTER: Duration = Duration::from_millis(300);
 /// Servo and controller answer a request within this time, or are taken to be away.
 pub const ANSWER_WITHIN: Duration = Duration::from_millis(700);
-
-/// Last word of servo and controller.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Heard {
-    /// Counts up with every sample.
-    pub version: u64,
-    /// The servo's last telemetry and when it came.
-    pub servo: Option<(Instant, Telemetry)>,
-    /// The controller's last state and when it came.
-    pub controller: Option<(Instant, ControllerState)>,
-}
-
-impl Heard {
-    fn telemetry(&self, now: Instant) -> Option<&Telemetry> {
-        self.servo
-            .as_ref()
-            .filter(|(at, _)| now.saturating_duration_since(*at) < AWAY_AFTER)
-            .map(|(_, heard)| heard)
-    }
-
-    fn controller(&self, now: Instant) -> Option<&ControllerState> {
-        self.controller
-            .as_ref()
-            .filter(|(at, _)| now.saturating_duration_since(*at) < AWAY_AFTER)
-            .map(|(_, heard)| heard)
-    }
-
-    /// Latched faults of both processes, as a bitset.
-    pub fn faults(&self, now: Instant) -> u64 {
-        self.telemetry(now).map_or(0, |t| t.faults) | self.controller(now).map_or(0, |c| c.faults)
-    }
-
-    /// Limits in force in both processes, as a bitset.
-    pub fn limits(&self, now: Instant) -> u64 {
-        self.telemetry(now).map_or(0, |t| t.limits) | self.controller(now).map_or(0, |c| c.limits)
-    }
-
-    /// Is the drive armed, as far as is known?
-    pub fn armed(&self, now: Instant) -> bool {
-        self.telemetry(now).is_some_and(|t| t.armed != 0)
-    }
-
-    /// Is the servo (the controller) heard?
-    pub fn alive(&self, now: Instant) -> (bool, bool) {
-        (self.telemetry(now).is_some(), self.controller(now).is_some())
-    }
-}
 
 /// A request on its way to servo and controller.
 #[derive(Debug)]

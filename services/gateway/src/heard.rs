@@ -1,0 +1,56 @@
+//! What was last heard of servo and controller, and for how long it counts.
+
+use std::time::{Duration, Instant};
+
+use kort_proto::messages::{ControllerState, Telemetry};
+
+/// A process not heard for this long is away.
+pub const AWAY_AFTER: Duration = Duration::from_millis(300);
+/// Last word of servo and controller.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Heard {
+    /// Counts up with every sample.
+    pub version: u64,
+    /// The servo's last telemetry and when it came.
+    pub servo: Option<(Instant, Telemetry)>,
+    /// The controller's last state and when it came.
+    pub controller: Option<(Instant, ControllerState)>,
+}
+
+impl Heard {
+    /// The servo's last word, unless it is away.
+    pub fn telemetry(&self, now: Instant) -> Option<&Telemetry> {
+        self.servo
+            .as_ref()
+            .filter(|(at, _)| now.saturating_duration_since(*at) < AWAY_AFTER)
+            .map(|(_, heard)| heard)
+    }
+
+    /// The controller's last word, unless it is away.
+    pub fn controller(&self, now: Instant) -> Option<&ControllerState> {
+        self.controller
+            .as_ref()
+            .filter(|(at, _)| now.saturating_duration_since(*at) < AWAY_AFTER)
+            .map(|(_, heard)| heard)
+    }
+
+    /// Latched faults of both processes, as a bitset.
+    pub fn faults(&self, now: Instant) -> u64 {
+        self.telemetry(now).map_or(0, |t| t.faults) | self.controller(now).map_or(0, |c| c.faults)
+    }
+
+    /// Limits in force in both processes, as a bitset.
+    pub fn limits(&self, now: Instant) -> u64 {
+        self.telemetry(now).map_or(0, |t| t.limits) | self.controller(now).map_or(0, |c| c.limits)
+    }
+
+    /// Is the drive armed, as far as is known?
+    pub fn armed(&self, now: Instant) -> bool {
+        self.telemetry(now).is_some_and(|t| t.armed != 0)
+    }
+
+    /// Is the servo (the controller) heard?
+    pub fn alive(&self, now: Instant) -> (bool, bool) {
+        (self.telemetry(now).is_some(), self.controller(now).is_some())
+    }
+}
