@@ -80,19 +80,57 @@ impl Blade {
 
     /// Thrust and torque for an inflow, equations (14)-(17).
     pub fn load(&self, inflow: Inflow) -> BladeLoad {
-        let v = inflow.speed_m_s();
-        if v == 0.0 {
+        self.row().load(inflow.tangential_m_s, inflow.axial_m_s)
+    }
+
+    /// The same blade with its products formed once, for inner loops.
+    pub fn row(&self) -> BladeRow {
+        let (sin_pitch, cos_pitch) = self.pitch_rad.sin_cos();
+        let scale = self.density_kg_m3 * self.area_m2();
+        BladeRow {
+            sin_pitch,
+            cos_pitch,
+            lever_m: self.lever_m(),
+            lift_kg_m: scale * self.lift_max,
+            drag_kg_m: scale * self.drag_max,
+        }
+    }
+}
+
+/// A blade whose constant products are formed: one square root and one division a load.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BladeRow {
+    sin_pitch: f64,
+    cos_pitch: f64,
+    /// Radius at which lift and drag act, m.
+    pub lever_m: f64,
+    lift_kg_m: f64,
+    drag_kg_m: f64,
+}
+
+/// Below this square of the speed through the water, m^2/s^2, loads are zero: it keeps the
+/// quotient finite, and the loads it drops are below 1e-190 N.
+const STILL: f64 = 1e-200;
+
+impl BladeRow {
+    /// Thrust and torque for a tangential and an axial speed, m/s; equations (14)-(17).
+    #[inline(always)]
+    pub fn load(&self, tangential_m_s: f64, axial_m_s: f64) -> BladeLoad {
+        let (ut, vp) = (tangential_m_s, axial_m_s);
+        let v2 = ut * ut + vp * vp;
+        if v2 < STILL {
             return BladeLoad::default();
         }
-        let (sin, cos) = self.pitch_rad.sin_cos();
-        let (ut, vp) = (inflow.tangential_m_s, inflow.axial_m_s);
-        let wn = ut * sin - vp * cos;
-        let wc = ut * cos + vp * sin;
-        let scale = self.density_kg_m3 * self.area_m2() * wn / v;
-        BladeLoad {
-            thrust_n: scale * (self.lift_max * wc * ut - self.drag_max * wn * vp),
-            torque_n_m: self.lever_m() * scale * (self.lift_max * wc * vp + self.drag_max * wn * ut),
-        }
+        let wn = ut * self.sin_pitch - vp * self.cos_pitch;
+        let wc = ut * self.cos_pitch + vp * self.sin_pitch;
+        // wn / V written as wn V / V^2: root and quotient do not wait for each other.
+        let (root, inverse) = (v2.sqrt(), 1.0 / v2);
+        let lift = self.lift_kg_m * wc;
+        let drag = self.drag_kg_m * wn;
+        let ahead = wn * (lift * ut - drag * vp);
+        let around = self.lever_m * wn * (lift * vp + drag * ut);
+        let scale = root * inverse;
+        BladeLoad { thrust_n: ahead * scale, torque_n_m: around * scale }
     }
 }
 

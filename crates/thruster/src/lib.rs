@@ -8,7 +8,10 @@
 
 pub mod blade;
 pub mod effects;
+pub mod integrate;
 pub mod models;
+pub mod momentum;
+pub mod motor;
 pub mod parameters;
 pub mod plant;
 pub mod rig;
