@@ -302,6 +302,16 @@ impl Tick {
         Ok(())
     }
 
+    /// The law with its observer and estimator.
+    pub fn controller(&self) -> &Controller {
+        &self.controller
+    }
+
+    /// What the last tick gave.
+    pub fn output(&self) -> &Output {
+        &self.output
+    }
+
     /// The state for the gateway, without header and timing.
     pub fn state(&self) -> ControllerState {
         let mut state = ControllerState {

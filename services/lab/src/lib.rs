@@ -8,6 +8,7 @@ pub mod failure;
 pub mod input;
 pub mod progress;
 pub mod render;
+pub mod soak;
 
 pub use commands::Command;
 pub use failure::{Failure, Outcome};

@@ -2,6 +2,7 @@
 
 mod explain;
 mod simulate;
+mod soak;
 
 use clap::Subcommand;
 
@@ -14,6 +15,8 @@ pub enum Command {
     Explain(explain::Args),
     /// Make a recording from a model, with the stand's sensors
     Simulate(simulate::Args),
+    /// Run several controllers on the same plant, faults and references, and compare them
+    Soak(soak::Args),
 }
 
 impl Command {
@@ -22,6 +25,7 @@ impl Command {
         match self {
             Command::Explain(args) => explain::run(&args),
             Command::Simulate(args) => simulate::run(&args),
+            Command::Soak(args) => soak::run(&args),
         }
     }
 }

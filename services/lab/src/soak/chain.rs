@@ -1,0 +1,194 @@
+//! The production ticks on virtual time: servo and controller with the messages they exchange, an
+//! operator who sets thrust, and clears faults and arms again after half a second.
+//!
+//! As in the live service, a command acts one servo tick after the telemetry it answers.
+
+use kort_control::{Controller, ControllerConfig, ModelError, Output};
+use kort_controller::tick::Tick;
+use kort_proto::messages::{Command, DriveKind, Header, Request, RequestKind, Setpoint, SetpointKind};
+use kort_proto::signals::Signals;
+use kort_servo::settings::{Limits, Settings};
+use kort_servo::tick::{Inputs, Servo};
+use kort_thruster::rig::{AmplifierKind, Rig};
+
+/// Virtual time starts here, ns: sessions are told apart by when they began.
+const START_NS: u64 = 1_000_000_000;
+/// The operator looks that long at a fault before acting, s.
+const OPERATOR_S: f64 = 0.5;
+
+/// Controller, servo and operator of one thruster.
+pub struct Chain {
+    rig: Rig,
+    config: ControllerConfig,
+    period_ns: u64,
+    now_ns: u64,
+    servo: Servo,
+    controller: Tick,
+    controller_session: u64,
+    sequence: u64,
+    command: Option<Command>,
+    setpoint: Setpoint,
+    disarmed_s: f64,
+    /// Fault bits that the servo has latched since start, and how often it went off by itself.
+    trips: u32,
+    was_armed: bool,
+}
+
+/// What the drive gets at one tick.
+#[derive(Clone, Copy, Debug)]
+pub struct Driven {
+    /// Command in the amplifier's unit; zero while not armed.
+    pub command: f64,
+    /// The output stage is on.
+    pub armed: bool,
+}
+
+impl Chain {
+    /// At rest, not yet armed: the operator arms in the first ticks.
+    ///
+    /// # Errors
+    /// [`ModelError`] if the rig has no propeller.
+    pub fn new(rig: &Rig, config: &ControllerConfig, period_s: f64) -> Result<Self, ModelError> {
+        let period_ns = (period_s * 1e9).round() as u64;
+        let controller = Tick::new(rig, config, period_ns, START_NS)?;
+        let servo = Servo::new(settings(rig, controller.controller(), period_ns), START_NS);
+        Ok(Self {
+            rig: rig.clone(),
+            config: *config,
+            period_ns,
+            now_ns: START_NS,
+            servo,
+            controller,
+            controller_session: START_NS,
+            sequence: 0,
+            command: None,
+            setpoint: Setpoint::default(),
+            disarmed_s: OPERATOR_S,
+            trips: 0,
+            was_armed: false,
+        })
+    }
+
+    /// The law with its observer and estimator.
+    pub fn controller(&self) -> &Controller {
+        self.controller.controller()
+    }
+
+    /// The last output of the controller.
+    pub fn output(&self) -> &Output {
+        self.controller.output()
+    }
+
+    /// How often the servo has gone off by itself.
+    pub fn trips(&self) -> u32 {
+        self.trips
+    }
+
+    /// The controller process came up afresh: nothing of the old one is left.
+    pub fn restart(&mut self) {
+        if let Ok(fresh) = Tick::new(&self.rig, &self.config, self.period_ns, self.now_ns) {
+            self.controller = fresh;
+            self.controller_session = self.now_ns;
+        }
+    }
+
+    /// One tick of both; `alive` says whether the controller ticks at all.
+    pub fn tick(&mut self, measured: &Signals, thrust_n: f64, alive: bool) -> Driven {
+        self.now_ns += self.period_ns;
+        self.sequence += 1;
+        let now = self.now_ns;
+        let drive = self.servo.tick(&Inputs {
+            now_ns: now,
+            ticks: 1,
+            command: self.command.take().as_ref(),
+            measured,
+            amplifier_well: true,
+        });
+        self.operate(alive, thrust_n);
+        if alive {
+            let mut telemetry = self.servo.telemetry(now, measured);
+            telemetry.header = self.header(START_NS);
+            self.controller.take_telemetry(&telemetry, now);
+            self.setpoint.header = self.header(START_NS);
+            self.controller.take_setpoint(&self.setpoint, now);
+            let mut command = self.controller.tick(now);
+            command.header = self.header(self.controller_session);
+            self.command = Some(command);
+        }
+        Driven { command: drive.unwrap_or(0.0), armed: drive.is_some() }
+    }
+
+    fn header(&self, session: u64) -> Header {
+        Header { sequence: self.sequence, stamp_ns: self.now_ns, session }
+    }
+
+    /// Sets thrust; after a fault clears it, arms, and sets thrust anew.
+    fn operate(&mut self, alive: bool, thrust_n: f64) {
+        let now = self.now_ns;
+        let armed = self.servo.armed();
+        if self.was_armed && !armed {
+            self.trips += 1;
+        }
+        self.was_armed = armed;
+        if armed {
+            self.disarmed_s = 0.0;
+        } else {
+            self.disarmed_s += self.period_ns as f64 * 1e-9;
+            if alive && self.disarmed_s >= OPERATOR_S {
+                // Tried again every few ticks until the cause is gone and a controller speaks.
+                self.disarmed_s -= 4.0 * self.period_ns as f64 * 1e-9;
+                for kind in [RequestKind::ClearFaults, RequestKind::Arm] {
+                    let request =
+                        Request { header: self.header(START_NS), kind: kind as u32, ..Request::default() };
+                    self.servo.request(&request, now);
+                    self.controller.request(&request, now);
+                }
+                self.was_armed = self.servo.armed();
+            }
+        }
+        // A setpoint counts if it was given after the arming.
+        let changed = self.setpoint.value != thrust_n || !armed;
+        if changed {
+            self.setpoint.generation += 1;
+            self.setpoint.given_at_ns = now;
+            self.setpoint.kind = SetpointKind::Thrust as u32;
+            self.setpoint.value = thrust_n;
+        }
+        self.setpoint.lease_until_ns = now + 1_000_000_000;
+    }
+}
+
+/// The servo's settings at the defaults of `kort.toml`, with speed limits wide enough for a shaft
+/// that races without load to be the law's problem first.
+fn settings(rig: &Rig, controller: &Controller, period_ns: u64) -> Settings {
+    let model = controller.nominal();
+    let period_s = period_ns as f64 * 1e-9;
+    let current_a = model.current_limit_a;
+    let (kind, drive_max) = match rig.amplifier.kind {
+        AmplifierKind::Current => (DriveKind::Current, current_a),
+        AmplifierKind::Voltage => (DriveKind::Voltage, rig.amplifier.supply_v.unwrap_or(f64::INFINITY)),
+        AmplifierKind::Speed => (DriveKind::Speed, model.speed_max_rad_s),
+    };
+    let fastest = 2.0 * model.torque_constant_nm_a * current_a / model.inertia_kg_m2 * period_s;
+    let speed_rad_s = 1.75 * model.speed_max_rad_s;
+    Settings {
+        period_ns,
+        command_timeout_ns: period_ns * 7 / 2,
+        limits: Limits {
+            kind,
+            drive_max,
+            current_a,
+            trip_current_a: 1.25 * current_a,
+            continuous_current_a: current_a,
+            thermal_time_constant_s: 60.0,
+            speed_rad_s,
+            trip_speed_rad_s: 1.15 * speed_rad_s,
+            full_drive_s: 0.005,
+            supply_v: (f64::NEG_INFINITY, f64::INFINITY),
+            temperature_c: f64::INFINITY,
+            frozen_s: 0.5,
+            spike_rad_s: 10.0 * fastest + 4.0 * model.speed_quantum_rad_s,
+            winding: (model.winding_resistance_ohm.unwrap_or(f64::NAN), model.torque_constant_nm_a),
+        },
+    }
+}

@@ -1,0 +1,475 @@
+//! Scenario files of `kort soak`: `config/scenarios/soak-*.toml`.
+//!
+//! A scenario says what is true (model, effects, errors of the stated parameters, water, supply),
+//! what is asked (references), what is measured and what breaks. Levels of thrust are shares of the
+//! largest steady thrust of the rig, so that one scenario serves any thruster.
+
+use std::collections::{BTreeMap, HashMap};
+use std::path::{Path, PathBuf};
+
+use kort_thruster::effects;
+use kort_thruster::models::ModelName;
+use kort_thruster::parameters::Parameter;
+use kort_thruster::rig::Rig;
+use serde::Deserialize;
+use thiserror::Error;
+
+/// Why a scenario cannot be run: the file and what is wrong in it.
+#[derive(Debug, Error)]
+#[error("{file}: {message}")]
+pub struct ScenarioError {
+    /// The scenario's file.
+    pub file: String,
+    /// What is wrong, with a hint.
+    pub message: String,
+}
+
+/// A scenario as written.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scenario {
+    /// Name in reports.
+    pub name: String,
+    /// One sentence: what it is for.
+    pub what: String,
+    /// Rig description, relative to the scenario file.
+    pub rig: PathBuf,
+    /// Model of the truth.
+    #[serde(default = "model2")]
+    pub model: ModelName,
+    /// Virtual time, s.
+    pub duration_s: f64,
+    /// Time at the start that is not scored, s.
+    #[serde(default)]
+    pub settle_s: f64,
+    /// Rate of controller and servo, Hz.
+    #[serde(default = "rate")]
+    pub control_rate_hz: f64,
+    /// How many seeds, unless the command line says.
+    #[serde(default = "seeds")]
+    pub seeds: u32,
+    /// Controllers compared, unless the command line says: files of `config/controllers/`.
+    pub controllers: Vec<String>,
+    /// Which of the rig's sensors are fitted.
+    #[serde(default)]
+    pub sensors: Fitted,
+    /// Noise of the sensors beyond their quantum.
+    #[serde(default)]
+    pub noise: Noise,
+    /// True parameters.
+    #[serde(default)]
+    pub truth: Truth,
+    /// Physics that the controllers' model leaves out.
+    #[serde(default, rename = "effect")]
+    pub effects: Vec<EffectSpec>,
+    /// References, one after the other, again from the start when through.
+    #[serde(rename = "reference")]
+    pub references: Vec<Segment>,
+    /// Ambient flow.
+    #[serde(default)]
+    pub ambient: Ambient,
+    /// Depth of the shaft, where an effect needs it.
+    pub depth: Option<Depth>,
+    /// Supply sags.
+    #[serde(default, rename = "supply_sag")]
+    pub supply_sags: Vec<Sag>,
+    /// Faults of sensors.
+    #[serde(default, rename = "sensor_fault")]
+    pub sensor_faults: Vec<SensorFault>,
+    /// Faults of processes.
+    #[serde(default, rename = "process_fault")]
+    pub process_faults: Vec<ProcessFault>,
+}
+
+fn model2() -> ModelName {
+    ModelName::Model2
+}
+fn rate() -> f64 {
+    1000.0
+}
+fn seeds() -> u32 {
+    4
+}
+fn yes() -> bool {
+    true
+}
+
+/// Sensors fitted; shaft speed always is.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Fitted {
+    /// Motor current.
+    #[serde(default = "yes")]
+    pub current: bool,
+    /// Force sensor.
+    #[serde(default = "yes")]
+    pub thrust: bool,
+    /// Flow meter.
+    #[serde(default = "yes")]
+    pub flow: bool,
+    /// Ambient flow (a log or a current meter).
+    #[serde(default)]
+    pub ambient: bool,
+}
+
+impl Default for Fitted {
+    fn default() -> Self {
+        Self { current: true, thrust: true, flow: true, ambient: false }
+    }
+}
+
+/// Standard deviations of one reading.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Noise {
+    /// Share of the largest thrust.
+    pub thrust: f64,
+    /// Share of the flow, turbulence of the jet.
+    pub flow: f64,
+    /// Share of the current limit.
+    pub current: f64,
+}
+
+impl Default for Noise {
+    fn default() -> Self {
+        Self { thrust: 0.005, flow: 0.1, current: 0.002 }
+    }
+}
+
+/// True parameters as factors on the stated ones; the controllers do not know them.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Truth {
+    /// Factors by parameter.
+    pub factors: HashMap<Parameter, f64>,
+    /// Factors also drawn by seed: one sigma of a log-normal for lift, drag, flux and added mass.
+    pub spread: f64,
+    /// Changes while running.
+    pub change: Vec<Change>,
+}
+
+/// A change of the truth.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Change {
+    /// When, s.
+    pub at_s: f64,
+    /// Factors by parameter, on what was true before.
+    pub factors: HashMap<Parameter, f64>,
+}
+
+/// An effect of the catalogue at work.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EffectSpec {
+    /// Identifier of the catalogue.
+    pub id: String,
+    /// Values by parameter; a parameter left out stands where a fit would start.
+    #[serde(default)]
+    pub values: BTreeMap<String, f64>,
+}
+
+/// One stretch of references.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields, tag = "kind", rename_all = "snake_case")]
+pub enum Segment {
+    /// Levels held one after the other.
+    Steps {
+        /// Shares of the largest thrust.
+        levels: Vec<f64>,
+        /// How long each is held, s.
+        hold_s: f64,
+    },
+    /// A sinusoid.
+    Sine {
+        /// Amplitude, share of the largest thrust.
+        amplitude: f64,
+        /// Mean, share of the largest thrust.
+        #[serde(default)]
+        offset: f64,
+        /// Period, s.
+        period_s: f64,
+        /// How long, s.
+        for_s: f64,
+    },
+    /// What a dynamic-positioning system asks for: low-passed noise about a mean, at 10 Hz.
+    Dp {
+        /// Mean, share of the largest thrust.
+        #[serde(default)]
+        mean: f64,
+        /// Standard deviation, share of the largest thrust.
+        std: f64,
+        /// Time scale, s.
+        time_s: f64,
+        /// How long, s.
+        for_s: f64,
+    },
+    /// What a pilot's stick gives: holds of random length, quick ramps, now and then full reverse.
+    Joystick {
+        /// Largest deflection, share of the largest thrust.
+        amplitude: f64,
+        /// How long, s.
+        for_s: f64,
+    },
+    /// The `thrust_cmd_n` (or another column) of a recording.
+    Replay {
+        /// Recording, relative to the scenario file.
+        file: PathBuf,
+        /// Column.
+        #[serde(default = "thrust_column")]
+        column: String,
+        /// Multiplies the column; its largest value becomes this share of the largest thrust if
+        /// left out.
+        peak: f64,
+    },
+}
+
+fn thrust_column() -> String {
+    "thrust_cmd_n".into()
+}
+
+/// Ambient axial flow: mean, tow programme, waves and slow wander add up.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Ambient {
+    /// Mean, m/s.
+    pub mean_m_s: f64,
+    /// Tow or current over time: pairs of time, s, and speed, m/s; again from the start when through.
+    pub program: Vec<(f64, f64)>,
+    /// Standard deviation of the waves' orbital flow along the axis, m/s.
+    pub wave_std_m_s: f64,
+    /// Peak period of the waves, s.
+    pub wave_period_s: f64,
+    /// Standard deviation of the slow wander, m/s.
+    pub wander_std_m_s: f64,
+    /// Time scale of the slow wander, s.
+    pub wander_time_s: f64,
+}
+
+/// Depth of the shaft under the waves.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Depth {
+    /// Mean, m.
+    pub mean_m: f64,
+    /// Standard deviation of the surface, m; moves with the waves of the ambient flow.
+    pub wave_std_m: f64,
+}
+
+/// The supply drops and comes back.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sag {
+    /// When, s.
+    pub at_s: f64,
+    /// How long, s.
+    pub for_s: f64,
+    /// Down to, share of the nominal supply.
+    pub to: f64,
+    /// Again after, s.
+    pub every_s: Option<f64>,
+}
+
+/// How a sensor lies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Lie {
+    /// No value.
+    Dropout,
+    /// The last value stays.
+    Stuck,
+    /// `size` is added, share of full scale.
+    Bias,
+    /// The value is multiplied by `size`.
+    Gain,
+    /// `size` is added to one reading in twenty, share of full scale.
+    Spikes,
+}
+
+/// A measured channel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Channel {
+    /// Shaft speed.
+    ShaftSpeedRadS,
+    /// Motor current.
+    CurrentA,
+    /// Thrust.
+    ThrustN,
+    /// Axial flow.
+    FlowMS,
+}
+
+/// A sensor fault.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SensorFault {
+    /// Which sensor.
+    pub channel: Channel,
+    /// How it lies.
+    pub lie: Lie,
+    /// Size of the lie.
+    #[serde(default)]
+    pub size: f64,
+    /// When, s.
+    pub at_s: f64,
+    /// How long, s.
+    pub for_s: f64,
+    /// Again after, s.
+    pub every_s: Option<f64>,
+}
+
+/// Which process fails, and how.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ProcessFaultKind {
+    /// The controller dies and comes up afresh.
+    ControllerRestart,
+    /// The controller stops ticking and goes on with what it knew.
+    ControllerFrozen,
+}
+
+/// A process fault. The servo's watchdog takes the drive to zero; the operator arms again half a
+/// second after the process is back.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ProcessFault {
+    /// What happens.
+    pub kind: ProcessFaultKind,
+    /// When, s.
+    pub at_s: f64,
+    /// How long the process is away, s.
+    pub for_s: f64,
+    /// Again after, s.
+    pub every_s: Option<f64>,
+}
+
+/// Whether something that starts `at_s`, lasts `for_s` and repeats is on at a time.
+pub fn is_on(at_s: f64, for_s: f64, every_s: Option<f64>, time_s: f64) -> bool {
+    let since = time_s - at_s;
+    if since < 0.0 {
+        return false;
+    }
+    match every_s {
+        Some(every) if every > 0.0 => since % every < for_s,
+        _ => since < for_s,
+    }
+}
+
+impl Scenario {
+    /// Reads and checks a scenario, and its rig.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] names the file, the key, the value and what is allowed.
+    pub fn read(path: &Path) -> Result<(Self, Rig), ScenarioError> {
+        let error = |message: String| ScenarioError { file: path.display().to_string(), message };
+        let text = std::fs::read_to_string(path).map_err(|e| {
+            error(format!("{e}\nhint: scenarios shipped with kort are config/scenarios/soak-*.toml"))
+        })?;
+        let scenario: Self = toml::from_str(&text).map_err(|e| {
+            error(format!("{}\nhint: config/scenarios/soak-bollard-dp.toml shows every key", e.to_string().trim_end()))
+        })?;
+        scenario.check().map_err(&error)?;
+        let rig_path = path.parent().unwrap_or(Path::new(".")).join(&scenario.rig);
+        let rig_error = |message: String| ScenarioError { file: rig_path.display().to_string(), message };
+        let text = std::fs::read_to_string(&rig_path)
+            .map_err(|e| rig_error(format!("{e}\nhint: `rig` in {} is taken relative to that file", path.display())))?;
+        let rig = Rig::from_toml(&text).map_err(|e| rig_error(e.to_string()))?;
+        Ok((scenario, rig))
+    }
+
+    fn check(&self) -> Result<(), String> {
+        let within = |key: &str, value: f64, low: f64, high: f64, hint: &str| {
+            if value >= low && value <= high {
+                Ok(())
+            } else {
+                Err(format!("`{key}` = {value} is outside what is allowed: {low} to {high}\nhint: {hint}"))
+            }
+        };
+        within("duration_s", self.duration_s, 1.0, 31.0 * 86_400.0, "seconds: 3600 for an hour")?;
+        within("settle_s", self.settle_s, 0.0, 0.9 * self.duration_s, "shorter than the run")?;
+        within("control_rate_hz", self.control_rate_hz, 50.0, 10_000.0, "1000 is usual")?;
+        within("seeds", f64::from(self.seeds), 1.0, 1000.0, "4 gives a first interval")?;
+        within("truth.spread", self.truth.spread, 0.0, 0.5, "0.05 for five percent")?;
+        within("noise.thrust", self.noise.thrust, 0.0, 1.0, "share of the largest thrust")?;
+        within("noise.flow", self.noise.flow, 0.0, 2.0, "share of the flow")?;
+        within("noise.current", self.noise.current, 0.0, 1.0, "share of the current limit")?;
+        if self.controllers.is_empty() {
+            return Err("`controllers` is empty\nhint: controllers = [\"velocity_servo\", \"model2_inversion\"]".into());
+        }
+        if self.references.is_empty() {
+            return Err("there is no [[reference]]\nhint: [[reference]] with kind = \"steps\", levels = [0.5, -0.5], hold_s = 3".into());
+        }
+        for segment in &self.references {
+            segment.check(&within)?;
+        }
+        for (name, factor) in self.truth.factors.iter().chain(self.truth.change.iter().flat_map(|c| &c.factors)) {
+            within(&format!("truth factor of {}", name.name()), *factor, 0.05, 20.0, "a factor: 1.3 for 30 % more")?;
+        }
+        for spec in &self.effects {
+            effects::find(&spec.id).ok_or_else(|| {
+                let known: Vec<_> = effects::ALL.iter().map(|d| d.id).collect();
+                format!("effect `{}` is not in the catalogue\nhint: known are {}", spec.id, known.join(", "))
+            })?;
+        }
+        let ambient = &self.ambient;
+        within("ambient.mean_m_s", ambient.mean_m_s, -5.0, 5.0, "m/s, positive feeds the propeller ahead")?;
+        within("ambient.wave_std_m_s", ambient.wave_std_m_s, 0.0, 5.0, "m/s")?;
+        if ambient.wave_std_m_s > 0.0 {
+            within("ambient.wave_period_s", ambient.wave_period_s, 0.5, 60.0, "seconds: 8 for a sea")?;
+        }
+        if ambient.wander_std_m_s > 0.0 {
+            within("ambient.wander_time_s", ambient.wander_time_s, 0.1, 1e6, "seconds")?;
+        }
+        if ambient.program.windows(2).any(|w| w[1].0 <= w[0].0) {
+            return Err("`ambient.program` has times that do not increase\nhint: [[0, 0.0], [10, 0.5], [20, 0.0]]".into());
+        }
+        Ok(())
+    }
+}
+
+impl Segment {
+    fn check(&self, within: &dyn Fn(&str, f64, f64, f64, &str) -> Result<(), String>) -> Result<(), String> {
+        let share = "shares of the largest thrust, -1 to 1";
+        match self {
+            Self::Steps { levels, hold_s } => {
+                if levels.is_empty() {
+                    return Err("`levels` of steps is empty\nhint: levels = [0.5, -0.5]".into());
+                }
+                within("hold_s", *hold_s, 0.01, 1e6, "seconds")?;
+                levels.iter().try_for_each(|l| within("levels", *l, -1.0, 1.0, share))
+            }
+            Self::Sine { amplitude, offset, period_s, for_s } => {
+                within("amplitude", *amplitude, 0.0, 1.0, share)?;
+                within("offset", *offset, -1.0, 1.0, share)?;
+                within("period_s", *period_s, 0.01, 1e6, "seconds")?;
+                within("for_s", *for_s, 0.01, 1e7, "seconds")
+            }
+            Self::Dp { mean, std, time_s, for_s } => {
+                within("mean", *mean, -1.0, 1.0, share)?;
+                within("std", *std, 0.0, 1.0, share)?;
+                within("time_s", *time_s, 0.05, 1e6, "seconds")?;
+                within("for_s", *for_s, 0.1, 1e7, "seconds")
+            }
+            Self::Joystick { amplitude, for_s } => {
+                within("amplitude", *amplitude, 0.0, 1.0, share)?;
+                within("for_s", *for_s, 0.1, 1e7, "seconds")
+            }
+            Self::Replay { peak, .. } => within("peak", *peak, 0.0, 1.0, share),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn repeating_faults_come_back() {
+        assert!(!is_on(5.0, 1.0, Some(10.0), 4.9));
+        assert!(is_on(5.0, 1.0, Some(10.0), 5.5));
+        assert!(!is_on(5.0, 1.0, Some(10.0), 6.5));
+        assert!(is_on(5.0, 1.0, Some(10.0), 15.5));
+        assert!(!is_on(5.0, 1.0, None, 15.5));
+    }
+}

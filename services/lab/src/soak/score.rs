@@ -1,0 +1,388 @@
+//! Scores of one run, gathered tick by tick, and their summary over seeds.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+/// What one tick shows to the scores.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Sample {
+    /// Time, s.
+    pub time_s: f64,
+    /// Thrust asked for, N.
+    pub reference_n: f64,
+    /// True thrust, N.
+    pub thrust_n: f64,
+    /// True shaft speed, rad/s.
+    pub shaft_speed_rad_s: f64,
+    /// True motor current, A.
+    pub current_a: f64,
+    /// True axial flow, m/s.
+    pub flow_m_s: f64,
+    /// Observer's axial flow, m/s.
+    pub flow_estimate_m_s: f64,
+    /// The command or the thruster was at a limit.
+    pub saturated: bool,
+    /// Drive, current or speed was beyond what the rig allows.
+    pub broken: bool,
+    /// The drive is off for a fault that the scenario put in: not the law's error.
+    pub excused: bool,
+}
+
+/// Names, units and what smaller means, of every score.
+pub const SCORES: &[(&str, &str)] = &[
+    ("thrust_rms_n", "thrust error, root mean square, N"),
+    ("thrust_p95_n", "thrust error that 95 % of the time is not passed, N"),
+    ("thrust_bias_n", "mean thrust error, N"),
+    ("rise_time_s", "time to 90 % of a step, s"),
+    ("settle_time_s", "time until thrust stays within 5 % of a step, s"),
+    ("overshoot_pct", "overshoot of a step, %"),
+    ("energy_j", "electrical energy: motor torque times speed where it drives, and copper loss, J"),
+    ("energy_per_impulse_j_n_s", "energy per newton-second given, J/(N s)"),
+    ("copper_loss_per_impulse_j_n_s", "copper loss per newton-second given, J/(N s)"),
+    ("saturation_share", "share of time at a limit"),
+    ("current_travel_a_s", "travel of the motor current per second: wear, A/s"),
+    ("flow_rms_m_s", "observer's flow error, root mean square, m/s"),
+    ("parameter_error", "largest relative error of an adapted coefficient at the end"),
+    ("faults_injected", "faults put in"),
+    ("faults_survived", "faults after which thrust came back"),
+    ("trips", "how often the servo went off, faults put in included"),
+    ("limits_broken", "ticks beyond a limit; must be 0"),
+];
+
+/// Longest time after a step that is looked at, s.
+const STEP_WINDOW_S: f64 = 6.0;
+/// Length of a window whose plot may be shown, s.
+pub const WINDOW_S: f64 = 8.0;
+/// Samples a second kept for plots.
+const PLOT_HZ: f64 = 100.0;
+/// Bins of the error histogram: logarithmic, 32 an octave, from 2^-20 of full scale.
+const BINS: usize = 32 * 22;
+
+/// A step of the reference under way.
+#[derive(Clone, Copy, Debug)]
+struct Step {
+    since_s: f64,
+    from_n: f64,
+    to_n: f64,
+    risen_s: Option<f64>,
+    outside_s: f64,
+    beyond: f64,
+}
+
+/// One point of a plot: time, reference, thrust, speed, flow, estimated flow, current.
+pub type Point = [f32; 7];
+
+/// The worst stretch of a run.
+#[derive(Clone, Debug, Default)]
+pub struct Window {
+    /// Root mean square of the thrust error in it, N.
+    pub rms_n: f64,
+    /// What happened.
+    pub points: Vec<Point>,
+}
+
+/// Gathers the scores of one run.
+pub struct Tally {
+    dt_s: f64,
+    scale_n: f64,
+    resistance_ohm: f64,
+    torque_constant_nm_a: f64,
+    settle_s: f64,
+    ticks: u64,
+    squares: f64,
+    sum: f64,
+    bins: Vec<u32>,
+    energy_j: f64,
+    copper_j: f64,
+    impulse_n_s: f64,
+    saturated: u64,
+    travel_a: f64,
+    last_current_a: f64,
+    flow_squares: f64,
+    broken: u64,
+    step: Option<Step>,
+    last_reference_n: Option<f64>,
+    rises: Vec<f64>,
+    settles: Vec<f64>,
+    overshoots: Vec<f64>,
+    window: Window,
+    window_squares: f64,
+    window_ticks: u64,
+    worst: Window,
+    plot_every: u64,
+    seen: u64,
+}
+
+impl Tally {
+    /// For a thruster with a largest thrust, torque constant and winding resistance.
+    pub fn new(dt_s: f64, scale_n: f64, torque_constant_nm_a: f64, resistance_ohm: f64, settle_s: f64) -> Self {
+        let plot_every = (1.0 / (PLOT_HZ * dt_s)).round().max(1.0) as u64;
+        Self {
+            dt_s,
+            scale_n,
+            resistance_ohm,
+            torque_constant_nm_a,
+            settle_s,
+            ticks: 0,
+            squares: 0.0,
+            sum: 0.0,
+            bins: vec![0; BINS],
+            energy_j: 0.0,
+            copper_j: 0.0,
+            impulse_n_s: 0.0,
+            saturated: 0,
+            travel_a: 0.0,
+            last_current_a: 0.0,
+            flow_squares: 0.0,
+            broken: 0,
+            step: None,
+            last_reference_n: None,
+            rises: Vec::new(),
+            settles: Vec::new(),
+            overshoots: Vec::new(),
+            window: Window::default(),
+            window_squares: 0.0,
+            window_ticks: 0,
+            worst: Window::default(),
+            plot_every,
+            seen: 0,
+        }
+    }
+
+    /// Root mean square of the thrust error so far, N.
+    pub fn rms_n(&self) -> f64 {
+        (self.squares / self.ticks.max(1) as f64).sqrt()
+    }
+
+    /// Energy so far, J.
+    pub fn energy_j(&self) -> f64 {
+        self.energy_j
+    }
+
+    /// One tick.
+    pub fn tick(&mut self, s: &Sample) {
+        self.broken += u64::from(s.broken);
+        if s.time_s < self.settle_s {
+            self.last_current_a = s.current_a;
+            self.last_reference_n = Some(s.reference_n);
+            return;
+        }
+        let dt = self.dt_s;
+        let copper = self.resistance_ohm * s.current_a * s.current_a;
+        let shaft = self.torque_constant_nm_a * s.current_a * s.shaft_speed_rad_s;
+        self.energy_j += (copper + shaft.max(0.0)) * dt;
+        self.copper_j += copper * dt;
+        self.impulse_n_s += s.thrust_n.abs() * dt;
+        self.travel_a += (s.current_a - self.last_current_a).abs();
+        self.last_current_a = s.current_a;
+        self.saturated += u64::from(s.saturated);
+        let error = s.thrust_n - s.reference_n;
+        if !s.excused {
+            self.ticks += 1;
+            self.squares += error * error;
+            self.sum += error;
+            self.flow_squares += (s.flow_estimate_m_s - s.flow_m_s).powi(2);
+            self.bins[bin(error.abs() / self.scale_n)] += 1;
+        }
+        self.follow_step(s);
+        self.follow_window(s, error);
+    }
+
+    fn follow_step(&mut self, s: &Sample) {
+        let last = self.last_reference_n.replace(s.reference_n).unwrap_or(s.reference_n);
+        let change = s.reference_n - last;
+        if change != 0.0 || s.excused {
+            self.close_step();
+            if change.abs() > 0.05 * self.scale_n && !s.excused {
+                self.step = Some(Step {
+                    since_s: 0.0,
+                    from_n: s.thrust_n,
+                    to_n: s.reference_n,
+                    risen_s: None,
+                    outside_s: 0.0,
+                    beyond: 0.0,
+                });
+            }
+        }
+        if let Some(step) = &mut self.step {
+            step.since_s += self.dt_s;
+            let span = step.to_n - step.from_n;
+            let done = (s.thrust_n - step.from_n) / span;
+            if done >= 0.9 && step.risen_s.is_none() {
+                step.risen_s = Some(step.since_s);
+            }
+            if (done - 1.0).abs() > 0.05 {
+                step.outside_s = step.since_s;
+            }
+            step.beyond = step.beyond.max(done - 1.0);
+            if step.since_s >= STEP_WINDOW_S {
+                self.close_step();
+            }
+        }
+    }
+
+    /// A step counts if it was held for half a second; what was not reached counts as the whole time.
+    fn close_step(&mut self) {
+        let Some(step) = self.step.take() else { return };
+        if step.since_s < 0.5 || (step.to_n - step.from_n).abs() < 0.05 * self.scale_n {
+            return;
+        }
+        self.rises.push(step.risen_s.unwrap_or(step.since_s));
+        self.settles.push(step.outside_s);
+        self.overshoots.push(100.0 * step.beyond);
+    }
+
+    fn follow_window(&mut self, s: &Sample, error: f64) {
+        if !s.excused {
+            self.window_squares += error * error;
+        }
+        self.window_ticks += 1;
+        if self.seen % self.plot_every == 0 {
+            self.window.points.push([
+                s.time_s as f32,
+                s.reference_n as f32,
+                s.thrust_n as f32,
+                s.shaft_speed_rad_s as f32,
+                s.flow_m_s as f32,
+                s.flow_estimate_m_s as f32,
+                s.current_a as f32,
+            ]);
+        }
+        self.seen += 1;
+        if self.window_ticks as f64 * self.dt_s >= WINDOW_S {
+            self.window.rms_n = (self.window_squares / self.window_ticks as f64).sqrt();
+            if self.window.rms_n > self.worst.rms_n {
+                std::mem::swap(&mut self.worst, &mut self.window);
+            }
+            self.window.points.clear();
+            (self.window_squares, self.window_ticks) = (0.0, 0);
+        }
+    }
+
+    /// The scores, and the worst window.
+    pub fn finish(mut self, extra: &[(&'static str, f64)]) -> Outcome {
+        self.close_step();
+        if self.worst.points.is_empty() {
+            std::mem::swap(&mut self.worst, &mut self.window);
+        }
+        let n = self.ticks.max(1) as f64;
+        let seconds = n * self.dt_s;
+        let mut scores = BTreeMap::new();
+        scores.insert("thrust_rms_n", (self.squares / n).sqrt());
+        scores.insert("thrust_p95_n", self.percentile(0.95));
+        scores.insert("thrust_bias_n", self.sum / n);
+        for (name, values) in
+            [("rise_time_s", &self.rises), ("settle_time_s", &self.settles), ("overshoot_pct", &self.overshoots)]
+        {
+            if !values.is_empty() {
+                scores.insert(name, values.iter().sum::<f64>() / values.len() as f64);
+            }
+        }
+        scores.insert("energy_j", self.energy_j);
+        if self.impulse_n_s > 0.0 {
+            scores.insert("energy_per_impulse_j_n_s", self.energy_j / self.impulse_n_s);
+            scores.insert("copper_loss_per_impulse_j_n_s", self.copper_j / self.impulse_n_s);
+        }
+        scores.insert("saturation_share", self.saturated as f64 / n);
+        scores.insert("current_travel_a_s", self.travel_a / seconds);
+        scores.insert("flow_rms_m_s", (self.flow_squares / n).sqrt());
+        scores.insert("limits_broken", self.broken as f64);
+        scores.extend(extra.iter().copied());
+        Outcome { scores, worst: self.worst }
+    }
+
+    fn percentile(&self, share: f64) -> f64 {
+        let target = (share * self.ticks as f64) as u64;
+        let mut below = 0;
+        for (i, count) in self.bins.iter().enumerate() {
+            below += u64::from(*count);
+            if below > target {
+                return edge(i + 1) * self.scale_n;
+            }
+        }
+        0.0
+    }
+}
+
+fn bin(share: f64) -> usize {
+    if share <= 0.0 {
+        return 0;
+    }
+    ((share.log2() + 20.0) * 32.0).clamp(0.0, BINS as f64 - 1.0) as usize
+}
+
+fn edge(bin: usize) -> f64 {
+    (bin as f64 / 32.0 - 20.0).exp2()
+}
+
+/// Scores and worst window of one run.
+#[derive(Clone, Debug, Default)]
+pub struct Outcome {
+    /// Scores by name.
+    pub scores: BTreeMap<&'static str, f64>,
+    /// Worst window.
+    pub worst: Window,
+}
+
+/// Mean and its interval over seeds.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Score {
+    /// Mean over seeds.
+    pub mean: f64,
+    /// 95 % interval of the mean (Student's t); both ends the mean with one seed.
+    pub ci95: [f64; 2],
+}
+
+/// Mean and 95 % interval of some values.
+pub fn summarise(values: &[f64]) -> Score {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    if values.len() < 2 {
+        return Score { mean, ci95: [mean, mean] };
+    }
+    let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    let t = StudentsT::new(0.0, 1.0, n - 1.0).map_or(1.96, |d| d.inverse_cdf(0.975));
+    let half = t * (variance / n).sqrt();
+    Score { mean, ci95: [mean - half, mean + half] }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sample(time_s: f64, reference_n: f64, thrust_n: f64) -> Sample {
+        Sample { time_s, reference_n, thrust_n, ..Sample::default() }
+    }
+
+    #[test]
+    fn a_first_order_step_is_measured() {
+        let mut tally = Tally::new(1e-3, 100.0, 1.0, 1.0, 0.0);
+        tally.tick(&sample(0.0, 0.0, 0.0));
+        for k in 0..3000 {
+            let t = f64::from(k) * 1e-3;
+            tally.tick(&sample(t, 50.0, 50.0 * (1.0 - (-t / 0.1).exp())));
+        }
+        let scores = tally.finish(&[]).scores;
+        assert!((scores["rise_time_s"] - 0.230).abs() < 0.003, "{scores:?}");
+        assert!((scores["settle_time_s"] - 0.300).abs() < 0.003, "{scores:?}");
+        assert_eq!(scores["overshoot_pct"], 0.0);
+    }
+
+    #[test]
+    fn ninety_five_percent_of_the_time() {
+        let mut tally = Tally::new(1e-3, 100.0, 1.0, 1.0, 0.0);
+        for k in 0..10_000 {
+            tally.tick(&sample(0.0, 0.0, f64::from(k) * 1e-3));
+        }
+        let p95 = tally.finish(&[]).scores["thrust_p95_n"];
+        assert!((p95 - 9.5).abs() < 0.25, "{p95}");
+    }
+
+    #[test]
+    fn the_interval_is_students() {
+        let s = summarise(&[1.0, 2.0, 3.0]);
+        assert!((s.mean - 2.0).abs() < 1e-12 && (s.ci95[1] - 2.0 - 4.303 / 3f64.sqrt()).abs() < 1e-3, "{s:?}");
+    }
+}
