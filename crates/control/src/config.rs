@@ -70,7 +70,7 @@ pub struct LimitOptions {
 
 impl Default for LimitOptions {
     fn default() -> Self {
-        Self { current_rate_per_s: 100.0, thrust_rate_per_s: 1000.0, overspeed: 1.3, fade_s: 0.1 }
+        Self { current_rate_per_s: 200.0, thrust_rate_per_s: 1000.0, overspeed: 1.3, fade_s: 0.1 }
     }
 }
 

@@ -1,16 +1,17 @@
 //! Model 1 (Yoerger) inverted.
 //!
 //! Reference: Yoerger, Cooke & Slotine 1990; (7)-(9) of Whitcomb & Yoerger; physics.md D3:
-//! `tau = (1/2) eta r tan(p) Td + Omr' / beta`, `beta = 1 / (eta^2 r^2 tan^2(p) rho V)`, with the
-//! efficiency `eta` that makes (7) agree with the rig's static thrust map.
+//! `tau = (1/2) eta r tan(p) Td + Omr' / beta`, `beta = 1 / (eta^2 r^2 tan^2(p) rho V)`.
 //!
-//! Assumes: the water moves with the blades (no flow state), quasi-static; its torque per thrust
-//! follows from power balance and not from the measured map.
+//! No single `eta` serves both terms: on the paper's stand (18) asks for 0.49, (20) for 2.31, and
+//! with the first the law gives a fifth of the torque. Here the level takes the `eta` of torque per
+//! thrust (20), the derivative that of thrust per speed squared (18).
+//!
+//! Assumes: the water moves with the blades (no flow state), quasi-static.
 //! Needs measured: nothing.
 //!
-//! Fails: no flow transient, so no overshoot is foreseen or prevented; with one `eta` the torque is
-//! off where (18) and (19) ask for different efficiencies (0.49 and 0.81 on the stand); all that
-//! fails in `static_map` fails here.
+//! Fails: no flow transient, so no overshoot is foreseen or prevented; the shaft's own inertia is
+//! not in the model; all that fails in `static_map` fails here.
 
 use super::{Demand, LawInput};
 use crate::limits::LimitSet;
@@ -39,7 +40,8 @@ impl Model1Inversion {
         let rate = (target - self.speed_rad_s) / (self.smoothing_s + input.dt_s);
         self.speed_rad_s += rate * input.dt_s;
         let inertia = (eta * advance).powi(2) * input.model.duct_water_kg;
-        let torque = 0.5 * eta * advance * input.thrust_n
+        // (1/2) eta r tan(p) with the eta of (20) is the static map's torque per thrust.
+        let torque = input.model.map.torque_for_thrust_n_m(input.thrust_n)
             + inertia * rate
             + input.model.friction_n_m(self.speed_rad_s);
         Demand { torque_n_m: torque, speed_rad_s: self.speed_rad_s, limits: LimitSet::default() }

@@ -30,7 +30,7 @@ pub struct RotationalFlowOptions {
 
 impl Default for RotationalFlowOptions {
     fn default() -> Self {
-        Self { drag: 1.5, inertia: 0.1 }
+        Self { drag: 3.0, inertia: 0.1 }
     }
 }
 

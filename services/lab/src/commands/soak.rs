@@ -12,7 +12,9 @@ use crate::soak::{self, Metrics, SoakError, Watch};
 ///
 /// Virtual time by default; --live drives a running service through the same script in real time.
 #[derive(Debug, ClapArgs)]
-#[command(after_help = "Example:\n  kort soak config/scenarios/soak-towed.toml --controllers velocity_servo,model2_inversion --seeds 4 --html soak.html")]
+#[command(
+    after_help = "Example:\n  kort soak config/scenarios/soak-towed.toml --controllers velocity_servo,model2_inversion --seeds 4 --html soak.html"
+)]
 pub struct Args {
     /// Scenario files; the shipped ones are config/scenarios/soak-*.toml
     #[arg(required = true, value_name = "SCENARIO")]

@@ -60,7 +60,13 @@ pub enum LiveError {
 ///
 /// # Errors
 /// [`LiveError`] names what was asked of which address and what came back.
-pub fn live(loaded: &[Loaded], url: &str, thruster: &str, seed: u64, watch: &Watch) -> Result<Report, LiveError> {
+pub fn live(
+    loaded: &[Loaded],
+    url: &str,
+    thruster: &str,
+    seed: u64,
+    watch: &Watch,
+) -> Result<Report, LiveError> {
     let started = Instant::now();
     let service = Service::take(url.trim_end_matches('/'), thruster)?;
     let mut scenarios = Vec::new();
@@ -84,17 +90,29 @@ pub fn live(loaded: &[Loaded], url: &str, thruster: &str, seed: u64, watch: &Wat
         }
         scenarios.push(ScenarioResult::new(&l.scenario.name, &l.scenario.what, l.thrust_max_n, laws));
     }
-    Ok(Report::new(started.elapsed().as_secs_f64(), played_s, scenarios))
+    eprintln!("{played_s:.0} s driven in {:.1} s", started.elapsed().as_secs_f64());
+    Ok(Report::new(loaded.iter().map(|l| l.scenario.duration_s).sum(), played_s, scenarios))
 }
 
 /// One controller through one scenario.
-fn drive(service: &Service, l: &Loaded, seed: u64, progress: &dyn Fn(f64, f64, f64)) -> Result<Outcome, LiveError> {
+fn drive(
+    service: &Service,
+    l: &Loaded,
+    seed: u64,
+    progress: &dyn Fn(f64, f64, f64),
+) -> Result<Outcome, LiveError> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     random.set_stream(1);
     let mut player = Player::new(&l.scenario.references, &l.replayed, random);
     let dt = 1.0 / RATE_HZ;
     let resistance = l.rig.motor.winding_resistance_ohm.map_or(0.0, |r| r.value);
-    let mut tally = Tally::new(dt, l.thrust_max_n, l.rig.motor.torque_constant_nm_a.value, resistance, l.scenario.settle_s);
+    let mut tally = Tally::new(
+        dt,
+        l.thrust_max_n,
+        l.rig.motor.torque_constant_nm_a.value,
+        resistance,
+        l.scenario.settle_s,
+    );
     let mut stream = service.stream()?;
     let (mut first, mut done_s, mut trips, mut was_armed) = (None, 0.0, 0, true);
     let mut reference_n = 0.0;
@@ -155,16 +173,22 @@ impl Service {
             .timeout_global(Some(Duration::from_secs(5)))
             .build()
             .into();
-        let mut service =
-            Self { thruster: format!("{base}/v1/thrusters/{id}"), lease: String::new(), agent };
+        let mut service = Self { thruster: format!("{base}/v1/thrusters/{id}"), lease: String::new(), agent };
         let body = json!({ "holder": "kort soak", "ttl_ms": LEASE_MS });
-        let answer = service.post("take the lease", "lease", &body, "another holder must give the lease up first")?;
+        let answer =
+            service.post("take the lease", "lease", &body, "another holder must give the lease up first")?;
         service.lease = answer["lease_id"].as_str().unwrap_or_default().to_owned();
         service.arm()?;
         Ok(service)
     }
 
-    fn post(&self, what: &'static str, path: &str, body: &Value, hint: &'static str) -> Result<Value, LiveError> {
+    fn post(
+        &self,
+        what: &'static str,
+        path: &str,
+        body: &Value,
+        hint: &'static str,
+    ) -> Result<Value, LiveError> {
         let url = format!("{}/{path}", self.thruster);
         let answer = self.agent.post(&url).header("Lease-Id", &self.lease).send_json(body);
         Self::read(what, url, answer, hint)
@@ -177,13 +201,23 @@ impl Service {
         hint: &'static str,
     ) -> Result<Value, LiveError> {
         match answer {
-            Err(e) => Err(LiveError::Request { what, url, answer: e.to_string(), hint: "is the service running there? `kort up` prints its address" }),
+            Err(e) => Err(LiveError::Request {
+                what,
+                url,
+                answer: e.to_string(),
+                hint: "is the service running there? `kort up` prints its address",
+            }),
             Ok(mut response) => {
                 let text = response.body_mut().read_to_string().unwrap_or_default();
                 if response.status().is_success() {
                     Ok(serde_json::from_str(&text).unwrap_or(Value::Null))
                 } else {
-                    Err(LiveError::Request { what, url, answer: format!("{} {text}", response.status()), hint })
+                    Err(LiveError::Request {
+                        what,
+                        url,
+                        answer: format!("{} {text}", response.status()),
+                        hint,
+                    })
                 }
             }
         }
@@ -198,8 +232,11 @@ impl Service {
     }
 
     fn switch(&self, config: &ControllerConfig) -> Result<(), LiveError> {
-        let parameters: serde_json::Map<String, Value> =
-            TUNABLES.iter().filter(|t| t.applies(config)).map(|t| (t.name.into(), json!((t.get)(config)))).collect();
+        let parameters: serde_json::Map<String, Value> = TUNABLES
+            .iter()
+            .filter(|t| t.applies(config))
+            .map(|t| (t.name.into(), json!((t.get)(config))))
+            .collect();
         let body = json!({
             "controller": config.law.name(),
             "observer": config.observer.name(),
@@ -208,7 +245,8 @@ impl Service {
         });
         let url = format!("{}/controller", self.thruster);
         let answer = self.agent.put(&url).header("Lease-Id", &self.lease).send_json(&body);
-        Self::read("switch the controller", url, answer, "GET the same address for what is available").map(|_| ())
+        Self::read("switch the controller", url, answer, "GET the same address for what is available")
+            .map(|_| ())
     }
 
     fn stream(&self) -> Result<Stream, LiveError> {
@@ -237,11 +275,18 @@ impl Service {
                     let passing = value["status"].as_u64() == Some(409);
                     if !passing {
                         let hint = "see the problem document";
-                        return Err(LiveError::Request { what: "set thrust", url: self.thruster.clone(), answer: value.to_string(), hint });
+                        return Err(LiveError::Request {
+                            what: "set thrust",
+                            url: self.thruster.clone(),
+                            answer: value.to_string(),
+                            hint,
+                        });
                     }
                 }
                 Ok(_) => {}
-                Err(tungstenite::Error::Io(e)) if matches!(e.kind(), std::io::ErrorKind::WouldBlock | std::io::ErrorKind::TimedOut) => {
+                Err(tungstenite::Error::Io(e))
+                    if matches!(e.kind(), std::io::ErrorKind::WouldBlock | std::io::ErrorKind::TimedOut) =>
+                {
                     return Err(LiveError::Silent { url: self.thruster.clone() });
                 }
                 Err(e) => return Err(self.broken(e)),

@@ -19,7 +19,9 @@ use super::report::LawResult;
 #[derive(Debug, Error)]
 pub enum MetricsError {
     /// The address is taken or not ours.
-    #[error("--metrics-addr {address}: {source}\nhint: a free port of this machine, for example 127.0.0.1:9464")]
+    #[error(
+        "--metrics-addr {address}: {source}\nhint: a free port of this machine, for example 127.0.0.1:9464"
+    )]
     Bind {
         /// The address.
         address: SocketAddr,
@@ -56,15 +58,21 @@ impl Metrics {
             registry.register(Box::new(gauge.clone()))?;
             Ok(gauge)
         };
-        let progress =
-            gauge("kort_soak_progress_ratio", "Share of the run that is done, mean over seeds.", &["law", "scenario"])?;
+        let progress = gauge(
+            "kort_soak_progress_ratio",
+            "Share of the run that is done, mean over seeds.",
+            &["law", "scenario"],
+        )?;
         let error = gauge(
             "kort_soak_thrust_error_newtons",
             "Thrust error: stat rms is the root mean square so far, p95 what is not passed 95 % of the time.",
             &["law", "scenario", "stat"],
         )?;
-        let energy =
-            gauge("kort_soak_energy_joules", "Electrical energy so far, mean over seeds.", &["law", "scenario"])?;
+        let energy = gauge(
+            "kort_soak_energy_joules",
+            "Electrical energy so far, mean over seeds.",
+            &["law", "scenario"],
+        )?;
         let bind = |source| MetricsError::Bind { address, source };
         let listener = std::net::TcpListener::bind(address).map_err(bind)?;
         listener.set_nonblocking(true).map_err(bind)?;

@@ -23,8 +23,8 @@ use thiserror::Error;
 pub use live::{LiveError, live};
 pub use metrics::{Metrics, MetricsError};
 pub use page::page;
-pub use report::Report;
 use reference::Replayed;
+pub use report::Report;
 use report::{LawResult, ScenarioResult};
 use run::Prepared;
 use scenario::{Scenario, ScenarioError, Segment};
@@ -37,7 +37,9 @@ pub enum SoakError {
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
     /// A controller that is not known.
-    #[error("controller `{name}` is not known{near}\nhint: a file of config/controllers/ without .toml, a path to one, or a law: {laws}")]
+    #[error(
+        "controller `{name}` is not known{near}\nhint: a file of config/controllers/ without .toml, a path to one, or a law: {laws}"
+    )]
     UnknownController {
         /// What was asked for.
         name: String,
@@ -96,8 +98,10 @@ pub fn load(path: &Path, controllers: Option<&[String]>, seeds: Option<u32>) -> 
         .map_err(|source| SoakError::Model { file: path.display().to_string(), source })?;
     let folder = path.parent().unwrap_or(Path::new("."));
     let names = controllers.map_or_else(|| scenario.controllers.clone(), <[String]>::to_vec);
-    let controllers =
-        names.iter().map(|name| Ok((name.clone(), controller(name, folder)?))).collect::<Result<_, SoakError>>()?;
+    let controllers = names
+        .iter()
+        .map(|name| Ok((name.clone(), controller(name, folder)?)))
+        .collect::<Result<_, SoakError>>()?;
     let replayed = scenario.references.iter().map(|s| replay(s, folder)).collect::<Result<_, _>>()?;
     let seeds = seeds.unwrap_or(scenario.seeds);
     Ok(Loaded { scenario, rig, replayed, thrust_max_n: model.thrust_max_n, controllers, seeds })
@@ -146,9 +150,9 @@ fn replay(segment: &Segment, folder: &Path) -> Result<Option<Replayed>, SoakErro
 /// Times and values of a column where it is sampled.
 fn replayed_column(path: &Path, column: &str) -> Result<(Vec<f64>, Vec<f64>), String> {
     let recording = Recording::read(path, None).map_err(|e| e.to_string())?;
-    let values = recording
-        .column(column)
-        .ok_or_else(|| format!("there is no column `{column}`\nhint: a recording with thrust commands has `thrust_cmd_n`"))?;
+    let values = recording.column(column).ok_or_else(|| {
+        format!("there is no column `{column}`\nhint: a recording with thrust commands has `thrust_cmd_n`")
+    })?;
     Ok(recording.time_s.iter().zip(values).filter(|(_, v)| v.is_finite()).map(|(t, v)| (*t, *v)).unzip())
 }
 
@@ -214,5 +218,10 @@ pub fn soak(loaded: &[Loaded], seed: u64, jobs: usize, watch: &Watch) -> Result<
         }
         scenarios.push(ScenarioResult::new(&l.scenario.name, &l.scenario.what, l.thrust_max_n, laws));
     }
-    Ok(Report::new(started.elapsed().as_secs_f64(), virtual_s, scenarios))
+    let took = started.elapsed().as_secs_f64();
+    eprintln!(
+        "{virtual_s:.0} virtual seconds in {took:.1} s: {:.0} times real time",
+        virtual_s / took.max(1e-9)
+    );
+    Ok(Report::new(loaded.iter().map(|l| l.scenario.duration_s).sum(), virtual_s, scenarios))
 }

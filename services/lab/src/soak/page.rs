@@ -11,8 +11,8 @@ pub fn page(report: &Report) -> String {
     let mut page = Page::new(
         "Controllers compared",
         format!(
-            "kort soak: {:.0} virtual seconds in {:.1} s; figures are means over seeds with 95 % intervals",
-            report.virtual_seconds, report.seconds
+            "kort soak: {:.0} virtual seconds; figures are means over seeds with 95 % intervals",
+            report.virtual_seconds
         ),
     );
     for s in &report.scenarios {
@@ -45,7 +45,9 @@ fn scores(s: &ScenarioResult) -> Markup {
         .iter()
         .map(|l| {
             let name = if l.efficient(&s.laws) { format!("{} *", l.name) } else { l.name.clone() };
-            std::iter::once(name).chain(columns.iter().map(|c| l.score(c).map_or_else(|| "-".into(), cell))).collect()
+            std::iter::once(name)
+                .chain(columns.iter().map(|c| l.score(c).map_or_else(|| "-".into(), cell)))
+                .collect()
         })
         .collect();
     table(&head, &rows)
@@ -60,8 +62,11 @@ fn cell(score: Score) -> String {
 }
 
 fn pareto(s: &ScenarioResult) -> Markup {
-    let mut chart =
-        Chart::new("Thrust error against energy: nearer the lower left corner is better", "thrust error [N RMS]", "energy [kJ]");
+    let mut chart = Chart::new(
+        "Thrust error against energy: nearer the lower left corner is better",
+        "thrust error [N RMS]",
+        "energy [kJ]",
+    );
     for l in &s.laws {
         let (x, y) = (l.mean("thrust_rms_n"), 1e-3 * l.mean("energy_j"));
         if x.is_finite() && y.is_finite() {

@@ -26,6 +26,7 @@ pub struct Player<'a> {
     stages: [f64; 2],
     update_s: f64,
     value: f64,
+    /// Where the stick goes; where a ramp began.
     target: f64,
     hold_s: f64,
     cursor: usize,
@@ -61,8 +62,15 @@ impl<'a> Player<'a> {
         let now = self.since_s;
         self.since_s += dt_s;
         match &self.segments[self.index] {
-            Segment::Steps { levels, hold_s } => {
-                self.value = levels[((now / hold_s + 1e-9) as usize).min(levels.len() - 1)];
+            Segment::Steps { levels, hold_s, ramp_s } => {
+                let place = ((now / hold_s + 1e-9) as usize).min(levels.len() - 1);
+                if now + 1e-9 >= self.update_s {
+                    self.update_s = (place + 1) as f64 * hold_s;
+                    self.target = self.value;
+                }
+                let since = now - place as f64 * hold_s;
+                let part = if *ramp_s > 0.0 { (since / ramp_s).clamp(0.0, 1.0) } else { 1.0 };
+                self.value = self.target + (levels[place] - self.target) * part;
             }
             Segment::Sine { amplitude, offset, period_s, .. } => {
                 self.value = offset + amplitude * (std::f64::consts::TAU * now / period_s).sin();
@@ -81,7 +89,9 @@ impl<'a> Player<'a> {
             }
             Segment::Replay { .. } => {
                 if let Some(replayed) = &self.replayed[self.index] {
-                    while self.cursor + 1 < replayed.time_s.len() && replayed.time_s[self.cursor + 1] <= now + 1e-9 {
+                    while self.cursor + 1 < replayed.time_s.len()
+                        && replayed.time_s[self.cursor + 1] <= now + 1e-9
+                    {
                         self.cursor += 1;
                     }
                     self.value = replayed.share[self.cursor];
@@ -93,8 +103,10 @@ impl<'a> Player<'a> {
 
     fn length_s(&self) -> f64 {
         match &self.segments[self.index] {
-            Segment::Steps { levels, hold_s } => levels.len() as f64 * hold_s,
-            Segment::Sine { for_s, .. } | Segment::Dp { for_s, .. } | Segment::Joystick { for_s, .. } => *for_s,
+            Segment::Steps { levels, hold_s, .. } => levels.len() as f64 * hold_s,
+            Segment::Sine { for_s, .. } | Segment::Dp { for_s, .. } | Segment::Joystick { for_s, .. } => {
+                *for_s
+            }
             Segment::Replay { .. } => self.replayed[self.index]
                 .as_ref()
                 .and_then(|r| r.time_s.last().copied())
@@ -153,12 +165,16 @@ mod tests {
 
     #[test]
     fn steps_repeat_from_the_start() {
-        let values = play(Segment::Steps { levels: vec![0.5, -0.5], hold_s: 1.0 }, 4.0);
+        let values = play(Segment::Steps { levels: vec![0.5, -0.5], hold_s: 1.0, ramp_s: 0.0 }, 4.0);
         assert_eq!((values[50], values[150], values[250], values[350]), (0.5, -0.5, 0.5, -0.5));
     }
 
     #[test]
     fn a_stick_stays_in_its_gate() {
-        assert!(play(Segment::Joystick { amplitude: 0.7, for_s: 1e6 }, 600.0).iter().all(|v| v.abs() <= 0.7 + 1e-12));
+        assert!(
+            play(Segment::Joystick { amplitude: 0.7, for_s: 1e6 }, 600.0)
+                .iter()
+                .all(|v| v.abs() <= 0.7 + 1e-12)
+        );
     }
 }

@@ -103,10 +103,20 @@ impl<'a> Bench<'a> {
         let rig = self.prepared.rig;
         let scale = self.prepared.thrust_max_n;
         let mut player = Player::new(&scenario.references, self.prepared.replayed, stream(self.seed, 1));
-        let mut sea =
-            Sea::new(&scenario.ambient, scenario.depth, &scenario.supply_sags, rig.amplifier.supply_v, stream(self.seed, 2));
-        let mut tally =
-            Tally::new(self.dt, scale, rig.motor.torque_constant_nm_a.value, self.resistance_ohm, scenario.settle_s);
+        let mut sea = Sea::new(
+            &scenario.ambient,
+            scenario.depth,
+            &scenario.supply_sags,
+            rig.amplifier.supply_v,
+            stream(self.seed, 2),
+        );
+        let mut tally = Tally::new(
+            self.dt,
+            scale,
+            rig.motor.torque_constant_nm_a.value,
+            self.resistance_ohm,
+            scenario.settle_s,
+        );
         let ticks = (scenario.duration_s / self.dt).round() as u64;
         let (mut sea_from, mut sea_to) = (Now::default(), sea.at(0.0));
         let mut sea_time = -STEP_S;
@@ -179,7 +189,9 @@ impl<'a> Bench<'a> {
 
     fn saturated(&self) -> bool {
         let limits = self.chain.output().limits;
-        [Limit::Current, Limit::Voltage, Limit::ShaftSpeed, Limit::CurrentRate].iter().any(|l| limits.contains(*l))
+        [Limit::Current, Limit::Voltage, Limit::ShaftSpeed, Limit::CurrentRate]
+            .iter()
+            .any(|l| limits.contains(*l))
     }
 
     /// Beyond what the rig allows: never the law's to decide.
@@ -190,7 +202,9 @@ impl<'a> Bench<'a> {
             AmplifierKind::Voltage => model.supply_v.unwrap_or(f64::INFINITY),
             AmplifierKind::Speed => model.speed_max_rad_s,
         };
-        !command.is_finite() || command.abs() > most * (1.0 + 1e-9) || speed_rad_s.abs() > 1.75 * 1.15 * model.speed_max_rad_s
+        !command.is_finite()
+            || command.abs() > most * (1.0 + 1e-9)
+            || speed_rad_s.abs() > 1.75 * 1.15 * model.speed_max_rad_s
     }
 
     /// Whether the controller ticks now.
@@ -216,7 +230,9 @@ impl<'a> Bench<'a> {
 
     /// A fault is survived if within ten seconds of its end thrust comes within a tenth of full scale.
     fn recovery(&mut self, s: &Sample) {
-        let Some(since) = self.awaited_s.map(|end| s.time_s - end).filter(|since| *since > 0.0) else { return };
+        let Some(since) = self.awaited_s.map(|end| s.time_s - end).filter(|since| *since > 0.0) else {
+            return;
+        };
         if !s.excused && (s.thrust_n - s.reference_n).abs() < 0.1 * self.prepared.thrust_max_n {
             self.survived += 1;
             self.awaited_s = None;
@@ -243,7 +259,8 @@ impl<'a> Bench<'a> {
         let scenario = self.prepared.scenario;
         let (noise, fitted, rig) = (&scenario.noise, &scenario.sensors, self.prepared.rig);
         let model = self.chain.controller().nominal();
-        let (scale_n, limit_a, quantum_n) = (self.prepared.thrust_max_n, model.current_limit_a, model.thrust_quantum_n);
+        let (scale_n, limit_a, quantum_n) =
+            (self.prepared.thrust_max_n, model.current_limit_a, model.thrust_quantum_n);
         let s = *self.plant.sensed();
         let speed_drive = rig.amplifier.kind == AmplifierKind::Speed;
         let mut channels = [Some(s.shaft_speed_rad_s), None, None, None];
@@ -257,7 +274,8 @@ impl<'a> Bench<'a> {
         if fitted.flow {
             if time + 1e-9 >= self.flow_due_s {
                 self.flow_due_s += rig.sensors.flow_rate_hz.map_or(self.dt, |f| 1.0 / f);
-                self.held_flow_m_s = Some(s.flow_m_s * (1.0 + noise.flow * self.normal()) + 0.01 * self.normal());
+                self.held_flow_m_s =
+                    Some(s.flow_m_s * (1.0 + noise.flow * self.normal()) + 0.01 * self.normal());
             }
             channels[3] = self.held_flow_m_s;
         }

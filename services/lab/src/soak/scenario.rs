@@ -177,8 +177,11 @@ pub enum Segment {
     Steps {
         /// Shares of the largest thrust.
         levels: Vec<f64>,
-        /// How long each is held, s.
+        /// How long each is held, s, the ramp included.
         hold_s: f64,
+        /// Time of the straight ramp from level to level, s; zero is a step.
+        #[serde(default)]
+        ramp_s: f64,
     },
     /// A sinusoid.
     Sine {
@@ -218,8 +221,7 @@ pub enum Segment {
         /// Column.
         #[serde(default = "thrust_column")]
         column: String,
-        /// Multiplies the column; its largest value becomes this share of the largest thrust if
-        /// left out.
+        /// The column is scaled so that its largest value becomes this share of the largest thrust.
         peak: f64,
     },
 }
@@ -367,13 +369,17 @@ impl Scenario {
             error(format!("{e}\nhint: scenarios shipped with kort are config/scenarios/soak-*.toml"))
         })?;
         let scenario: Self = toml::from_str(&text).map_err(|e| {
-            error(format!("{}\nhint: config/scenarios/soak-bollard-dp.toml shows every key", e.to_string().trim_end()))
+            error(format!(
+                "{}\nhint: config/scenarios/soak-bollard-dp.toml shows every key",
+                e.to_string().trim_end()
+            ))
         })?;
         scenario.check().map_err(&error)?;
         let rig_path = path.parent().unwrap_or(Path::new(".")).join(&scenario.rig);
         let rig_error = |message: String| ScenarioError { file: rig_path.display().to_string(), message };
-        let text = std::fs::read_to_string(&rig_path)
-            .map_err(|e| rig_error(format!("{e}\nhint: `rig` in {} is taken relative to that file", path.display())))?;
+        let text = std::fs::read_to_string(&rig_path).map_err(|e| {
+            rig_error(format!("{e}\nhint: `rig` in {} is taken relative to that file", path.display()))
+        })?;
         let rig = Rig::from_toml(&text).map_err(|e| rig_error(e.to_string()))?;
         Ok((scenario, rig))
     }
@@ -395,7 +401,10 @@ impl Scenario {
         within("noise.flow", self.noise.flow, 0.0, 2.0, "share of the flow")?;
         within("noise.current", self.noise.current, 0.0, 1.0, "share of the current limit")?;
         if self.controllers.is_empty() {
-            return Err("`controllers` is empty\nhint: controllers = [\"velocity_servo\", \"model2_inversion\"]".into());
+            return Err(
+                "`controllers` is empty\nhint: controllers = [\"velocity_servo\", \"model2_inversion\"]"
+                    .into(),
+            );
         }
         if self.references.is_empty() {
             return Err("there is no [[reference]]\nhint: [[reference]] with kind = \"steps\", levels = [0.5, -0.5], hold_s = 3".into());
@@ -403,8 +412,16 @@ impl Scenario {
         for segment in &self.references {
             segment.check(&within)?;
         }
-        for (name, factor) in self.truth.factors.iter().chain(self.truth.change.iter().flat_map(|c| &c.factors)) {
-            within(&format!("truth factor of {}", name.name()), *factor, 0.05, 20.0, "a factor: 1.3 for 30 % more")?;
+        for (name, factor) in
+            self.truth.factors.iter().chain(self.truth.change.iter().flat_map(|c| &c.factors))
+        {
+            within(
+                &format!("truth factor of {}", name.name()),
+                *factor,
+                0.05,
+                20.0,
+                "a factor: 1.3 for 30 % more",
+            )?;
         }
         for spec in &self.effects {
             effects::find(&spec.id).ok_or_else(|| {
@@ -422,7 +439,10 @@ impl Scenario {
             within("ambient.wander_time_s", ambient.wander_time_s, 0.1, 1e6, "seconds")?;
         }
         if ambient.program.windows(2).any(|w| w[1].0 <= w[0].0) {
-            return Err("`ambient.program` has times that do not increase\nhint: [[0, 0.0], [10, 0.5], [20, 0.0]]".into());
+            return Err(
+                "`ambient.program` has times that do not increase\nhint: [[0, 0.0], [10, 0.5], [20, 0.0]]"
+                    .into(),
+            );
         }
         Ok(())
     }
@@ -432,11 +452,12 @@ impl Segment {
     fn check(&self, within: &dyn Fn(&str, f64, f64, f64, &str) -> Result<(), String>) -> Result<(), String> {
         let share = "shares of the largest thrust, -1 to 1";
         match self {
-            Self::Steps { levels, hold_s } => {
+            Self::Steps { levels, hold_s, ramp_s } => {
                 if levels.is_empty() {
                     return Err("`levels` of steps is empty\nhint: levels = [0.5, -0.5]".into());
                 }
                 within("hold_s", *hold_s, 0.01, 1e6, "seconds")?;
+                within("ramp_s", *ramp_s, 0.0, *hold_s, "seconds, at most hold_s")?;
                 levels.iter().try_for_each(|l| within("levels", *l, -1.0, 1.0, share))
             }
             Self::Sine { amplitude, offset, period_s, for_s } => {

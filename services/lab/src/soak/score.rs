@@ -117,7 +117,13 @@ pub struct Tally {
 
 impl Tally {
     /// For a thruster with a largest thrust, torque constant and winding resistance.
-    pub fn new(dt_s: f64, scale_n: f64, torque_constant_nm_a: f64, resistance_ohm: f64, settle_s: f64) -> Self {
+    pub fn new(
+        dt_s: f64,
+        scale_n: f64,
+        torque_constant_nm_a: f64,
+        resistance_ohm: f64,
+        settle_s: f64,
+    ) -> Self {
         let plot_every = (1.0 / (PLOT_HZ * dt_s)).round().max(1.0) as u64;
         Self {
             dt_s,
@@ -273,9 +279,11 @@ impl Tally {
         scores.insert("thrust_rms_n", (self.squares / n).sqrt());
         scores.insert("thrust_p95_n", self.percentile(0.95));
         scores.insert("thrust_bias_n", self.sum / n);
-        for (name, values) in
-            [("rise_time_s", &self.rises), ("settle_time_s", &self.settles), ("overshoot_pct", &self.overshoots)]
-        {
+        for (name, values) in [
+            ("rise_time_s", &self.rises),
+            ("settle_time_s", &self.settles),
+            ("overshoot_pct", &self.overshoots),
+        ] {
             if !values.is_empty() {
                 scores.insert(name, values.iter().sum::<f64>() / values.len() as f64);
             }
@@ -383,6 +391,9 @@ mod tests {
     #[test]
     fn the_interval_is_students() {
         let s = summarise(&[1.0, 2.0, 3.0]);
-        assert!((s.mean - 2.0).abs() < 1e-12 && (s.ci95[1] - 2.0 - 4.303 / 3f64.sqrt()).abs() < 1e-3, "{s:?}");
+        assert!(
+            (s.mean - 2.0).abs() < 1e-12 && (s.ci95[1] - 2.0 - 4.303 / 3f64.sqrt()).abs() < 1e-3,
+            "{s:?}"
+        );
     }
 }
