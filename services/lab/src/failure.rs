@@ -3,6 +3,8 @@
 use std::fmt;
 use std::path::Path;
 
+pub use crate::files::read_rig;
+
 /// A command that did its work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {

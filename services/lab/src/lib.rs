@@ -5,7 +5,7 @@
 
 pub mod commands;
 pub mod failure;
-pub mod input;
+pub mod files;
 pub mod progress;
 pub mod render;
 pub mod soak;

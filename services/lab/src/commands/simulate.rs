@@ -11,7 +11,7 @@ use kort_thruster::scenario::{Replayed, Replays, Run, Scenario};
 use serde::Serialize;
 
 use crate::failure::{Failure, Outcome, print, print_json};
-use crate::{input, progress};
+use crate::{files, progress};
 
 /// Arguments of `kort simulate`.
 #[derive(Debug, ClapArgs)]
@@ -60,7 +60,7 @@ struct Report<'a> {
 /// Runs it.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let format = Format::of(&args.output).map_err(Failure::input)?;
-    let rig = input::read_rig(&args.rig)?;
+    let rig = files::read_rig(&args.rig)?;
     let mut scenario = read_scenario(&args.scenario)?;
     scenario.seed = args.seed.unwrap_or(scenario.seed);
     scenario.noise = args.noise.unwrap_or(scenario.noise);
@@ -117,7 +117,7 @@ fn write(run: &mut Run, format: Format, path: &Path, rig: &Rig) -> Result<f64, F
 
 /// A scenario in TOML or JSON, or the next experiment of a diagnosis report.
 fn read_scenario(wanted: &Path) -> Result<Scenario, Failure> {
-    let text = input::scenario_text(wanted)?;
+    let text = files::scenario_text(wanted)?;
     let fail = |e: &dyn std::fmt::Display| Failure::in_file(wanted, e);
     if !text.trim_start().starts_with('{') {
         return Scenario::from_toml(&text).map_err(|e| fail(&e));
@@ -140,8 +140,8 @@ struct Files {
 
 impl Replays for Files {
     fn column(&mut self, name: &str, column: &str, columns: Option<&str>) -> Result<Replayed, String> {
-        let map = input::read_columns(columns).map_err(|e| e.to_string())?;
-        let recording = input::replayed_recording(name, self.beside.as_deref(), map.as_ref())
+        let map = files::read_columns(columns).map_err(|e| e.to_string())?;
+        let recording = files::replayed_recording(name, self.beside.as_deref(), map.as_ref())
             .map_err(|e| e.to_string())?;
         self.lost |= !recording.losses.is_empty();
         let Some(values) = recording.column(column) else {
