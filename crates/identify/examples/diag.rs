@@ -25,7 +25,12 @@ fn main() {
             columns: names[1..].iter().cloned().zip(cols).filter(|c| !drop.contains(&c.0)).collect(),
         };
         let t = std::time::Instant::now();
-        let d = diagnose(&[series], &rig, &Options { model, seed: 1 }, &|_| ()).unwrap();
+        let d = diagnose(&[series], &rig, &Options { model, seed: 1 }, &|m: &str| {
+            if std::env::var("TRACE").is_ok() {
+                eprintln!("{:.2} {m}", cpu())
+            }
+        })
+        .unwrap();
         let r = &d.report;
         if json {
             println!("{}", serde_json::to_string_pretty(r).unwrap());
@@ -54,4 +59,9 @@ fn main() {
             t.elapsed().as_secs_f64()
         );
     }
+}
+
+fn cpu() -> f64 {
+    let s = std::fs::read_to_string("/proc/self/stat").unwrap();
+    s.rsplit(')').next().unwrap().split_whitespace().nth(11).unwrap().parse::<f64>().unwrap() / 100.0
 }

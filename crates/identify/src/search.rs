@@ -49,6 +49,10 @@ pub mod rules {
     pub const REFITTED: usize = 9;
 }
 
+/// Effects that shift signals in time, and so depend on where the edges of the command lie.
+const TIMING: [&str; 5] =
+    ["transport_delay", "amplifier_lag", "clock_skew", "encoder_filter_lag", "thrust_sensor_lag"];
+
 /// An effect fitted on top of what was found before.
 #[derive(Clone)]
 pub struct Candidate {
@@ -201,7 +205,11 @@ impl<'a> Search<'a> {
             candidates = candidates
                 .into_par_iter()
                 .map(|c| {
-                    let fit = self.again(&c.fit);
+                    let fit = if TIMING.contains(&c.effect.id) {
+                        self.with_own_edges(&c.fit)
+                    } else {
+                        self.again(&c.fit)
+                    };
                     Candidate { criterion: criterion(&fit), fit, ..c }
                 })
                 .collect();
@@ -242,7 +250,10 @@ impl<'a> Search<'a> {
             .map(|s| {
                 let hypothesis =
                     with_effect(&current.hypothesis, &current.values, s.effect, &self.scale, Some(&s.start));
-                let fit = self.problem.fit(&hypothesis, &current.columns, 4);
+                let mut fit = self.problem.fit(&hypothesis, &current.columns, 4);
+                if TIMING.contains(&s.effect.id) {
+                    fit = self.with_own_edges(&fit);
+                }
                 Candidate { effect: s.effect, criterion: criterion(&fit), fit, screened: s.gain }
             })
             .collect();
@@ -262,6 +273,19 @@ impl<'a> Search<'a> {
         let mut hypothesis = fit.hypothesis.clone();
         hypothesis.start.clone_from(&fit.values);
         self.problem.fit(&hypothesis, &fit.columns, 6)
+    }
+
+    /// Like [`Search::again`], with the command's edges where this hypothesis wants them: a lag or
+    /// a delay judged on edges that were placed without it would never win.
+    fn with_own_edges(&self, fit: &Fit) -> Fit {
+        if self.problem.recordings.iter().all(|r| r.edges.is_empty()) {
+            return self.again(fit);
+        }
+        let mut own = self.problem.clone();
+        own.place_edges(&fit.hypothesis, &fit.values);
+        let mut hypothesis = fit.hypothesis.clone();
+        hypothesis.start.clone_from(&fit.values);
+        own.fit(&hypothesis, &fit.columns, 5)
     }
 
     /// Largest root mean square difference of two fits' responses over full scale.
