@@ -9,6 +9,7 @@ use crate::baseline::{self, Member, members, recompose};
 use crate::checks;
 use crate::data::{DataError, Driving, Prepared, Series, available, scale};
 use crate::errors;
+use crate::experiment;
 use crate::fit::{Fit, Problem, Stack, Target};
 use crate::heldout::held_out_rows;
 use crate::judge::{self, Outcome};
@@ -300,7 +301,7 @@ fn write(
         parameters: parameters(&outcome.baseline, &std_baseline, None),
         channels: errors::channels(&search.problem, &held, &residual_baseline, &baseline_full, &floor),
     };
-    let next_experiment = words::next_experiment(search, &outcome, rig);
+    let next_experiment = experiment::next(search, &outcome, rig);
     let report = Report {
         schema: "kort.diagnosis/1".into(),
         kort_version: env!("CARGO_PKG_VERSION").into(),

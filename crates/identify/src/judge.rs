@@ -260,8 +260,12 @@ fn settle(search: &Search, current: &mut Fit, rounds: &[Vec<Candidate>]) -> Vec<
         let without = search.problem.fit(&hypothesis, &columns, 6);
         let gain = criterion(&without) - criterion(current);
         let limit = margin(gain);
+        let near = |other: &Descriptor| {
+            let mates = other.confused_with.contains(&chosen.id) || chosen.confused_with.contains(&other.id);
+            if mates { limit.max(rules::MATES_SHARE * gain) } else { limit }
+        };
         let (rivals, aside): (Vec<_>, Vec<_>) =
-            tried.into_iter().partition(|t| t.1 < limit && !is_term(t.0.0) && !is_term(chosen));
+            tried.into_iter().partition(|t| t.1 < near(t.0.0) && !is_term(t.0.0) && !is_term(chosen));
         places.push(Place { chosen, rivals, aside: aside.into_iter().map(|t| (t.0.0, t.1)).collect(), gain });
     }
     places

@@ -6,6 +6,7 @@ pub mod data;
 pub mod diagnose;
 pub mod edges;
 pub mod errors;
+pub mod experiment;
 pub mod fit;
 pub mod heldout;
 pub mod identifiable;

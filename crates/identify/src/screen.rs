@@ -20,6 +20,8 @@ pub struct Screened {
     pub effect: &'static Descriptor,
     /// Values from which a fit should start.
     pub start: Vec<f64>,
+    /// Values at which the effect was simulated for the screen.
+    pub origin: Vec<f64>,
     /// Expected fall of the sum of squares.
     pub gain: f64,
     /// Degrees of freedom behind that gain.
@@ -221,6 +223,7 @@ fn score(
         }
         let gain = a.dot(&b);
         let size = (0..n).map(|i| a[i].abs() * sizes[active[i]]).sum();
+        let origin = start.clone();
         let mut from = start;
         for (k, s) in strengths.drain(..).enumerate() {
             let factor = active.iter().position(|i| *i == k).map_or(0.0, |i| a[i]);
@@ -229,6 +232,6 @@ fn score(
             let reach = 8.0 * from[s].abs();
             from[s] = value.clamp(-reach, reach).clamp(specs[s].low, specs[s].high);
         }
-        return Some(Screened { effect, start: from, gain, directions: n, size });
+        return Some(Screened { effect, start: from, origin, gain, directions: n, size });
     }
 }

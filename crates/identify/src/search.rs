@@ -25,13 +25,15 @@ pub mod rules {
     /// differs a little from ours is not another effect.
     pub const SHARE_OF_FIRST: f64 = 0.004;
     /// Least size: root mean square of its response over full scale, on some channel.
-    pub const LEAST_SIZE: f64 = 0.0015;
+    pub const LEAST_SIZE: f64 = 0.0012;
     /// Share of the gain that must hold on left-out blocks.
     pub const HOLDS: f64 = 0.4;
     /// Rivals closer than this cannot be told apart.
     pub const MARGIN: f64 = 12.0;
     /// ... or closer than this share of what the effect gains.
     pub const MARGIN_SHARE: f64 = 0.02;
+    /// ... or, for effects that the catalogue knows to be confused, this share.
+    pub const MATES_SHARE: f64 = 0.06;
     /// How much better a term without a name must be than the best name, as a share of its gain.
     pub const TERM_SHARE: f64 = 0.06;
     /// ... and at least this much.
@@ -218,10 +220,18 @@ impl<'a> Search<'a> {
                 break;
             }
         }
-        let left_out = heldout::paired(
-            &heldout::left_out(&self.problem, &mut before),
-            &heldout::left_out(&self.problem, &mut candidates[0].fit),
-        );
+        // A leader whose gain does not hold on left-out blocks (many parameters, little physics) or
+        // that is too small to matter gives way to the next.
+        let without = heldout::left_out(&self.problem, &mut before);
+        let mut left_out = (0.0, 0.0);
+        while let Some(leader) = candidates.first_mut() {
+            let gain = criterion(&before) - leader.criterion;
+            left_out = heldout::paired(&without, &heldout::left_out(&self.problem, &mut leader.fit));
+            if left_out.0 > rules::HOLDS * gain || candidates.len() == 1 {
+                break;
+            }
+            candidates.remove(0);
+        }
         let best = &candidates[0];
         Some(Round {
             gain: criterion(&before) - best.criterion,
@@ -248,8 +258,12 @@ impl<'a> Search<'a> {
         let mut all: Vec<Candidate> = chosen
             .par_iter()
             .map(|s| {
-                let hypothesis =
-                    with_effect(&current.hypothesis, &current.values, s.effect, &self.scale, Some(&s.start));
+                let at = |start: &[f64]| {
+                    with_effect(&current.hypothesis, &current.values, s.effect, &self.scale, Some(start))
+                };
+                // Limits and thresholds do not scale: start where the screen stood, if that is better.
+                let (scaled, plain) = (at(&s.start), at(&s.origin));
+                let hypothesis = if self.cost(&plain) < self.cost(&scaled) { plain } else { scaled };
                 let mut fit = self.problem.fit(&hypothesis, &current.columns, 4);
                 if TIMING.contains(&s.effect.id) {
                     fit = self.with_own_edges(&fit);
@@ -273,6 +287,12 @@ impl<'a> Search<'a> {
         let mut hypothesis = fit.hypothesis.clone();
         hypothesis.start.clone_from(&fit.values);
         self.problem.fit(&hypothesis, &fit.columns, 6)
+    }
+
+    /// Misfit of a hypothesis where it starts.
+    fn cost(&self, hypothesis: &crate::fit::Hypothesis) -> f64 {
+        let residual = self.problem.residual(&self.problem.respond(hypothesis, &hypothesis.start));
+        self.problem.whiten(&residual).norm_squared()
     }
 
     /// Like [`Search::again`], with the command's edges where this hypothesis wants them: a lag or

@@ -1,14 +1,12 @@
 //! What the report says in words, and the odds it gives.
 
 use kort_thruster::effects::Descriptor;
-use kort_thruster::rig::Rig;
 
 use crate::data::Series;
 use crate::fit::Problem;
 use crate::judge::{Outcome, Place, margin};
 use crate::locate;
 use crate::report::{Baseline, EmpiricalTerm, Finding, HeldOut, Mismatch, NextExperiment, Verdict};
-use crate::search::Search;
 
 /// How sure a lone name is when nothing comes near it; measured on tuning seeds.
 const SURE: f64 = 0.97;
@@ -144,12 +142,6 @@ pub fn unused(series: &[Series], problem: &Problem, driver: Option<&str>) -> Vec
         ));
     }
     notes
-}
-
-/// The run that would part what this one cannot.
-pub fn next_experiment(search: &Search, outcome: &Outcome, rig: &Rig) -> Option<NextExperiment> {
-    let _ = (search, outcome, rig);
-    None
 }
 
 /// One paragraph to act on.

@@ -18,7 +18,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     separated_by: "the recorded bus voltage; the supply voltage varied",
     reference: "physics.md C2",
     parameters,
-    starts: |scale| [0.05, 0.2, 0.4].iter().map(|share| vec![share * source_ohm(scale), 0.01]).collect(),
+    starts: |scale| [0.03, 0.08, 0.14, 0.2, 0.28, 0.4].iter().map(|share| vec![share * source_ohm(scale), 0.01]).collect(),
     needs: voltage_limit_backemf::needs,
     build: |values, context| {
         Box::new(SupplySag {

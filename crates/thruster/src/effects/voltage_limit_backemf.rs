@@ -36,7 +36,7 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
 }
 
 fn starts(scale: &Scale) -> Vec<Vec<f64>> {
-    [0.9, 1.05, 1.4].iter().map(|k| vec![(1.0 - k * emf_share(scale)).clamp(-0.2, 0.9), 1.0]).collect()
+    [0.9, 1.0, 1.1, 1.3, 1.4, 1.5, 1.7].iter().map(|k| vec![(1.0 - k * emf_share(scale)).clamp(-0.2, 0.9), 1.0]).collect()
 }
 
 pub(super) fn needs(rig: &Rig, available: &Available) -> Result<(), &'static str> {

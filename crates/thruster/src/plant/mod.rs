@@ -442,7 +442,14 @@ impl Plant {
 
     /// (14)-(17) without angles, with the hooks of inflow and foil.
     #[inline(always)]
-    fn blade_loads<const HOOKED: bool>(&self, at: &Local, x: &States, flow: f64, speed: f64, balance: &mut Balance) {
+    fn blade_loads<const HOOKED: bool>(
+        &self,
+        at: &Local,
+        x: &States,
+        flow: f64,
+        speed: f64,
+        balance: &mut Balance,
+    ) {
         let c = &self.constants;
         let mut inflow = Inflow { tangential_m_s: c.lever_m * speed - x[SWIRL], axial_m_s: flow };
         for i in self.inflow_hooks.iter().take(if HOOKED { usize::MAX } else { 0 }) {

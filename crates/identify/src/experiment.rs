@@ -1,0 +1,161 @@
+//! The run that would settle what this one cannot: of the shipped test signals, the one on which
+//! the rivals' fitted models differ most.
+
+use std::collections::BTreeMap;
+
+use kort_thruster::effects::Scale;
+use kort_thruster::parameters::Parameter;
+use kort_thruster::rig::Rig;
+use kort_thruster::scenario::{EffectUse, NoReplays, Run, Scenario};
+
+use crate::baseline::{Member, members, recompose};
+use crate::fit::Fit;
+use crate::judge::{Outcome, Place};
+use crate::report::NextExperiment;
+use crate::search::Search;
+
+/// Test signals to choose from: shipped scenario, what it does in an engineer's words.
+const SIGNALS: &[(&str, &str)] = &[
+    (
+        include_str!("../../../config/scenarios/slow-reversal-ramp.toml"),
+        "a slow ramp through zero in both directions",
+    ),
+    (
+        include_str!("../../../config/scenarios/staircase.toml"),
+        "a staircase of steady levels, up and down, both ways",
+    ),
+    (include_str!("../../../config/scenarios/chirp.toml"), "a chirp of 0.05 to 5 Hz about a mean"),
+    (
+        include_str!("../../../config/scenarios/identification-random-levels.toml"),
+        "random steps both ways, logged with the fastest rate there is",
+    ),
+    (include_str!("../../../config/scenarios/tow.toml"), "steps while towed ahead and astern"),
+];
+
+/// The next experiment, if anything is left open.
+pub fn next(search: &Search, outcome: &Outcome, rig: &Rig) -> Option<NextExperiment> {
+    let open = outcome.places.iter().enumerate().find(|(_, p)| !p.rivals.is_empty());
+    let Some((slot, place)) = open else { return unexplained(outcome) };
+    let (rival, _) = place.rivals.first()?;
+    let mine = members(&search.problem, &outcome.last);
+    let mut theirs = mine.clone();
+    *theirs.get_mut(slot)? = rival.clone();
+    let (hypothesis, columns) = recompose(&outcome.last, &theirs, &search.scale);
+    let other = search.problem.fit(&hypothesis, &columns, 4);
+    let best = SIGNALS
+        .iter()
+        .filter_map(|(text, words)| {
+            let scenario: Scenario = toml::from_str(text).ok()?;
+            let a = respond(&scenario, rig, search, &outcome.last)?;
+            let b = respond(&scenario, rig, search, &other)?;
+            Some((difference(&a, &b, &search.scale), scenario, *words))
+        })
+        .max_by(|x, y| x.0.total_cmp(&y.0))?;
+    let mut scenario = with_effects(best.1, &mine);
+    scenario.what = format!("Parts {} from {}: {}", place.chosen.id, rival.0.id, best.2);
+    scenario.name = format!("separate-{}-{}", place.chosen.id, rival.0.id).replace('_', "-");
+    Some(NextExperiment {
+        separates: std::iter::once(place.chosen.id.to_string())
+            .chain(place.rivals.iter().map(|r| r.0.0.id.to_string()))
+            .collect(),
+        excitation: best.2.into(),
+        why: why(place, rival, best.0),
+        scenario: serde_json::to_value(&scenario).ok()?,
+    })
+}
+
+fn why(place: &Place, rival: &Member, difference: f64) -> String {
+    let sizes = format!(
+        "fitted to this recording, {} and {} would then differ by {:.1} % of full scale on the channel where they differ most",
+        place.chosen.id,
+        rival.0.id,
+        100.0 * difference
+    );
+    if difference < 0.003 {
+        format!(
+            "{sizes}: none of the shipped test signals parts them well; what does is {}",
+            place.chosen.separated_by
+        )
+    } else {
+        format!("{sizes}; the catalogue's advice: {}", place.chosen.separated_by)
+    }
+}
+
+/// Nothing named: the richest signal there is, both ways.
+fn unexplained(outcome: &Outcome) -> Option<NextExperiment> {
+    let term = outcome.places.iter().find(|p| crate::library::is_term(p.chosen))?;
+    let (text, words) = SIGNALS[1];
+    let mut scenario: Scenario = toml::from_str(text).ok()?;
+    scenario.name = "locate-the-unknown".into();
+    Some(NextExperiment {
+        separates: vec!["unknown".into()],
+        excitation: words.into(),
+        why: format!(
+            "steady levels both ways show on the {} path how the unknown term goes with speed and direction; then repeat this run to see whether it stays",
+            term.chosen.path.name()
+        ),
+        scenario: serde_json::to_value(&scenario).ok()?,
+    })
+}
+
+fn respond(scenario: &Scenario, rig: &Rig, search: &Search, fit: &Fit) -> Option<Vec<Vec<f64>>> {
+    let (parameters, _) = search.problem.assemble(&fit.hypothesis, &fit.values);
+    let mut run = with_effects(scenario.clone(), &members(&search.problem, fit));
+    run.noise = 0.0;
+    run.turbulence = None;
+    run.model = search.problem.model;
+    run.parameters = Parameter::ALL.iter().map(|p| (*p, parameters.get(*p))).collect();
+    let mut run = Run::new(&run, rig, &mut NoReplays).ok()?;
+    let names = ["shaft_speed_rad_s", "thrust_n", "flow_m_s", "torque_n_m", "current_a"];
+    let at: Vec<Option<usize>> = names.iter().map(|n| run.columns().iter().position(|c| c == n)).collect();
+    let mut out: Vec<Vec<f64>> = vec![Vec::new(); names.len()];
+    let mut row = Vec::new();
+    while run.next_row(&mut row).is_some() {
+        for (column, at) in out.iter_mut().zip(&at) {
+            if let Some(v) = at.and_then(|i| row.get(i)).filter(|v| v.is_finite()) {
+                column.push(*v);
+            }
+        }
+    }
+    Some(out)
+}
+
+/// Root mean square difference over full scale, largest channel.
+fn difference(a: &[Vec<f64>], b: &[Vec<f64>], scale: &Scale) -> f64 {
+    let full = [scale.shaft_speed_rad_s, scale.thrust_n, scale.flow_m_s, scale.torque_n_m, scale.current_a];
+    a.iter()
+        .zip(b)
+        .zip(full)
+        .filter(|((x, y), _)| !x.is_empty() && x.len() == y.len())
+        .map(|((x, y), full)| {
+            let sum: f64 = x.iter().zip(y).map(|(p, q)| (p - q).powi(2)).sum();
+            (sum / x.len() as f64).sqrt() / full
+        })
+        .fold(0.0, f64::max)
+}
+
+fn with_effects(mut scenario: Scenario, list: &[Member]) -> Scenario {
+    scenario.effects = list
+        .iter()
+        .filter(|m| !crate::library::is_term(m.0))
+        .map(|(effect, values)| EffectUse { effect: effect.id.into(), parameters: named(effect, values) })
+        .collect();
+    scenario
+}
+
+fn named(effect: &kort_thruster::effects::Descriptor, values: &[f64]) -> BTreeMap<String, f64> {
+    // Only names are wanted here, and they do not depend on the scale.
+    let unit = Scale {
+        shaft_speed_rad_s: 1.0,
+        torque_n_m: 1.0,
+        thrust_n: 1.0,
+        flow_m_s: 1.0,
+        current_a: 1.0,
+        command: 1.0,
+        supply_v: 1.0,
+        inertia_kg_m2: 1.0,
+        tick_s: 0.002,
+        duration_s: 60.0,
+    };
+    (effect.parameters)(&unit).iter().map(|s| s.name.to_string()).zip(values.iter().copied()).collect()
+}
