@@ -122,11 +122,10 @@ pub fn held_out(
     let (b, a) = (sums(problem, before, pick), sums(problem, after, pick));
     let full = full_scales(problem);
     let rms = |(sum, n): (f64, usize)| (sum / n.max(1) as f64).sqrt();
-    // The channel where the error stands highest above the noise.
+    // The channel where most goes, against its noise.
     let height = |name: &str| {
-        let (sum, n) = b[name];
         let noise = floor.get(name).copied().unwrap_or(0.0).max(1e-12 * full[name] * full[name]);
-        (sum / n.max(1) as f64 - noise) / noise
+        (b[name].0 - a[name].0) / (noise * (b[name].1.max(1) as f64).sqrt())
     };
     let best = b.keys().copied().max_by(|x, y| height(x).total_cmp(&height(y)));
     let (removed, interval_95) = best.map_or((0.0, [0.0, 0.0]), |name| {

@@ -115,7 +115,7 @@ pub fn run(
         }
     }
     progress("weighing rivals");
-    prune(search, &mut current, &mut rounds);
+    prune(search, &mut current, &mut rounds, so_far);
     let mut places = settle(search, &mut current, &rounds);
     let baseline = plain(search, &current);
     unnamed(search, &baseline, &mut current, &mut places, term);
@@ -151,7 +151,9 @@ fn switched(search: &mut Search, current: &mut Fit) -> Option<Candidate> {
     None
 }
 
-/// Lets terms without a name judge what the names explain.
+/// Lets terms without a name judge what the names explain. One term alone that does better than
+/// any name alone, and nearly as well as all of them together, shows physics outside the
+/// catalogue; a term on top of the names shows what they leave.
 fn unnamed(
     search: &mut Search,
     baseline: &Fit,
@@ -160,36 +162,58 @@ fn unnamed(
     term: Option<Candidate>,
 ) {
     let base = criterion(baseline);
-    let named_gain = base - criterion(current);
     let place = |effect, gain| Place { chosen: effect, rivals: Vec::new(), aside: Vec::new(), gain };
-    let alone = term.map(|t| (t.effect, search.again(&t.fit)));
-    let on_top = if places.is_empty() { None } else { search.best_term(current) };
+    let named_gain = base - criterion(current);
     let needed = rules::TERM_LEAST.max(rules::TERM_SHARE * named_gain);
-    let now = criterion(current);
-    if let Some((effect, fit)) = alone {
-        let lead = now - criterion(&fit);
-        let with_names = on_top.as_ref().map_or(f64::NEG_INFINITY, |t| now - t.criterion);
-        let simpler = places.len() > 1 && lead > -margin(named_gain);
-        if places.is_empty() || (simpler || lead > needed) && with_names < lead + needed {
-            let gain = base - criterion(&fit);
-            let names: Vec<_> =
-                places.drain(..).map(|p| (p.chosen, criterion(&fit) - base + gain - p.gain)).collect();
-            *places = vec![Place { aside: names, ..place(effect, gain) }];
-            *current = fit;
+    let mut best = current.clone();
+    let mut added = None;
+    if !places.is_empty()
+        && let Some(top) = search.best_term(current)
+        && criterion(current) - top.criterion > needed
+        && search.size(current, &top.fit) > 2.0 * rules::LEAST_SIZE
+    {
+        added = Some(place(top.effect, criterion(current) - top.criterion));
+        best = top.fit;
+    }
+    let suspicious = places.len() > 1 || added.is_some() || places.is_empty() || term.is_some();
+    let alone = if suspicious {
+        let first = term.map(|t| {
+            let fit = search.again(&t.fit);
+            Candidate { criterion: criterion(&fit), fit, ..t }
+        });
+        let second =
+            if places.len() > 1 || added.is_some() { search.best_term(&mut baseline.clone()) } else { None };
+        first.into_iter().chain(second).min_by(|a, b| a.criterion.total_cmp(&b.criterion))
+    } else {
+        None
+    };
+    if let Some(alone) = alone {
+        let gain = base - alone.criterion;
+        let all = base - criterion(&best);
+        let single = members(&search.problem, current)
+            .into_iter()
+            .map(|m| {
+                let (hypothesis, columns) = recompose(current, &[m], &search.scale);
+                base - criterion(&search.problem.fit(&hypothesis, &columns, 5))
+            })
+            .fold(0.0_f64, f64::max);
+        let several = places.len() + usize::from(added.is_some()) > 1;
+        if places.is_empty() || gain > single + needed && (!several || gain > rules::TERM_ALONE * all) {
+            let aside = places.drain(..).map(|p| (p.chosen, (gain - p.gain).max(0.0))).collect();
+            *places = vec![Place { aside, ..place(alone.effect, gain) }];
+            *current = alone.fit;
             return;
         }
     }
-    if let Some(term) = on_top
-        && now - term.criterion > needed
-        && search.size(current, &term.fit) > 2.0 * rules::LEAST_SIZE
-    {
-        places.push(place(term.effect, now - term.criterion));
-        *current = term.fit;
+    if let Some(added) = added {
+        places.push(added);
+        *current = best;
     }
 }
 
 /// Backward elimination: an early find that later ones made needless goes.
-fn prune(search: &Search, current: &mut Fit, rounds: &mut Vec<Vec<Candidate>>) {
+fn prune(search: &Search, current: &mut Fit, rounds: &mut Vec<Vec<Candidate>>, gained: f64) {
+    let needed = rules::BELIEVE.max(rules::SHARE_OF_FIRST * gained);
     while rounds.len() > 1 {
         let all = members(&search.problem, current);
         let now = criterion(current);
@@ -205,7 +229,7 @@ fn prune(search: &Search, current: &mut Fit, rounds: &mut Vec<Vec<Candidate>>) {
             }
         }
         match least {
-            Some((leave, fit, loss)) if loss < rules::BELIEVE => {
+            Some((leave, fit, loss)) if loss < needed || search.size(&fit, current) < rules::LEAST_SIZE => {
                 *current = fit;
                 rounds.remove(leave);
             }

@@ -20,10 +20,10 @@ pub mod rules {
     /// Cost of one more parameter.
     pub const PER_PARAMETER: f64 = 6.0;
     /// What an effect must gain to be believed at all.
-    pub const BELIEVE: f64 = 30.0;
+    pub const BELIEVE: f64 = 80.0;
     /// ... and as a share of what was gained before: the rest of an effect whose true form
     /// differs a little from ours is not another effect.
-    pub const SHARE_OF_FIRST: f64 = 0.004;
+    pub const SHARE_OF_FIRST: f64 = 0.02;
     /// Least size: root mean square of its response over full scale, on some channel.
     pub const LEAST_SIZE: f64 = 0.0012;
     /// Share of the gain that must hold on left-out blocks.
@@ -36,7 +36,9 @@ pub mod rules {
     pub const MATES_SHARE: f64 = 0.06;
     /// How much better a term without a name must be than the best name, as a share of its gain.
     pub const TERM_SHARE: f64 = 0.06;
-    /// ... and at least this much.
+    /// Share of what several names explain together that one term alone must reach to replace them.
+    pub const TERM_ALONE: f64 = 0.85;
+    /// Least gain of a term.
     pub const TERM_LEAST: f64 = 20.0;
     /// Error above the noise, root mean square over full scale, below which nothing is sought:
     /// light turbulence of the inflow leaves as much.
@@ -185,11 +187,11 @@ impl<'a> Search<'a> {
         let everything: Vec<&'static Descriptor> =
             self.named.iter().chain(&terms).copied().filter(|e| !taken.contains(&e.id)).collect();
         let screened = screen(&self.problem, current, &everything, &self.scale, &mut self.known);
-        let least = (0.5 * rules::BELIEVE).max(0.5 * rules::SHARE_OF_FIRST * so_far);
+        let least = (0.25 * rules::BELIEVE).max(0.1 * rules::SHARE_OF_FIRST * so_far);
         let chosen = choose(&screened, least);
         let mut candidates = self.refit(current, &chosen);
         let base = criterion(current);
-        if candidates.first().is_none_or(|c| base - c.criterion < 0.6 * rules::BELIEVE) {
+        if candidates.first().is_none_or(|c| base - c.criterion < 0.3 * rules::BELIEVE) {
             return None;
         }
         // Under the noise of the best so far the rivals part more sharply; that may change the best.
@@ -248,7 +250,7 @@ impl<'a> Search<'a> {
         let chosen: Vec<Screened> = screened
             .into_iter()
             .filter(|s| s.gain > 0.5 * rules::TERM_LEAST && s.size > rules::LEAST_SIZE)
-            .take(2)
+            .take(3)
             .collect();
         self.refit(current, &chosen).into_iter().next()
     }
