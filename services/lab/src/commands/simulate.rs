@@ -128,8 +128,10 @@ fn read_scenario(wanted: &Path) -> Result<Scenario, Failure> {
             fail(&"`next_experiment` is null: this report asks for no further run\nhint: choose a scenario yourself")
         })?;
     }
-    serde_json::from_value(json)
-        .map_err(|e| fail(&format!("{e}\nhint: docs/recordings.md lists the keys of a scenario")))
+    serde_path_to_error::deserialize(json).map_err(|e| {
+        let (path, why) = (e.path().to_string(), e.into_inner());
+        fail(&format!("`{path}`: {why}\nhint: docs/recordings.md lists the keys of a scenario"))
+    })
 }
 
 /// Replays from files and built-in recordings.
