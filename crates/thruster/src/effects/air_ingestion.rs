@@ -16,7 +16,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     signature: "thrust and torque fall by the same fraction at high speed, slowly, and recover slowly",
     confused_with: &["ventilation", "water_density", "cavitation"],
     separated_by: "thrust over speed squared against torque over speed squared (same fraction); long holds with rests",
-    reference: "physics.md C4",
+    reference: "density of the mixture; the onset with speed is kort's form",
     parameters,
     starts: |scale| {
         let full = scale.shaft_speed_rad_s;

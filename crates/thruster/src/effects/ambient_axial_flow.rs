@@ -14,7 +14,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
                 falls as 1/Om, while an asymmetry of the blades is a constant percentage",
     confused_with: &["forward_reverse_asymmetry", "torque_channel_bias", "thrust_bias_gain_hysteresis", "tank_recirculation"],
     separated_by: "a staircase in both directions; a towed run; a force bias leaves shaft speed alone",
-    reference: "equation (6a), derived from (4); physics.md C3",
+    reference: "equation (6a), from (4); Blanke, Lindegaard, Fossen 2000 (nonzero advance speed)",
     parameters,
     starts: one_start,
     needs,

@@ -12,7 +12,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     signature: "thrust, shaft speed and flow move together without a command, at 0.05 to 0.3 Hz",
     confused_with: &["ambient_axial_flow", "tank_recirculation", "supply_sag", "thermal_drift_kt"],
     separated_by: "the flow meter with the motor off; coherence of thrust, speed and flow at low frequency",
-    reference: "equation (6a); physics.md C3",
+    reference: "equation (6a), from (4); straight pieces are kort's form",
     parameters,
     starts: one_start,
     needs: super::ambient_axial_flow::needs,

@@ -13,7 +13,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
                 a recorded current shows the lag itself",
     confused_with: &["transport_delay", "encoder_filter_lag", "entrained_water_inertia", "clock_skew"],
     separated_by: "a chirp: phase slope against roll-off; the recorded current",
-    reference: "physics.md C2",
+    reference: "Whitcomb & Yoerger, Comparative Experiments in the Dynamics and Model-Based Control of Marine Thrusters (their current amplifier: 2 ms)",
     parameters,
     starts: |scale| [0.005_f64, 0.015, 0.05].iter().map(|lag| vec![lag.max(scale.tick_s)]).collect(),
     needs: commanded,

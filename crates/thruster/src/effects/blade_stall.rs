@@ -17,7 +17,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
                 its angle of attack lies above the stall",
     confused_with: &["nonsinusoidal_lift_drag", "ventilation", "unsteady_lift_lag"],
     separated_by: "reversals at several rates, which sweep the angle of attack",
-    reference: "physics.md C4",
+    reference: "Leishman 2006, Principles of Helicopter Aerodynamics (dynamic stall); kort's form",
     parameters,
     starts: |_| vec![vec![0.1, 0.17, 1.0], vec![0.1, 0.28, 1.0], vec![0.1, 0.35, 1.0], vec![0.1, 0.28, 4.0]],
     needs: wet,

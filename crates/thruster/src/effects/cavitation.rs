@@ -22,7 +22,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     signature: "thrust over speed squared droops at top speed only, alike in both directions; less so at depth",
     confused_with: &["ventilation", "voltage_limit_backemf", "current_saturation", "torque_constant_saturation", "air_ingestion"],
     separated_by: "the same run at several depths; a voltage limit caps speed but leaves thrust over speed squared alone",
-    reference: "physics.md C4",
+    reference: "Carlton, Marine Propellers and Propulsion (cavitation number); the loss below onset is kort's form",
     parameters,
     starts: |scale| [1.3, 3.0, 5.0].iter().map(|factor| vec![0.1, onset(scale, *factor)]).collect(),
     needs: wet,

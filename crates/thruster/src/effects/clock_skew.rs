@@ -17,7 +17,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     signature: "one channel is shifted by the same time at all frequencies and amplitudes, its levels fit",
     confused_with: &["transport_delay", "thrust_sensor_lag", "encoder_filter_lag", "flowmeter_offset_lag_location", "amplifier_lag"],
     separated_by: "channels correlated with each other at the start and at the end of the run",
-    reference: "physics.md C5",
+    reference: "Ljung 1999, System Identification",
     parameters,
     starts: |_| vec![vec![0.04, 0.04, 0.04], vec![0.12, 0.12, 0.12]],
     needs,

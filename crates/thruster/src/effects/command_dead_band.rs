@@ -14,7 +14,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
                 are off by d or not at all",
     confused_with: &["coulomb_friction", "torque_channel_bias", "gear_backlash"],
     separated_by: "a slow ramp through zero with current recorded: with dry friction current flows and nothing moves",
-    reference: "physics.md C2; ArduSub's simulated ESC 1475-1525 us",
+    reference: "Bessa, Dutra, Kreuzer (thruster dead zone); ArduSub's simulated ESC: 1475 to 1525 us",
     parameters,
     starts: |scale| {
         let full = scale.command;

@@ -14,7 +14,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
                 thrust over speed squared is unchanged; the loss in thrust per torque falls as 1/Om^2",
     confused_with: &["viscous_friction", "torque_channel_bias", "command_dead_band"],
     separated_by: "a slow ramp through zero in both directions; a coast-down",
-    reference: "physics.md C1; Armstrong-Helouvry, Dupont, Canudas de Wit 1994 (Automatica 30:1083)",
+    reference: "Armstrong-Helouvry, Dupont, Canudas de Wit 1994 (Automatica 30:1083)",
     parameters,
     starts: one_start,
     needs: free_shaft,

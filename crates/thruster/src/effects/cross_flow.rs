@@ -14,7 +14,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
                 for flow from both sides",
     confused_with: &["ambient_axial_flow", "thrust_deduction_interaction", "duct_loss"],
     separated_by: "a yaw sweep in towed runs; the transverse flow recorded",
-    reference: "physics.md C3, T (1 - c (vt/vp)^2), here bounded where vp is small",
+    reference: "T (1 - c (vt/vp)^2), here bounded where vp is small; kort's form",
     parameters,
     starts: |scale| {
         let full = scale.flow_m_s;

@@ -14,7 +14,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
                 small commands fit",
     confused_with: &["voltage_limit_backemf", "torque_constant_saturation", "cavitation"],
     separated_by: "steps of rising size; the supply voltage varied (a current limit stays)",
-    reference: "physics.md C2",
+    reference: "Whitcomb & Yoerger, Comparative Experiments in the Dynamics and Model-Based Control of Marine Thrusters (their current amplifier: 9 A)",
     parameters,
     starts: |_| [0.05, 0.25, 0.4, 0.6].iter().map(|cut| vec![*cut]).collect(),
     needs,

@@ -15,7 +15,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
                 shaft speed hardly changes",
     confused_with: &["thrust_bias_gain_hysteresis", "flowmeter_offset_lag_location", "thrust_deduction_interaction", "water_density"],
     separated_by: "a profile of the flow across the duct; thrust and flow recorded together",
-    reference: "equations (2)-(6); physics.md C3",
+    reference: "control volume of the duct, equations (2)-(6); Carlton, Marine Propellers and Propulsion",
     parameters,
     starts: one_start,
     needs: wet,

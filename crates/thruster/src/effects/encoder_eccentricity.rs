@@ -14,7 +14,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     signature: "lines at orders 1 and 2 of shaft angle in speed, in proportion to speed; none in thrust",
     confused_with: &["torque_ripple_cogging"],
     separated_by: "a slow creep over full turns, averaged over angle, speed against thrust",
-    reference: "physics.md C5",
+    reference: "Doebelin, Measurement Systems (angle encoders)",
     parameters,
     starts: one_start,
     needs,

@@ -13,7 +13,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     signature: "shaft speed alone is late and rounded by a fixed time, at all amplitudes; thrust and flow fit",
     confused_with: &["clock_skew", "amplifier_lag", "transport_delay", "entrained_water_inertia", "rotor_inertia_error"],
     separated_by: "the raw shaft angle, differenced",
-    reference: "physics.md C5",
+    reference: "Whitcomb & Yoerger, Comparative Experiments in the Dynamics and Model-Based Control of Marine Thrusters (their speed filter: 10 ms)",
     parameters,
     starts: |_| vec![vec![0.03], vec![0.1]],
     needs: speed_measured,

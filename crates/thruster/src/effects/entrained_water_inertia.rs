@@ -15,7 +15,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
                 Om'; steady states fit",
     confused_with: &["rotor_inertia_error", "inertia_added_mass_error", "amplifier_lag", "rotational_flow"],
     separated_by: "a coast-down in air against one in water; small fast variations of torque about zero speed",
-    reference: "physics.md C1",
+    reference: "Newman 1977, Marine Hydrodynamics (added moment of inertia); equation (10)",
     parameters,
     starts: one_start,
     needs,

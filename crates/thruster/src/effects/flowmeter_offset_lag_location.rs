@@ -17,7 +17,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
                 proportion, or by a constant also at rest",
     confused_with: &["inertia_added_mass_error", "duct_loss", "clock_skew"],
     separated_by: "steps to several speeds, flow correlated with thrust at each; a traverse of the meter",
-    reference: "physics.md C5; dbeta 1.86 = 2/g^2 gives g = 1.04",
+    reference: "Whitcomb & Yoerger, Comparative Experiments in the Dynamics and Model-Based Control of Marine Thrusters (their meter: 0.30 m downstream); dbeta 1.86 = 2/g^2 gives g = 1.04",
     parameters,
     starts: |scale| [0.15, 0.35].iter().map(|share| vec![share * scale.flow_m_s, 0.02, 0.005 * scale.flow_m_s]).collect(),
     needs: flow_measured,

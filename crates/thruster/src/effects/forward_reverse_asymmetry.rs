@@ -13,7 +13,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     signature: "thrust over speed squared differs between the directions by the same percentage at all speeds",
     confused_with: &["ambient_axial_flow", "thrust_bias_gain_hysteresis", "torque_channel_bias"],
     separated_by: "a staircase in both directions; the thruster turned end for end on the stand",
-    reference: "physics.md C4; rev/fwd 0.75-0.785 for a T200-size unit",
+    reference: "maker's curves of a T200-size unit: reverse over forward thrust 0.75 to 0.785",
     parameters,
     starts: one_start,
     needs: wet,

@@ -15,7 +15,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     signature: "lost motion, then a blow, at each reversal of torque; a limit cycle about zero under a speed loop",
     confused_with: &["coulomb_friction", "transport_delay", "command_dead_band"],
     separated_by: "an encoder on the load side; slow reversals of torque",
-    reference: "physics.md C2; inelastic contact in place of a stiff tooth spring",
+    reference: "Nordin & Gutman 2002 (Automatica 38:1633); inelastic contact in place of a stiff tooth spring",
     parameters,
     starts: one_start,
     needs,

@@ -12,7 +12,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     signature: "axial flow rises more slowly (or faster) than modelled, and with it thrust overshoots longer; steady states fit",
     confused_with: &["entrained_water_inertia", "rotor_inertia_error", "unsteady_lift_lag", "flowmeter_offset_lag_location", "rotational_flow"],
     separated_by: "steps of shaft speed under a speed loop (the shaft's inertia drops out), with flow or thrust recorded",
-    reference: "equation (2); physics.md C3",
+    reference: "equation (2); Whitcomb & Yoerger, Comparative Experiments in the Dynamics and Model-Based Control of Marine Thrusters",
     parameters,
     starts: |_| vec![vec![-0.3], vec![1.0]],
     needs: wet,

@@ -293,19 +293,19 @@ mod memory;
 macro_rules! catalogue {
     ($($name:ident),* $(,)?) => {
         $(pub mod $name;)*
-        /// Every effect, in the order of `physics.md`, part C.
+        /// Every effect: shaft, drive, flow, blade, sensor.
         pub const ALL: &[&Descriptor] = &[$(&$name::DESCRIPTOR),*];
     };
 }
 
 catalogue! {
-    // C1: shaft friction and load
+    // shaft friction and load
     coulomb_friction,
     viscous_friction,
     windage_drag,
     rotor_inertia_error,
     entrained_water_inertia,
-    // C2: drive and motor
+    // drive and motor
     amplifier_lag,
     transport_delay,
     current_saturation,
@@ -316,7 +316,7 @@ catalogue! {
     torque_ripple_cogging,
     command_dead_band,
     gear_backlash,
-    // C3: axial flow
+    // axial flow
     ambient_axial_flow,
     ambient_flow_unsteady,
     tank_recirculation,
@@ -324,7 +324,7 @@ catalogue! {
     thrust_deduction_interaction,
     cross_flow,
     inertia_added_mass_error,
-    // C4: blades
+    // blades
     rotational_flow,
     nonsinusoidal_lift_drag,
     blade_stall,
@@ -334,7 +334,7 @@ catalogue! {
     air_ingestion,
     cavitation,
     water_density,
-    // C5: sensors and structure
+    // sensors and structure
     thrust_bias_gain_hysteresis,
     thrust_sensor_lag,
     stand_resonance,

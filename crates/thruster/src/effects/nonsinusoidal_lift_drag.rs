@@ -13,7 +13,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
                 and is off at other advance",
     confused_with: &["rotational_flow", "blade_stall", "inertia_added_mass_error", "windage_drag"],
     separated_by: "steps of shaft speed, towed runs: whatever sweeps the angle of attack",
-    reference: "Bachmayer, Whitcomb, Grosenbaugh 2000 (IEEE JOE 25:146); physics.md C4",
+    reference: "Bachmayer, Whitcomb, Grosenbaugh 2000 (IEEE JOE 25:146); the harmonics are kort's form",
     parameters,
     starts: one_start,
     needs: wet,

@@ -16,7 +16,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
                 yet washed out while axial flow is low",
     confused_with: &["entrained_water_inertia", "unsteady_lift_lag", "nonsinusoidal_lift_drag", "inertia_added_mass_error"],
     separated_by: "steps of several sizes both ways with shaft speed and thrust logged: the pair of overshoots; a probe for tangential flow",
-    reference: "Bachmayer, Whitcomb, Grosenbaugh 2000 (IEEE JOE 25:146); equation form physics.md C4",
+    reference: "Bachmayer, Whitcomb, Grosenbaugh 2000 (IEEE JOE 25:146); the equation's form is kort's",
     parameters,
     starts: |_| vec![vec![0.1, 0.08], vec![0.1, 1.5]],
     needs: wet,

@@ -13,7 +13,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
                 steady states fit",
     confused_with: &["entrained_water_inertia", "inertia_added_mass_error", "amplifier_lag", "rotational_flow"],
     separated_by: "small fast variations of torque about zero speed; a coast-down in air against one in water",
-    reference: "physics.md C1; equation (10)",
+    reference: "Healey et al. 1995 (IEEE JOE 20:354), equation (10)",
     parameters,
     starts: one_start,
     needs: free_shaft,

@@ -14,7 +14,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
                 the frequency",
     confused_with: &["thrust_sensor_lag", "rotational_flow", "nonsinusoidal_lift_drag"],
     separated_by: "a tap on the stand with the motor off; a chirp",
-    reference: "physics.md C5",
+    reference: "Doebelin, Measurement Systems (second-order instrument)",
     parameters,
     starts: |_| [5.0, 7.0, 10.0, 14.0, 28.0, 40.0, 56.0, 80.0].iter().map(|hz| vec![0.5, *hz, 0.03]).collect(),
     needs: thrust_measured,

@@ -16,7 +16,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
                 other loads on the bus show through; thrust over speed squared is unchanged",
     confused_with: &["voltage_limit_backemf", "thermal_drift_kt", "viscous_friction"],
     separated_by: "the recorded bus voltage; the supply voltage varied",
-    reference: "physics.md C2",
+    reference: "Ohm's law with the power balance of the drive; kort's form",
     parameters,
     starts: |scale| [0.03, 0.08, 0.14, 0.2, 0.28, 0.4].iter().map(|share| vec![share * source_ohm(scale), 0.01]).collect(),
     needs: voltage_limit_backemf::needs,

@@ -13,7 +13,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
                 from one in stirred water",
     confused_with: &["ambient_axial_flow", "ambient_flow_unsteady", "thermal_drift_kt"],
     separated_by: "long holds, with waits for still water between; thermal drift leaves thrust over speed squared alone",
-    reference: "equation (6a); physics.md C3",
+    reference: "equation (6a), from (4); the first-order return is kort's form",
     parameters,
     starts: |_| vec![vec![0.05, 2.0], vec![0.05, 4.0], vec![0.05, 20.0], vec![0.05, 50.0]],
     needs: super::ambient_axial_flow::needs,

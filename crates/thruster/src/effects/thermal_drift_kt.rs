@@ -12,7 +12,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     signature: "thrust per ampere decays over minutes under load and recovers after a rest; thrust over speed squared is unchanged",
     confused_with: &["torque_constant_saturation", "tank_recirculation", "viscous_friction", "supply_sag"],
     separated_by: "a long hold with rests; recirculation changes thrust over speed squared, warming oil acts the other way",
-    reference: "physics.md C2",
+    reference: "Krishnan 2001, Electric Motor Drives; one thermal mass",
     parameters,
     starts: |scale| {
         let full = 1.0 / scale.current_a.powi(2);

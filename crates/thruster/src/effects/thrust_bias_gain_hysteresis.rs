@@ -13,7 +13,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
                 and falling load (hysteresis); shaft speed and flow fit",
     confused_with: &["forward_reverse_asymmetry", "ambient_axial_flow", "duct_loss", "water_density"],
     separated_by: "known static loads; the zero before and after the run",
-    reference: "physics.md C5",
+    reference: "Doebelin, Measurement Systems; a play operator for the loop",
     parameters,
     starts: one_start,
     needs: thrust_measured,

@@ -13,7 +13,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     signature: "thrust and flow follow another thruster's command; thrust is low in proportion",
     confused_with: &["ambient_axial_flow", "ambient_flow_unsteady", "thrust_bias_gain_hysteresis", "duct_loss"],
     separated_by: "the thrusters run one by one, then together",
-    reference: "physics.md C3",
+    reference: "Carlton, Marine Propellers and Propulsion (thrust deduction, interaction)",
     parameters,
     starts: one_start,
     needs,

@@ -13,7 +13,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     signature: "thrust alone is late and rounded by a fixed time, at all amplitudes; shaft speed and flow fit",
     confused_with: &["unsteady_lift_lag", "clock_skew", "stand_resonance"],
     separated_by: "a tap on the stand with the motor off; a chirp at two mean speeds (lift lag shrinks with speed)",
-    reference: "physics.md C5",
+    reference: "Whitcomb & Yoerger, Comparative Experiments in the Dynamics and Model-Based Control of Marine Thrusters (their force filter: 163 Hz)",
     parameters,
     starts: |_| vec![vec![0.003], vec![0.03], vec![0.1]],
     needs: thrust_measured,

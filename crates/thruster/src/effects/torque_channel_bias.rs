@@ -13,7 +13,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
                 measured current or torque is off also at rest",
     confused_with: &["coulomb_friction", "ambient_axial_flow", "command_dead_band", "forward_reverse_asymmetry"],
     separated_by: "a staircase in both directions; the zeros before and after the run",
-    reference: "physics.md C5",
+    reference: "Doebelin, Measurement Systems",
     parameters,
     starts: one_start,
     needs: always,

@@ -13,7 +13,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
                 over speed squared is unchanged",
     confused_with: &["coulomb_friction", "windage_drag", "thermal_drift_kt", "current_saturation"],
     separated_by: "torque with the rotor locked; a staircase in both directions (Coulomb friction has the opposite trend)",
-    reference: "physics.md C2",
+    reference: "Krishnan 2001, Electric Motor Drives",
     parameters,
     starts: one_start,
     needs: free_shaft,

@@ -14,7 +14,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     confused_with: &["encoder_eccentricity", "coulomb_friction"],
     separated_by: "a slow creep over full turns, averaged over angle; cogging stays with the current off; a resolver's \
                    error shows in speed but not in thrust",
-    reference: "physics.md C2",
+    reference: "Jahns & Soong 1996 (IEEE Trans. Ind. Electron. 43:321)",
     parameters,
     starts,
     needs,

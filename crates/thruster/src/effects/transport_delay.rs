@@ -13,7 +13,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     signature: "nothing moves until td after each edge, at every amplitude; phase falls linearly with frequency",
     confused_with: &["amplifier_lag", "clock_skew", "encoder_filter_lag"],
     separated_by: "steps cross-correlated channel by channel; a chirp (phase slope against roll-off)",
-    reference: "physics.md C2",
+    reference: "Ljung 1999, System Identification",
     parameters,
     starts: one_start,
     needs: commanded,

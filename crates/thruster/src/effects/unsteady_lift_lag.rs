@@ -17,7 +17,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     signature: "thrust and torque lag fast changes by a time that shrinks with speed; the gain of thrust at high frequency is low",
     confused_with: &["thrust_sensor_lag", "inertia_added_mass_error", "rotational_flow", "blade_stall"],
     separated_by: "a chirp at two mean speeds (a sensor's lag stays the same in seconds)",
-    reference: "Wagner 1925; R. T. Jones 1940 (NACA TR 681); physics.md C4",
+    reference: "Wagner 1925; R. T. Jones 1940 (NACA TR 681)",
     parameters,
     starts: |_| vec![vec![0.5, 0.2], vec![0.5, 1.5]],
     needs: wet,

@@ -21,7 +21,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     signature: "an abrupt loss of thrust and torque together at high speed, a rise of shaft speed, recovery with hysteresis",
     confused_with: &["cavitation", "air_ingestion", "blade_stall"],
     separated_by: "depth changed at the same speed; the recovery on the way down",
-    reference: "Minsaas, Faltinsen, Persson 1983; Smogeli 2006 (NTNU); physics.md C4",
+    reference: "Minsaas, Faltinsen, Persson 1983; Smogeli 2006 (thesis, NTNU); kort's form",
     parameters,
     starts: |scale| [0.5, 0.65, 0.95].iter().map(|share| vec![0.05, share * scale.shaft_speed_rad_s, 0.3]).collect(),
     needs: wet,

@@ -13,7 +13,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
                 unchanged; the loss in thrust per torque falls as 1/Om and shrinks as the unit warms",
     confused_with: &["coulomb_friction", "windage_drag", "voltage_limit_backemf", "supply_sag"],
     separated_by: "a staircase over a 10:1 range of speeds; a dry spin",
-    reference: "physics.md C1; equation (10)",
+    reference: "Healey et al. 1995 (IEEE JOE 20:354), equation (10)",
     parameters,
     starts: one_start,
     needs: free_shaft,

@@ -14,7 +14,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
                 supply; thrust over speed squared is unchanged",
     confused_with: &["current_saturation", "supply_sag", "cavitation", "viscous_friction"],
     separated_by: "the supply voltage varied; steps of rising size",
-    reference: "physics.md C2; equations (10)-(12)",
+    reference: "Healey et al. 1995 (IEEE JOE 20:354), equations (10)-(12)",
     parameters,
     starts,
     needs,

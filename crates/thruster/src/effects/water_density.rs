@@ -13,7 +13,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
                 torque are unchanged",
     confused_with: &["air_ingestion", "thrust_bias_gain_hysteresis", "windage_drag", "duct_loss"],
     separated_by: "temperature and salinity of the water; shaft speed together with thrust and torque",
-    reference: "physics.md C4",
+    reference: "Fofonoff & Millard 1983 (UNESCO Tech. Pap. Mar. Sci. 44)",
     parameters,
     starts: one_start,
     needs: wet,

@@ -12,7 +12,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     signature: "thrust per torque is lower by the same percentage at all speeds; thrust over speed squared is unchanged",
     confused_with: &["torque_constant_saturation", "nonsinusoidal_lift_drag", "viscous_friction", "water_density"],
     separated_by: "a spin with the blades off (windage stays); an error of the torque constant shows at standstill too",
-    reference: "physics.md C1; disk drag, Daily & Nece 1960 (J. Basic Eng. 82:217)",
+    reference: "Daily & Nece 1960 (J. Basic Eng. 82:217)",
     parameters,
     starts: one_start,
     needs: free_shaft,

@@ -222,6 +222,7 @@ mod tests {
             ("coulomb", "coulomb_friction"),
             ("backlash", "gear_backlash"),
             ("tranport_delay", "transport_delay"),
+            ("swirl", "rotational_flow"),
         ] {
             let failure = find(asked).map(|d| d.id).unwrap_err();
             assert_eq!(failure.code(), 2);
@@ -236,6 +237,12 @@ mod tests {
         let text = table(ALL);
         assert!(ALL.iter().all(|e| text.lines().any(|l| l.starts_with(e.id))));
         assert!(text.lines().all(|l| l.chars().count() <= WIDTH), "{text}");
+    }
+
+    #[test]
+    fn the_document_is_the_one_this_program_writes() {
+        let kept = include_str!("../../../../docs/catalogue.md");
+        assert!(kept == markdown(ALL), "run: kort explain --markdown > docs/catalogue.md");
     }
 
     #[test]
