@@ -130,7 +130,12 @@ fn excess(problem: &Problem, fit: &Fit) -> (&'static str, f64) {
     let full = errors::full_scales(problem);
     errors::sums(problem, &residual, |r, row| !problem.masked[r][row])
         .into_iter()
-        .map(|(name, (sum, n))| (name, (sum / n.max(1) as f64 - floor[name]).max(0.0).sqrt() / full[name]))
+        .map(|(name, (sum, n))| {
+            // The floor is itself an estimate: only what stands clear of its doubt counts.
+            let n = n.max(1) as f64;
+            let doubt = 4.0 * floor[name] * (3.0 / n).sqrt();
+            (name, (sum / n - floor[name] - doubt).max(0.0).sqrt() / full[name])
+        })
         .max_by(|a, b| a.1.total_cmp(&b.1))
         .unwrap_or(("", 0.0))
 }

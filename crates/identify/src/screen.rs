@@ -24,6 +24,8 @@ pub struct Screened {
     pub origin: Vec<f64>,
     /// Expected fall of the sum of squares.
     pub gain: f64,
+    /// Fall of the sum of squares at the simulated values themselves.
+    pub plain: f64,
     /// Degrees of freedom behind that gain.
     pub directions: usize,
     /// Upper bound of its response: root mean square over full scale, largest channel.
@@ -198,6 +200,7 @@ fn score(
         return None;
     }
     let (gram, gradient) = projector.project(fit, &directions);
+    let plain = 2.0 * gradient.sum() - gram.sum();
     let mut active: Vec<usize> = (0..strengths.len())
         .filter(|k| gram[(*k, *k)] > 1e-6 * directions[*k].norm_squared().max(1e-9))
         .collect();
@@ -232,6 +235,6 @@ fn score(
             let reach = 8.0 * from[s].abs();
             from[s] = value.clamp(-reach, reach).clamp(specs[s].low, specs[s].high);
         }
-        return Some(Screened { effect, start: from, origin, gain, directions: n, size });
+        return Some(Screened { effect, start: from, origin, gain, plain, directions: n, size });
     }
 }

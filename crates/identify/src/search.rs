@@ -203,7 +203,7 @@ impl<'a> Search<'a> {
             self.problem.learn_noise(&best.fit.hypothesis, &best.fit.values);
             let base = criterion(&before);
             let worth = base - candidates[0].criterion;
-            candidates.retain(|c| base - c.criterion > 0.4 * worth);
+            candidates.retain(|c| c.effect.id == leader || base - c.criterion > 0.4 * worth);
             candidates.truncate(6);
             before = self.again(&before);
             candidates = candidates
@@ -358,6 +358,19 @@ fn choose(screened: &[Screened], least: f64) -> Vec<Screened> {
         {
             named += 1;
             chosen.push(s.clone());
+        }
+    }
+    // Limits and thresholds do not scale with their strength: judge them where they were simulated.
+    let mut seen: Vec<&str> = Vec::new();
+    let mut plain: Vec<&Screened> =
+        screened.iter().filter(|s| s.plain > 0.3 * top && !is_term(s.effect)).collect();
+    plain.sort_by(|a, b| b.plain.total_cmp(&a.plain).then(a.effect.id.cmp(b.effect.id)));
+    for s in plain {
+        if !seen.contains(&s.effect.id) && seen.len() < 4 {
+            seen.push(s.effect.id);
+            if !chosen.iter().any(|c| c.effect.id == s.effect.id && c.origin == s.origin) {
+                chosen.push(Screened { start: s.origin.clone(), ..s.clone() });
+            }
         }
     }
     chosen
