@@ -9,6 +9,7 @@ pub mod files;
 pub mod progress;
 pub mod render;
 pub mod soak;
+pub mod reproduce;
 
 pub use commands::Command;
 pub use failure::{Failure, Outcome};

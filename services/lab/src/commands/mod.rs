@@ -1,6 +1,8 @@
 //! One file a subcommand.
 
 mod explain;
+mod fit_table;
+mod reproduce;
 mod simulate;
 mod soak;
 
@@ -13,6 +15,10 @@ use crate::failure::{Failure, Outcome};
 pub enum Command {
     /// Look up the physics a model may leave out: what it is, how it shows, what it is confused with
     Explain(explain::Args),
+    /// Make a rig description from a table of settled points, and say what it cannot fix
+    FitTable(fit_table::Args),
+    /// Compute the seed paper's tables and figures, ours beside the printed value
+    Reproduce(reproduce::Args),
     /// Make a recording from a model, with the stand's sensors
     Simulate(simulate::Args),
     /// Run several controllers on the same plant, faults and references, and compare them
@@ -24,6 +30,8 @@ impl Command {
     pub fn run(self) -> Result<Outcome, Failure> {
         match self {
             Command::Explain(args) => explain::run(&args),
+            Command::FitTable(args) => fit_table::run(&args),
+            Command::Reproduce(args) => reproduce::run(&args),
             Command::Simulate(args) => simulate::run(&args),
             Command::Soak(args) => soak::run(&args),
         }
