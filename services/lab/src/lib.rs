@@ -8,8 +8,8 @@ pub mod failure;
 pub mod files;
 pub mod progress;
 pub mod render;
-pub mod soak;
 pub mod reproduce;
+pub mod soak;
 
 pub use commands::Command;
 pub use failure::{Failure, Outcome};

@@ -8,7 +8,7 @@ use kort_recording::{ColumnMap, Recording};
 use serde::Serialize;
 
 use crate::failure::{Failure, Outcome, print, print_json, write_text};
-use crate::input;
+use crate::files;
 
 mod branch;
 
@@ -108,7 +108,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
             )));
         }
     }
-    let map = input::read_columns(args.columns.as_deref())?;
+    let map = files::read_columns(args.columns.as_deref())?;
     let chosen = read(&args.table, map.as_ref())?;
     let others = other_runs(&args.table, map.as_ref(), &chosen)?;
     let geometry = Geometry {
@@ -156,7 +156,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
 }
 
 fn read(path: &Path, map: Option<&ColumnMap>) -> Result<Run, Failure> {
-    let recording = input::read_recording(path, map)?;
+    let recording = files::read_recording(path, map)?;
     let need = |name: &str| column(&recording, name).map_err(|e| Failure::in_file(path, e));
     let (duty, speed, thrust) = (need("duty_cmd")?, need("shaft_speed_rad_s")?, need("thrust_n")?);
     let (current, supply) = (need("supply_current_a")?, need("supply_v")?);
