@@ -4,8 +4,9 @@
 //! `cargo bench --bench latency_and_jitter [-- SECONDS]`
 //!
 //! - one way: telemetry stamped by the servo until the controller's process holds it;
-//! - round trip: until the controller has sent the command that answers it (control law included);
-//!   the servo takes a command at its next tick, a wait that is the period's and is not counted;
+//! - answered: until the controller has sent the command that answers it, control law included. The
+//!   way back is not in it: the servo takes a command at its next tick, a wait that is the period's.
+//!   Beside it stands the bare round trip, which has the way back;
 //! - bare: two processes that exchange 128 bytes at 1 kHz through iceoryx2 (sample and event) and
 //!   through a Unix datagram socket, woken the same way, at the same priority;
 //! - jitter: lateness of the wake-up of the servo against a bare loop on `clock_nanosleep`, idle
@@ -45,11 +46,11 @@ fn main() {
     println!("one way, servo to controller  {}", figures(&service.0));
     println!("round trip, iceoryx2 bare     {}", figures(&bare.1));
     println!("round trip, Unix socket       {}", figures(&socket.1));
-    println!("round trip, servo controller  {}", figures(&service.1));
+    println!("answered, servo to command    {}", figures(&service.1));
     println!("  service / bare iceoryx2     {}", ratios(&service.0, &bare.0, "one way"));
-    println!("                              {}", ratios(&service.1, &bare.1, "round trip"));
+    println!("                              {}", ratios(&service.1, &bare.1, "answered / round trip"));
     println!("  service / Unix socket       {}", ratios(&service.0, &socket.0, "one way"));
-    println!("                              {}\n", ratios(&service.1, &socket.1, "round trip"));
+    println!("                              {}\n", ratios(&service.1, &socket.1, "answered / round trip"));
 
     for loaded in [false, true] {
         let stop = Arc::new(AtomicBool::new(false));
@@ -74,6 +75,7 @@ fn main() {
         println!("jitter {words}, servo       {}", figures(&servo));
         println!("  servo / bare            {}", ratios(&servo, &bare, words));
     }
+    drop(Deployment::new(Some(&folder.join("shm"))).own());
     let _ = std::fs::remove_dir_all(&folder);
     for left in std::fs::read_dir("/dev/shm").into_iter().flatten().flatten() {
         if left.file_name().as_encoded_bytes().starts_with(prefix(&folder).as_bytes()) {
@@ -126,36 +128,31 @@ impl Drop for Running {
     }
 }
 
-/// Shared memory of the run, cleared at the end.
-struct Cleared(Deployment);
-
-impl Drop for Cleared {
-    fn drop(&mut self) {
-        let _ = self.0.own();
-    }
-}
-
 fn role(role: &str, folder: &Path) -> Running {
+    if role == "servo" {
+        // What the servo of the run before left, which was killed.
+        drop(Deployment::new(Some(&folder.join("shm"))).own());
+    }
     let mut command = Command::new(env!("CARGO_BIN_EXE_kort"));
     command.arg(role).arg("--root").arg(folder.join("shm")).env("RUST_LOG", "warn");
     command.arg("--config").arg(concat!(env!("CARGO_MANIFEST_DIR"), "/config/kort.toml"));
     Running(command.stdout(Stdio::null()).spawn().expect("kort starts"))
 }
 
-fn ports(folder: &Path) -> (Cleared, GatewayPorts) {
+fn ports(folder: &Path) -> GatewayPorts {
     let deployment = Deployment::new(Some(&folder.join("shm")));
     deployment.wait_for_generation(Duration::from_secs(20)).expect("the servo creates its shared memory");
     let ports = GatewayPorts::open(&deployment, "t1").expect("ports");
     std::thread::sleep(Duration::from_secs(1));
     while ports.telemetry.next().is_some() || ports.state.next().is_some() {}
-    (Cleared(deployment), ports)
+    ports
 }
 
 /// One way and round trip between the real servo and the real controller.
 fn service(folder: &Path, seconds: u64) -> (Spread, Spread) {
     let _servo = role("servo", folder);
     let _controller = role("controller", folder);
-    let (_cleared, ports) = ports(folder);
+    let ports = ports(folder);
     let (mut one_way, mut round_trip, mut last) = (Vec::new(), Vec::new(), 0);
     let end = Instant::now() + Duration::from_secs(seconds);
     while Instant::now() < end {
@@ -176,7 +173,7 @@ fn service(folder: &Path, seconds: u64) -> (Spread, Spread) {
 /// Lateness of every wake-up of the real servo.
 fn servo(folder: &Path, seconds: u64) -> Spread {
     let _servo = role("servo", folder);
-    let (_cleared, ports) = ports(folder);
+    let ports = ports(folder);
     let mut late = Vec::new();
     let end = Instant::now() + Duration::from_secs(seconds);
     while Instant::now() < end {
