@@ -70,7 +70,8 @@ pub fn run(
         let believed = named.first().is_some_and(|best| {
             let gain = base - best.criterion;
             let others = best_term.as_ref().map_or(0.0, |t| base - t.criterion);
-            gain > rules::BELIEVE.max(rules::SHARE_OF_FIRST * so_far) && gain > rules::LEAST_OF_TERM * others
+            let weighty = gain > rules::SHARE_OF_FIRST * so_far || round.size > rules::CLEAR_SIZE;
+            gain > rules::BELIEVE && weighty && gain > rules::LEAST_OF_TERM * others
         });
         let holds = round.left_out.0 > rules::HOLDS * round.gain && round.size > rules::LEAST_SIZE;
         if rounds.is_empty() && holds {
@@ -218,7 +219,12 @@ fn unnamed(
 
 /// Backward elimination: an early find that later ones made needless goes.
 fn prune(search: &Search, current: &mut Fit, rounds: &mut Vec<Vec<Candidate>>, gained: f64) {
-    let needed = rules::BELIEVE.max(rules::SHARE_OF_FIRST * gained);
+    let needless = |search: &Search, without: &Fit, with: &Fit, loss: f64| {
+        let size = search.size(without, with);
+        loss < rules::BELIEVE
+            || size < rules::LEAST_SIZE
+            || loss < rules::SHARE_OF_FIRST * gained && size < rules::CLEAR_SIZE
+    };
     while rounds.len() > 1 {
         let all = members(&search.problem, current);
         let now = criterion(current);
@@ -234,7 +240,7 @@ fn prune(search: &Search, current: &mut Fit, rounds: &mut Vec<Vec<Candidate>>, g
             }
         }
         match least {
-            Some((leave, fit, loss)) if loss < needed || search.size(&fit, current) < rules::LEAST_SIZE => {
+            Some((leave, fit, loss)) if needless(search, &fit, current, loss) => {
                 *current = fit;
                 rounds.remove(leave);
             }

@@ -26,6 +26,8 @@ pub mod rules {
     pub const SHARE_OF_FIRST: f64 = 0.02;
     /// Least size: root mean square of its response over full scale, on some channel.
     pub const LEAST_SIZE: f64 = 0.0012;
+    /// An effect this large counts whatever its share.
+    pub const CLEAR_SIZE: f64 = 0.004;
     /// Share of the gain that must hold on left-out blocks.
     pub const HOLDS: f64 = 0.4;
     /// Rivals closer than this cannot be told apart.
@@ -187,7 +189,7 @@ impl<'a> Search<'a> {
         let everything: Vec<&'static Descriptor> =
             self.named.iter().chain(&terms).copied().filter(|e| !taken.contains(&e.id)).collect();
         let screened = screen(&self.problem, current, &everything, &self.scale, &mut self.known);
-        let least = (0.25 * rules::BELIEVE).max(0.1 * rules::SHARE_OF_FIRST * so_far);
+        let least = (0.25 * rules::BELIEVE).max(0.02 * rules::SHARE_OF_FIRST * so_far);
         let chosen = choose(&screened, least);
         let mut candidates = self.refit(current, &chosen);
         let base = criterion(current);
@@ -371,6 +373,18 @@ fn choose(screened: &[Screened], least: f64) -> Vec<Screened> {
             if !chosen.iter().any(|c| c.effect.id == s.effect.id && c.origin == s.origin) {
                 chosen.push(Screened { start: s.origin.clone(), ..s.clone() });
             }
+        }
+    }
+    // What the leader is known to be confused with competes, whatever the screen says of it.
+    let leader = screened[0].effect;
+    for id in leader.confused_with {
+        if chosen.iter().any(|c| c.effect.id == *id) {
+            continue;
+        }
+        let starts = screened.iter().filter(|s| s.effect.id == *id);
+        if let Some(s) = starts.max_by(|a, b| a.plain.max(a.gain).total_cmp(&b.plain.max(b.gain))) {
+            let start = if s.plain > s.gain { s.origin.clone() } else { s.start.clone() };
+            chosen.push(Screened { start, ..s.clone() });
         }
     }
     chosen
