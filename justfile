@@ -1,0 +1,24 @@
+# What one does every day; `just` lists it.
+default:
+    @just --list
+
+# formatting and lints
+check:
+    cargo fmt --check
+    cargo clippy --workspace --all-targets -- -D warnings
+
+# every test, with what they need
+test:
+    tests/run.sh
+
+# the live service on the simulated stand
+up:
+    cargo run --release
+
+# control laws compared on the shipped soak scenarios
+soak *SCENARIOS:
+    cargo run --release -- soak {{SCENARIOS}}
+
+# the blind proof on fresh seeds, written to docs/proof.md
+prove *ARGS:
+    cargo run --release -- prove --markdown docs/proof.md {{ARGS}}
