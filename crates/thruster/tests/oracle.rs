@@ -6,7 +6,7 @@ mod plain;
 use kort_thruster::models::{DriveInput, Model, Model2, ModelName, ShaftFlowState};
 use kort_thruster::parameters::Parameters;
 use kort_thruster::plant::{Plant, Tick};
-use kort_thruster::rig::{Rig, Sensors};
+use kort_thruster::rig::{Quantity, Rig, Sensors};
 
 fn paper() -> Rig {
     Rig::from_toml(include_str!("../../../config/thrusters/whitcomb-yoerger-1999.toml")).unwrap()
@@ -50,22 +50,26 @@ fn trajectories_agree_to_1e_9() {
 fn the_composed_plant_runs_the_same_model() {
     let mut rig = paper();
     rig.sensors = Sensors::IDEAL;
-    rig.amplifier.time_constant_s = kort_thruster::rig::Quantity::exact(0.0);
+    rig.amplifier.time_constant_s = Quantity::exact(0.0);
     let parameters = Parameters::stated(&rig);
-    let mut plant = Plant::new(ModelName::Model2, &rig, &parameters, &[], 0.001);
     let kt = rig.motor.torque_constant_nm_a.value;
-    let (mut om, mut vp) = (0.0, 0.0);
-    for k in 0..2000 {
-        plant.step(&Tick { time_s: k as f64 * 0.001, command: torque(k) / kt, ..Tick::default() });
-        (om, vp) = plain::step(om, vp, torque(k), 0.001);
-        let truth = plant.truth();
-        // The plant reuses rates across ticks (its current runs through the step), so it is held
-        // to the accuracy of the method, not to rounding.
-        assert!(
-            (truth.shaft_speed_rad_s - om).abs() < 0.02 * 11.0,
-            "tick {k}: {} {om}",
-            truth.shaft_speed_rad_s
-        );
-        assert!((truth.axial_m_s - vp).abs() < 0.02, "tick {k}: {} {vp}", truth.axial_m_s);
+    // From moving states in all quadrants, the current already where the command holds it.
+    for (speed, flow, torque) in
+        [(20.0, 0.3, 9.2), (-40.0, 0.8, 3.0), (-10.0, -0.9, -8.0), (50.0, -0.5, -1.0)]
+    {
+        let mut plant = Plant::new(ModelName::Model2, &rig, &parameters, &[], 0.001);
+        plant.start(0.0, speed, flow, torque / kt, 0.0);
+        let (mut om, mut vp) = (speed, flow);
+        for k in 0..1000 {
+            plant.step(&Tick { time_s: f64::from(k) * 0.001, command: torque / kt, ..Tick::default() });
+            (om, vp) = plain::step(om, vp, torque, 0.001);
+            let truth = plant.truth();
+            assert!(
+                (truth.shaft_speed_rad_s - om).abs() < 1e-7,
+                "tick {k}: {} {om}",
+                truth.shaft_speed_rad_s
+            );
+            assert!((truth.axial_m_s - vp).abs() < 1e-8, "tick {k}: {} {vp}", truth.axial_m_s);
+        }
     }
 }

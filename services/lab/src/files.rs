@@ -13,8 +13,10 @@ macro_rules! shipped {
 }
 
 /// Rigs built in, so that the program needs no folder beside it.
-const RIGS: &[(&str, &str)] =
-    shipped!["whitcomb-yoerger-1999": "config/thrusters/whitcomb-yoerger-1999.toml"];
+const RIGS: &[(&str, &str)] = shipped![
+    "t200": "config/thrusters/t200.toml",
+    "whitcomb-yoerger-1999": "config/thrusters/whitcomb-yoerger-1999.toml",
+];
 
 /// Scenarios of `kort simulate` built in.
 pub const SCENARIOS: &[(&str, &str)] = shipped![
