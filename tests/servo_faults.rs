@@ -135,11 +135,13 @@ fn silence_ends_at_zero_within_five_controller_periods() {
 #[test]
 fn another_controller_is_not_followed() {
     let mut bench = Bench::start();
+    // Opened beforehand, so that it takes over faster than the command time-out notices.
+    let second = ControllerPorts::open(&bench.site.deployment(), "t1").unwrap();
     bench.arm();
     bench.send(20, |c, _| c.command.send(Command { drive: 3.0, ..Command::default() }).unwrap());
-    bench.controller = ControllerPorts::open(&bench.site.deployment(), "t1").unwrap();
+    bench.controller = second;
     let rows = bench.send(20, |c, _| c.command.send(Command { drive: 3.0, ..Command::default() }).unwrap());
-    assert_eq!(rows.last().unwrap().faults, Fault::ControllerRestarted.bit());
+    assert_ne!(rows.last().unwrap().faults & Fault::ControllerRestarted.bit(), 0);
     assert_eq!(rows.last().unwrap().signals.current_cmd_a, 0.0);
 }
 
