@@ -300,7 +300,7 @@ fn draw(kind: CaseKind, seed: u64, selection: &Selection, rng: &mut impl Rng) ->
                 .effect
                 .as_deref()
                 .and_then(|id| Effect::ALL.into_iter().find(|effect| effect.id() == id));
-            let level = [0.012, 0.03, 0.06][(seed / Effect::ALL.len() as u64 % 3) as usize];
+            let level = [0.012, 0.03, 0.06][(seed % 3) as usize];
             let effect = chosen.unwrap_or(turn);
             plan.anchors = effect.anchors().to_vec();
             plan.hidden.push((effect, Effect::shape(rng), selection.strength.unwrap_or(level)));

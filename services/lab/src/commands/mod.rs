@@ -3,6 +3,7 @@
 mod explain;
 mod fit_table;
 mod reproduce;
+mod prove;
 mod simulate;
 mod soak;
 
@@ -23,6 +24,8 @@ pub enum Command {
     Simulate(simulate::Args),
     /// Run several controllers on the same plant, faults and references, and compare them
     Soak(soak::Args),
+    /// Prove `diagnose` blind: hide physics, diagnose the recordings alone, open the answers
+    Prove(prove::Prove),
 }
 
 impl Command {
@@ -34,6 +37,7 @@ impl Command {
             Command::Reproduce(args) => reproduce::run(&args),
             Command::Simulate(args) => simulate::run(&args),
             Command::Soak(args) => soak::run(&args),
+            Command::Prove(prove) => prove.run(),
         }
     }
 }
