@@ -62,7 +62,8 @@ fn a_dead_controller_is_survived_and_a_page_is_written() {
     let fault = "[[process_fault]]\nkind = \"controller_restart\"\nat_s = 4\nfor_s = 0.2\n";
     let file = scenario(folder.path(), fault);
     let page = folder.path().join("soak.html");
-    let run = kort(&["soak", file.to_str().expect("utf-8"), "--json", "--html", page.to_str().expect("utf-8")]);
+    let run =
+        kort(&["soak", file.to_str().expect("utf-8"), "--json", "--html", page.to_str().expect("utf-8")]);
     assert!(run.status.success(), "{}", text(&run.stderr));
     let report: Value = serde_json::from_slice(&run.stdout).expect("JSON");
     for law in report["scenarios"][0]["laws"].as_array().expect("laws") {
@@ -82,13 +83,19 @@ fn wrong_input_is_named() {
     let run = kort(&["soak", good, "--controllers", "velocity_srevo"]);
     assert_eq!(run.status.code(), Some(2));
     let said = text(&run.stderr);
-    assert!(said.contains("velocity_srevo") && said.contains("velocity_servo") && said.contains("hint:"), "{said}");
+    assert!(
+        said.contains("velocity_srevo") && said.contains("velocity_servo") && said.contains("hint:"),
+        "{said}"
+    );
 
     let bad = scenario(folder.path(), "[[effect]]\nid = \"couloumb\"\n");
     let run = kort(&["soak", bad.to_str().expect("utf-8")]);
     let said = text(&run.stderr);
     assert_eq!(run.status.code(), Some(2));
-    assert!(said.contains("short.toml") && said.contains("couloumb") && said.contains("coulomb_friction"), "{said}");
+    assert!(
+        said.contains("short.toml") && said.contains("couloumb") && said.contains("coulomb_friction"),
+        "{said}"
+    );
     assert_eq!(kort(&["soak"]).status.code(), Some(2));
     assert_eq!(kort(&["soak", "no-such-file.toml"]).status.code(), Some(2));
 }

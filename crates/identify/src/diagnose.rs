@@ -14,7 +14,7 @@ use crate::fit::{Fit, Problem, Stack, Target};
 use crate::heldout::held_out_rows;
 use crate::judge::{self, Outcome};
 use crate::library::is_term;
-use crate::locate::locate;
+use crate::locate::{locate, since_edge};
 use crate::noise::Whitener;
 use crate::report::{
     Alternative, Baseline, EmpiricalTerm, Finding, HeldOut, Mismatch, ParameterReport, Report, Verdict,
@@ -53,6 +53,8 @@ pub struct Trace {
     pub explained: Vec<f64>,
     /// Shaft speed simulated at each sample, rad/s.
     pub shaft_speed_rad_s: Vec<f64>,
+    /// Time since the last step of the command at each sample, s; infinite before the first.
+    pub since_step_s: Vec<f64>,
 }
 
 /// A diagnosis: the report, and traces for its plots.
@@ -469,6 +471,7 @@ fn empirical(search: &Search, last: &Fit, term: &'static Descriptor, heldout: He
 fn traces(problem: &Problem, before: &Stack, after: &Stack, speed: &[Vec<f64>]) -> Traces {
     let mut channels = Vec::new();
     for (r, recording) in problem.recordings.iter().enumerate() {
+        let since = since_edge(recording);
         for (c, channel) in recording.channels.iter().enumerate() {
             let minus = |residual: &[f64]| channel.values.iter().zip(residual).map(|(m, e)| m - e).collect();
             channels.push(Trace {
@@ -479,6 +482,7 @@ fn traces(problem: &Problem, before: &Stack, after: &Stack, speed: &[Vec<f64>]) 
                 baseline: minus(&before[r][c]),
                 explained: minus(&after[r][c]),
                 shaft_speed_rad_s: channel.rows.iter().map(|k| speed[r][*k]).collect(),
+                since_step_s: channel.rows.iter().map(|k| since[*k]).collect(),
             });
         }
     }

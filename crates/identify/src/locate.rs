@@ -97,7 +97,8 @@ fn each(
     }
 }
 
-fn since_edge(recording: &crate::data::Prepared) -> Vec<f64> {
+/// Time since the last step of the command at each row, s; infinite before the first.
+pub fn since_edge(recording: &crate::data::Prepared) -> Vec<f64> {
     let mut last = f64::NEG_INFINITY;
     let mut edges = recording.edges.iter().map(|e| e.row).peekable();
     (0..recording.time_s.len())

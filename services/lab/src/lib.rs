@@ -6,6 +6,8 @@
 pub mod commands;
 pub mod failure;
 pub mod files;
+pub mod fitted_rig;
+pub mod input;
 pub mod progress;
 pub mod render;
 pub mod reproduce;

@@ -20,3 +20,11 @@ fn style(template: &str) -> ProgressStyle {
     // The templates above are fixed; should one be wrong, the default bar still shows progress.
     ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
 }
+
+/// A spinner for work of unknown length; silent when stderr is no terminal.
+pub fn spinner() -> ProgressBar {
+    let spinner = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
+    spinner.set_style(style("{spinner} {elapsed} {msg}"));
+    spinner.enable_steady_tick(std::time::Duration::from_millis(120));
+    spinner
+}

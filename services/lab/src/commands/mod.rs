@@ -1,9 +1,11 @@
 //! One file a subcommand.
 
+mod diagnose;
 mod explain;
+mod fit;
 mod fit_table;
-mod reproduce;
 mod prove;
+mod reproduce;
 mod simulate;
 mod soak;
 
@@ -14,8 +16,12 @@ use crate::failure::{Failure, Outcome};
 /// The laboratory's subcommands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
+    /// Find what the model left out: where, what, how much better with it
+    Diagnose(diagnose::Diagnose),
     /// Look up the physics a model may leave out: what it is, how it shows, what it is confused with
     Explain(explain::Args),
+    /// Identify a model's parameters, with standard errors and a held-out score
+    Fit(fit::Fit),
     /// Make a rig description from a table of settled points, and say what it cannot fix
     FitTable(fit_table::Args),
     /// Compute the seed paper's tables and figures, ours beside the printed value
@@ -32,7 +38,9 @@ impl Command {
     /// Does it.
     pub fn run(self) -> Result<Outcome, Failure> {
         match self {
+            Command::Diagnose(diagnose) => diagnose.run(),
             Command::Explain(args) => explain::run(&args),
+            Command::Fit(fit) => fit.run(),
             Command::FitTable(args) => fit_table::run(&args),
             Command::Reproduce(args) => reproduce::run(&args),
             Command::Simulate(args) => simulate::run(&args),

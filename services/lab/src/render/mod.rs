@@ -1,7 +1,12 @@
 //! Self-contained HTML pages: no script, no outside file; readable at phone and desktop width.
 
+mod curves;
+pub mod diagnosis;
+pub mod fit;
 mod page;
 mod plot;
+pub mod text;
+pub mod verdict;
 
 pub use page::{Page, bars, facts, heat_map, note, table};
 pub use plot::{Chart, Mark, Series};

@@ -1,0 +1,59 @@
+//! `kort diagnose`: what the model left out.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use kort_identify::diagnose::{Options, diagnose};
+
+use crate::failure::{Failure, Outcome, print, print_json, write_text};
+use crate::input::Input;
+use crate::{progress, render};
+
+const EXAMPLE: &str = "\
+Example: kort diagnose tests/recordings/example-cases/rotational-flow.csv.gz \\
+           --rig tests/recordings/example-cases/rotational-flow.rig.toml --html report.html
+
+Exit codes: 0 whatever the verdict; 2 unreadable input; 3 done, but rows were lost in
+reading or left out because a sensor misbehaves there (the notes say which).
+How to read the report: docs/reading-a-report.md";
+
+/// Locate a mismatch between model and recording, name the omitted physics, show the fit improve
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLE)]
+pub struct Diagnose {
+    #[command(flatten)]
+    input: Input,
+    /// Print one JSON document (kort.diagnosis/1)
+    #[arg(long)]
+    json: bool,
+    /// Write the report as one self-contained page
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
+}
+
+impl Diagnose {
+    /// Does it.
+    ///
+    /// # Errors
+    /// Unreadable input, or an output file that cannot be written.
+    pub fn run(self) -> Result<Outcome, Failure> {
+        let loaded = self.input.load()?;
+        let options = Options { model: self.input.model, seed: self.input.seed };
+        let spinner = progress::spinner();
+        let told = |text: &str| spinner.set_message(text.to_string());
+        let diagnosis = self.input.on_threads(|| diagnose(&loaded.series, &loaded.rig, &options, &told))?;
+        spinner.finish_and_clear();
+        let mut diagnosis = diagnosis.map_err(Failure::input)?;
+        diagnosis.report.notes.splice(0..0, loaded.notes);
+        if let Some(path) = &self.html {
+            write_text(path, &render::diagnosis::page(&diagnosis, &loaded.rig))?;
+            eprintln!("wrote {}", path.display());
+        }
+        if self.json {
+            print_json(&diagnosis.report)?;
+        } else {
+            print(&render::verdict::text(&diagnosis.report, &loaded.rig));
+        }
+        Ok(Outcome::with_loss(loaded.lossy))
+    }
+}

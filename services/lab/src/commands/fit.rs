@@ -1,0 +1,74 @@
+//! `kort fit`: the parameters of a model from recordings.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use kort_identify::identify::{Options, identify};
+
+use crate::failure::{Failure, Outcome, print, print_json, read_text, write_text};
+use crate::fitted_rig::with_fitted;
+use crate::input::Input;
+use crate::{progress, render};
+
+const EXAMPLE: &str = "\
+Example: kort fit tests/recordings/example-cases/clean.csv.gz \\
+           --rig tests/recordings/example-cases/clean.rig.toml -o fitted.toml
+
+Exit code 3 means that the fit was done but rows were lost in reading or left out
+because a sensor misbehaves there; the notes say which.";
+
+/// Identify a model's parameters, with standard errors and a held-out score
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLE)]
+pub struct Fit {
+    #[command(flatten)]
+    input: Input,
+    /// Write the rig description with the fitted values, tol = two standard errors
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Fits from this many starts within the stated tolerances
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=100))]
+    starts: u16,
+    /// Fit viscous friction without prior and across zero: a negative value tells of physics left out
+    #[arg(long)]
+    free_friction: bool,
+    /// Print one JSON document (kort.fit/1)
+    #[arg(long)]
+    json: bool,
+}
+
+impl Fit {
+    /// Does it.
+    ///
+    /// # Errors
+    /// Unreadable input, or an output file that cannot be written.
+    pub fn run(self) -> Result<Outcome, Failure> {
+        let loaded = self.input.load()?;
+        let options = Options {
+            model: self.input.model,
+            seed: self.input.seed,
+            starts: usize::from(self.starts),
+            open_friction: self.free_friction,
+        };
+        let spinner = progress::spinner();
+        let told = |text: &str| spinner.set_message(text.to_string());
+        let report = self.input.on_threads(|| identify(&loaded.series, &loaded.rig, &options, &told))?;
+        spinner.finish_and_clear();
+        let mut report = report.map_err(Failure::input)?;
+        report.notes.splice(0..0, loaded.notes);
+        if let Some(path) = &self.output {
+            let (text, left_out) =
+                with_fitted(&read_text(&self.input.rig)?, &report.parameters).map_err(Failure::failed)?;
+            write_text(path, &text)?;
+            for why in left_out {
+                eprintln!("note: {}: {why}", path.display());
+            }
+        }
+        if self.json {
+            print_json(&report)?;
+        } else {
+            print(&render::fit::text(&report, &loaded.rig));
+        }
+        Ok(Outcome::with_loss(loaded.lossy))
+    }
+}

@@ -1,0 +1,92 @@
+//! What `fit` and `diagnose` read: recordings of one rig, its description, the model to compare.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use kort_identify::checks;
+use kort_identify::data::Series;
+use kort_recording::{ColumnMap, Recording};
+use kort_thruster::models::ModelName;
+use kort_thruster::rig::Rig;
+
+use crate::failure::{Failure, read_rig};
+
+/// Arguments that `fit` and `diagnose` share.
+#[derive(Debug, Args)]
+pub struct Input {
+    /// Recordings of one rig: CSV (plain or gzip) or MCAP; several are used together
+    #[arg(value_name = "REC", required = true)]
+    pub recordings: Vec<PathBuf>,
+    /// Rig description: what is stated of the thruster, its drive and its sensors
+    #[arg(long, value_name = "RIG")]
+    pub rig: PathBuf,
+    /// Model to compare with: model0, model1, model2, model3 or rotational_flow
+    #[arg(long, value_name = "NAME", default_value = "model2")]
+    pub model: ModelName,
+    /// Column map for foreign logs: a shipped one or a TOML file
+    #[arg(long, value_name = "NAME")]
+    pub columns: Option<String>,
+    /// Seed of everything drawn at random
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    /// Threads to use [default: one a core]; the result is the same whatever their number
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub jobs: Option<u16>,
+}
+
+/// Everything read.
+pub struct Loaded {
+    /// The rig.
+    pub rig: Rig,
+    /// The recordings.
+    pub series: Vec<Series>,
+    /// Notes of the reader, for the report.
+    pub notes: Vec<String>,
+    /// Rows were lost while reading, or will be left out because a sensor misbehaves there.
+    pub lossy: bool,
+}
+
+impl Input {
+    /// Reads all files.
+    ///
+    /// # Errors
+    /// Names file, field, value found and what is allowed.
+    pub fn load(&self) -> Result<Loaded, Failure> {
+        let rig = read_rig(&self.rig)?;
+        let map = self.columns.as_deref().map(ColumnMap::find).transpose().map_err(Failure::input)?;
+        let mut out = Loaded { rig, series: Vec::new(), notes: Vec::new(), lossy: false };
+        for (i, path) in self.recordings.iter().enumerate() {
+            if self.recordings[..i].contains(path) {
+                return Err(Failure::in_file(path, "is given twice\nhint: name every recording once"));
+            }
+            let recording = Recording::read(path, map.as_ref()).map_err(Failure::input)?;
+            let named = |text: &String| format!("{}: {text}", recording.name);
+            out.lossy |= !recording.losses.is_empty();
+            out.notes.extend(recording.losses.iter().chain(&recording.notes).map(named));
+            if !recording.unused.is_empty() {
+                out.notes.push(named(&format!(
+                    "columns that the column map leaves out: {}",
+                    recording.unused.join(", ")
+                )));
+            }
+            let series = Series {
+                name: recording.name,
+                time_s: recording.time_s,
+                columns: recording.columns.into_iter().map(|c| (c.name, c.values)).collect(),
+            };
+            out.lossy |= checks::check(&series, &out.rig).masked.contains(&true);
+            out.series.push(series);
+        }
+        Ok(out)
+    }
+
+    /// Runs work on the asked number of threads.
+    ///
+    /// # Errors
+    /// The threads cannot be started.
+    pub fn on_threads<T: Send>(&self, work: impl FnOnce() -> T + Send) -> Result<T, Failure> {
+        let threads = self.jobs.map_or(0, usize::from);
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(Failure::failed)?;
+        Ok(pool.install(work))
+    }
+}
