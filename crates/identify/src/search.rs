@@ -249,12 +249,23 @@ impl<'a> Search<'a> {
     /// The best term without a name on top of a fit, if any promises something.
     pub fn best_term(&mut self, current: &mut Fit) -> Option<Candidate> {
         let screened = screen(&self.problem, current, &self.terms, &self.scale, &mut self.known);
-        let chosen: Vec<Screened> = screened
-            .into_iter()
-            .filter(|s| s.gain > 0.5 * rules::TERM_LEAST && s.size > rules::LEAST_SIZE)
-            .take(3)
-            .collect();
-        self.refit(current, &chosen).into_iter().next()
+        let mut chosen: Vec<Screened> = Vec::new();
+        for s in screened {
+            let fresh = chosen.iter().all(|c| c.effect.id != s.effect.id);
+            if fresh && s.gain > 0.5 * rules::TERM_LEAST && s.size > rules::LEAST_SIZE && chosen.len() < 4 {
+                chosen.push(s);
+            }
+        }
+        let mut fitted = self.refit(current, &chosen);
+        // At one speed a load that comes on and a drive that loses gain look alike: the load is
+        // the likelier of the two.
+        let best = fitted.first()?;
+        let doubt = rules::TERM_LEAST.max(rules::TERM_SHARE * (criterion(current) - best.criterion));
+        let load = (best.effect.id == "term_drive_switched")
+            .then(|| fitted.iter().position(|c| c.effect.id == "term_shaft_switched"))
+            .flatten()
+            .filter(|k| fitted[*k].criterion - fitted[0].criterion < doubt);
+        Some(fitted.swap_remove(load.unwrap_or(0)))
     }
 
     /// Re-fits chosen effects on top of a fit, best first.

@@ -211,11 +211,17 @@ pub fn summary(
                 mismatch.first().map_or("?", |m| &m.regime),
             );
             if let Some(term) = term {
+                let holds = if term.heldout.excess_error_removed > 0.05 {
+                    format!(
+                        "it removes {} of the error above the noise on held-out data",
+                        gain(&term.heldout)
+                    )
+                } else {
+                    "it does not hold on the held-out part of this recording: take it as a hint only".into()
+                };
                 text.push_str(&format!(
-                    " An empirical term describes it: {} = {}; it removes {} of the error above the noise on held-out data.",
-                    term.enters,
-                    term.expression,
-                    gain(&term.heldout)
+                    " An empirical term describes it: {} = {}; {holds}.",
+                    term.enters, term.expression
                 ));
             }
             text
