@@ -4,7 +4,7 @@
 //! fixed number of Gauss-Newton steps (Diehl, Bock & Schloeder 2005, real-time iteration); the
 //! formulation is ours. Two currents are sought, one for the first few steps of the horizon and one
 //! for the rest, that bring the predicted thrust of Model 2 onto the reference soonest:
-//! `sum ((T_k - Td)/Tmax)^2 + r ((i1 - i_last)/Imax)^2`. The prediction holds shaft, flow, the drive's lag and
+//! `sum ((T_k - Td)/Tmax)^2 + r ((i1 - i_last)/Imax)^2`, with the speed error at the end of the horizon. The prediction holds shaft, flow, the drive's lag and
 //! what load the model does not explain (load observer, physics.md D7), which makes it offset-free.
 //!
 //! Assumes: as `model2_inversion`. Needs measured: shaft speed; the rest sharpens the observer.
@@ -24,6 +24,11 @@ use crate::observers::LoadTorque;
 const STEPS: usize = 14;
 /// Steps under the first current.
 const FIRST: usize = 3;
+/// Thrust errors along the horizon, and the speed error at its end.
+const RESIDUALS: usize = STEPS + 1;
+/// Weight of the speed error at the end. Near standstill thrust hardly depends on the current (it
+/// is quadratic in speed) and alone would let the shaft hunt.
+const END_WEIGHT: f64 = 0.5;
 
 /// Options of the prediction.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -48,6 +53,7 @@ impl Default for LookAheadOptions {
 pub struct LookAhead {
     load: LoadTorque,
     unexplained_n_m: f64,
+    aim_rad_s: f64,
     step_s: f64,
     effort: f64,
     iterations: u8,
@@ -67,16 +73,19 @@ struct Start {
     swirl_m_s: f64,
     drive_a: f64,
     unexplained_n_m: f64,
+    /// Speed that gives the thrust asked for in the flow now, rad/s.
+    aim_rad_s: f64,
 }
 
 impl LookAhead {
     /// At rest.
     pub fn new(model: &ControlModel, servo: &ServoOptions, options: &LookAheadOptions) -> Self {
         let (crossover, _) = model.speed_loop(servo.phase_margin_deg.to_radians());
-        let step = (options.horizon.clamp(0.2, 10.0) / crossover / STEPS as f64).min(1.5 * model.step_max_s);
+        let step = (options.horizon.clamp(0.2, 10.0) / crossover / STEPS as f64).min(4.0 * model.step_max_s);
         Self {
             load: LoadTorque::new(model),
             unexplained_n_m: 0.0,
+            aim_rad_s: 0.0,
             step_s: step.max(1e-5),
             effort: options.effort.clamp(1e-6, 10.0),
             iterations: options.iterations.clamp(1, 4),
@@ -88,14 +97,20 @@ impl LookAhead {
         }
     }
 
-    /// Predicted thrust errors under two currents, as shares of the largest thrust.
-    fn predict(&self, model: &ControlModel, start: &Start, moves: [f64; 2], thrust_n: f64) -> [f64; STEPS] {
+    /// Predicted errors under two currents, as shares of the largest thrust and speed.
+    fn predict(
+        &self,
+        model: &ControlModel,
+        start: &Start,
+        moves: [f64; 2],
+        thrust_n: f64,
+    ) -> [f64; RESIDUALS] {
         let h = self.step_s;
         let (mut speed, mut flow, mut current) = (start.speed_rad_s, start.flow_m_s, start.drive_a);
         let follow = h / (model.amplifier_lag_s + model.period_s + h);
         let inverse_scale = 1.0 / model.thrust_max_n;
-        let mut errors = [0.0; STEPS];
-        for (k, error) in errors.iter_mut().enumerate() {
+        let mut errors = [0.0; RESIDUALS];
+        for (k, error) in errors[..STEPS].iter_mut().enumerate() {
             current += (moves[usize::from(k >= FIRST)] - current) * follow;
             let s = model.slopes(model.blade.inflow(speed, flow, start.swirl_m_s));
             let torque = model.torque_constant_nm_a * current
@@ -110,6 +125,7 @@ impl LookAhead {
             flow += h * rate / (1.0 + h * decay);
             *error = (model.load(speed, flow, start.swirl_m_s).thrust_n - thrust_n) * inverse_scale;
         }
+        errors[STEPS] = END_WEIGHT * (speed - start.aim_rad_s) / model.speed_max_rad_s;
         errors
     }
 
@@ -122,7 +138,7 @@ impl LookAhead {
         let two = self.predict(model, start, [self.moves[0], self.moves[1] + delta], thrust_n);
         let (mut h11, mut h12, mut h22, mut g1, mut g2) = (0.0, 0.0, 0.0, 0.0, 0.0);
         let scale = limit / delta;
-        for k in 0..STEPS {
+        for k in 0..RESIDUALS {
             let (j1, j2) = ((one[k] - base[k]) * scale, (two[k] - base[k]) * scale);
             h11 += j1 * j1;
             h12 += j1 * j2;
@@ -159,6 +175,7 @@ impl LookAhead {
         let bound = 0.3 * kt * model.current_limit_a;
         let surprise = (self.load.torque_n_m - explained).clamp(-bound, bound);
         self.unexplained_n_m += (surprise - self.unexplained_n_m) * share;
+        self.aim_rad_s = model.speed_for_thrust_rad_s(input.thrust_n, flow, swirl, self.aim_rad_s);
         let start = Start {
             speed_rad_s: speed,
             flow_m_s: flow,
@@ -166,6 +183,7 @@ impl LookAhead {
             swirl_m_s: swirl,
             drive_a: motor_a,
             unexplained_n_m: self.unexplained_n_m,
+            aim_rad_s: self.aim_rad_s,
         };
         for _ in 0..self.iterations {
             self.improve(model, &start, input.thrust_n);
