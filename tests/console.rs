@@ -164,7 +164,8 @@ fn an_operator_takes_command_thrusts_records_and_stops() {
         "no command without lease"
     );
 
-    page.eval("document.getElementById('holder').value = 'bridge'");
+    // A browser on an overloaded machine may stand still for seconds; the life of the lease is not what is tested.
+    page.eval("lease_ttl_ms = 60000; document.getElementById('holder').value = 'bridge'");
     page.click("take");
     page.until(&text_is("lease-text", "You have the lease"));
     assert_eq!(stack.state().unwrap()["lease"]["holder"], "bridge");
@@ -176,8 +177,11 @@ fn an_operator_takes_command_thrusts_records_and_stops() {
     page.click("send");
     page.until("Math.abs(state.measured.thrust_n - 60) < 12");
     page.until("Math.abs(parseFloat(document.querySelector('#tiles .tile i').textContent) - 60) < 12");
-    std::thread::sleep(Duration::from_millis(3500)); // longer than the lease: the page renews it
-    assert_eq!(stack.state().unwrap()["lease"]["holder"], "bridge");
+    std::thread::sleep(Duration::from_millis(2000));
+    wait("the page to renew its lease", || {
+        let lease = stack.state()?["lease"].clone();
+        (lease["holder"] == "bridge" && lease["expires_in_ms"].as_u64()? > 58_500).then_some(())
+    });
 
     for chart in ["thrust", "speed", "current", "flow"] {
         let colours = page.eval(&format!(

@@ -1,7 +1,7 @@
 "use strict";
 const $ = (id) => document.getElementById(id);
-const LEASE_TTL_MS = 3000, RENEW_EVERY_MS = 500, STREAM_HZ = 25, DRAW_EVERY_MS = 50;
-let thruster = null, lease = null, socket = null, state = null, heard_ms = 0, paused_s = null, limitsOf = {}, recording = null, dragging = false, taken_ms = 0, drawn_ms = 0;
+const RENEW_EVERY_MS = 500, STREAM_HZ = 25, DRAW_EVERY_MS = 50;
+let lease_ttl_ms = 3000, thruster = null, lease = null, socket = null, state = null, heard_ms = 0, paused_s = null, limitsOf = {}, recording = null, dragging = false, taken_ms = 0, drawn_ms = 0;
 
 const charts = [
   new StripChart($("plot-thrust"), "thrust", "N", [
@@ -105,7 +105,7 @@ function showState(s, live) {
   if (lease && !s.lease && heard_ms > taken_ms + 500) { lease = null; log("the lease ran out", true); }
   $("lease-text").textContent = !s.lease ? "Nobody has the lease."
     : mine ? "You have the lease." : `“${s.lease.holder}” has the lease.`;
-  $("lease-bar").style.width = s.lease ? `${Math.min(100, s.lease.expires_in_ms / LEASE_TTL_MS * 100)}%` : "0";
+  $("lease-bar").style.width = s.lease ? `${Math.min(100, s.lease.expires_in_ms / lease_ttl_ms * 100)}%` : "0";
   $("take").disabled = Boolean(s.lease); $("give").disabled = !lease; $("send").disabled = !lease || !s.armed;
   $("setpoint-text").textContent = `in force: ${Object.entries(s.setpoint).map(([name, value]) => `${name} = ${value.toFixed(2)}`).join(", ")}`
     + (!lease ? " — take the lease to change it" : !s.armed ? " — arm to change it" : "");
@@ -135,7 +135,7 @@ function chip(id, words, kind) { $(id).textContent = words; $(id).className = `c
 
 // Command ------------------------------------------------------------------------------------------------
 click("take", async () => {
-  const granted = await call("POST", `${base()}/lease`, { holder: $("holder").value, ttl_ms: LEASE_TTL_MS });
+  const granted = await call("POST", `${base()}/lease`, { holder: $("holder").value, ttl_ms: lease_ttl_ms });
   lease = granted.lease_id; taken_ms = performance.now(); log(`lease taken as “${$("holder").value}”`);
 });
 click("give", async () => { await call("DELETE", `${base()}/lease`); lease = null; log("lease given up"); });
