@@ -81,9 +81,9 @@ fn prometheus(folder: &Path, gateway: u16, soak: u16) -> (Ends, u16) {
 
 fn ask(port: u16, query: &str) -> Value {
     let encoded: String = query.bytes().map(|b| format!("%{b:02x}")).collect();
-    let answer =
-        get(&format!("http://127.0.0.1:{port}/api/v1/query?query={encoded}")).expect("Prometheus answers");
-    serde_json::from_str(&answer).unwrap()
+    // It may still be starting.
+    let url = format!("http://127.0.0.1:{port}/api/v1/query?query={encoded}");
+    wait("Prometheus", || serde_json::from_str(&get(&url)?).ok())
 }
 
 fn dashboards() -> Vec<(PathBuf, Value)> {

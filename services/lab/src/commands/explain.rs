@@ -58,7 +58,14 @@ fn find(id: &str) -> Result<&'static Descriptor, Failure> {
         let likeness = |d: &Descriptor| {
             let whole = strsim::jaro_winkler(d.id, &wanted);
             // A part of the name is the usual near miss: `backlash`, `friction`.
-            if wanted.len() > 2 && d.id.contains(&wanted) { 1.0 + whole } else { whole }
+            if wanted.len() > 2 && d.id.contains(&wanted) {
+                1.0 + whole
+            } else if wanted.len() > 3 && d.what.contains(&wanted) {
+                // A workshop word stands in the description: `swirl` in rotational_flow.
+                0.9 + 0.1 * whole
+            } else {
+                whole
+            }
         };
         let nearest = ALL.iter().max_by(|a, b| likeness(a).total_cmp(&likeness(b)));
         let hint = match nearest.filter(|d| likeness(d) > 0.7) {

@@ -145,6 +145,6 @@ mod tests {
         assert!(
             CaseKind::ALL.into_iter().all(|kind| plan(&["--cases", "5"]).iter().any(|(k, _)| *k == kind))
         );
-        assert_eq!(plan(&["--quick"]).len(), 7 + 5 + 2 + 2 + 2);
+        assert_eq!(plan(&["--quick"]).len(), 8 + 5 + 2 + 2 + 2);
     }
 }
