@@ -83,6 +83,9 @@ limits = {{ full_drive_s = 0.005 }}
 
 impl Drop for Site {
     fn drop(&mut self) {
+        if std::thread::panicking() {
+            eprintln!("what the processes said:\n{}", self.log());
+        }
         // Owning clears what killed processes left in shared memory.
         let _ = self.deployment().own();
     }

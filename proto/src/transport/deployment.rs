@@ -4,7 +4,8 @@
 //! A kill while iceoryx2 creates a service leaves it broken for good. So one process, the owner,
 //! holds the lock, clears what others left under its root and prefix, creates every service under
 //! a new generation, and only then writes the generation down; all others wait for the number
-//! and only open.
+//! and only open. A generation has a folder and a prefix of its own: a peer that is just opening
+//! the previous one cannot put anything in the way of the next.
 
 use std::fs;
 use std::os::unix::fs::DirBuilderExt;
@@ -143,32 +144,34 @@ impl Deployment {
         }
         let _ = fs::write(&lock_path, format!("process {}", std::process::id()));
         let owner = Owner { deployment: self.clone(), _lock: lock, node: None, services: Vec::new() };
-        owner.clear()?;
+        owner.clear();
         let mut folder = fs::DirBuilder::new();
         folder.recursive(true).mode(0o700).create(&self.root).map_err(file_error(&self.root))?;
         Ok(owner)
     }
 
-    /// A node (iceoryx2's word for a participant) of this deployment.
-    pub(super) fn node(&self, name: &str) -> Result<Node<ipc::Service>, TransportError> {
+    /// A node (iceoryx2's word for a participant) of one generation of this deployment.
+    pub(super) fn node(&self, name: &str, generation: u64) -> Result<Node<ipc::Service>, TransportError> {
         // iceoryx2 talks about every dead peer; what matters is in our own errors.
         set_log_level(LogLevel::Fatal);
         let name = NodeName::new(name).map_err(|e| TransportError::iceoryx("node name", e))?;
         NodeBuilder::new()
             .name(&name)
-            .config(&self.config()?)
+            .config(&self.config(generation)?)
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create::<ipc::Service>()
             .map_err(|e| TransportError::iceoryx("creating a node", e))
     }
 
-    fn config(&self) -> Result<Config, TransportError> {
+    fn config(&self, generation: u64) -> Result<Config, TransportError> {
         let path_error = || TransportError::Path { root: self.root.clone() };
         let mut config = Config::default();
-        let root = iceoryx2::prelude::Path::new(self.root.as_os_str().as_encoded_bytes())
-            .map_err(|_| path_error())?;
+        let folder = self.root.join(format!("{generation:x}"));
+        let root =
+            iceoryx2::prelude::Path::new(folder.as_os_str().as_encoded_bytes()).map_err(|_| path_error())?;
         config.global.set_root_path(&root);
-        config.global.prefix = FileName::new(self.prefix().as_bytes()).map_err(|_| path_error())?;
+        let prefix = format!("{}{generation:x}_", self.prefix());
+        config.global.prefix = FileName::new(prefix.as_bytes()).map_err(|_| path_error())?;
         // Clearing up after the dead takes tens of milliseconds: only the owner does it.
         config.global.node.cleanup_dead_nodes_on_creation = false;
         config.global.node.cleanup_dead_nodes_on_destruction = false;
@@ -213,14 +216,12 @@ impl Owner {
     /// [`TransportError`] if iceoryx2 or the file system refuses.
     pub fn create(&mut self, thrusters: &[&str]) -> Result<u64, TransportError> {
         let generation = monotonic_ns();
-        let node = match self.node.take() {
-            Some(node) => node,
-            None => self.deployment.node("owner")?,
-        };
-        let created: Result<Vec<_>, _> =
-            thrusters.iter().map(|thruster| create_services(&node, thruster, generation)).collect();
+        let node = self.deployment.node("owner", generation)?;
+        self.services = thrusters
+            .iter()
+            .map(|thruster| create_services(&node, thruster, generation))
+            .collect::<Result<_, _>>()?;
         self.node = Some(node);
-        self.services = created?;
         let path = self.deployment.generation_file();
         let draft = self.deployment.beside("generation.new");
         fs::write(&draft, generation.to_string())
@@ -241,15 +242,11 @@ impl Owner {
         &self.deployment
     }
 
-    /// Removes everything under root and prefix, whoever left it.
-    fn clear(&self) -> Result<(), TransportError> {
+    /// Removes everything under root and prefix, whoever left it. What a peer creates meanwhile
+    /// belongs to a generation that is gone, and stays for the next clearing.
+    fn clear(&self) {
         let _ = fs::remove_file(self.deployment.generation_file());
-        match fs::remove_dir_all(&self.deployment.root) {
-            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-                return Err(TransportError::File { path: self.deployment.root.clone(), error });
-            }
-            _ => {}
-        }
+        let _ = fs::remove_dir_all(&self.deployment.root);
         let prefix = self.deployment.prefix();
         for folder in ["/dev/shm", "/tmp"] {
             for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
@@ -258,7 +255,6 @@ impl Owner {
                 }
             }
         }
-        Ok(())
     }
 }
 
@@ -267,6 +263,6 @@ impl Drop for Owner {
         // Services first: iceoryx2 removes what nobody uses; then whatever the dead left.
         self.services.clear();
         self.node = None;
-        let _ = self.clear();
+        self.clear();
     }
 }

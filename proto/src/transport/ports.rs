@@ -240,7 +240,7 @@ macro_rules! ports {
                 let generation = deployment.generation().ok_or_else(|| TransportError::NoGeneration {
                     root: deployment.root().to_path_buf(),
                 })?;
-                let node = deployment.node($node)?;
+                let node = deployment.node($node, generation)?;
                 let opener = Opener { node: &node, thruster, generation, session: monotonic_ns() };
                 $(let $field = { let $o = &opener; $make };)*
                 Ok(Self { $($field,)* generation, _node: node })
