@@ -242,6 +242,10 @@ fn echo(role: &str, folder: &Path) {
 }
 
 /// One end of a bare connection.
+#[expect(
+    clippy::large_enum_variant,
+    reason = "one of each in a run; a box would add an indirection to what is timed"
+)]
 enum Wire {
     Iceoryx {
         send: iceoryx2::port::publisher::Publisher<ipc::Service, Sample, ()>,

@@ -34,12 +34,8 @@ fn estimates_converge_on_the_truth() {
             let mut l = Loop::with_truth(rig, &config(estimator), 0.001, &factors);
             excite(&mut l, 60.0);
             let found = l.controller.adapted();
-            for i in 0..2 {
-                assert!(
-                    (found.ratio[i] / expected[i] - 1.0).abs() < 0.06,
-                    "{} {factors:?}: {found:?}",
-                    estimator.name()
-                );
+            for (ratio, expected) in found.ratio.iter().zip(expected) {
+                assert!((ratio / expected - 1.0).abs() < 0.06, "{} {factors:?}: {found:?}", estimator.name());
             }
             assert_eq!(l.controller.model().blade.lift_max, 0.542 * found.ratio[0], "the law runs on it");
         }
@@ -101,7 +97,7 @@ fn the_adapted_model_feeds_the_law() {
                 n += 1.0;
             }
         }
-        (sum / n as f64).sqrt()
+        (sum / n).sqrt()
     };
     let truth = rms(EstimatorKind::Off, 1.0);
     for estimator in ADAPTIVE {

@@ -448,10 +448,10 @@ fn smooth_between(command: &mut [f64], edges: &[Edge]) {
     let mut bounds: Vec<usize> = std::iter::once(0).chain(edges.iter().map(|e| e.row)).collect();
     bounds.push(raw.len());
     for segment in bounds.windows(2) {
-        for k in segment[0]..segment[1] {
+        for (k, smooth) in command.iter_mut().enumerate().take(segment[1]).skip(segment[0]) {
             let (from, to) = (k.saturating_sub(REACH).max(segment[0]), (k + REACH + 1).min(segment[1]));
             if to - from < 4 {
-                command[k] = raw[from..to].iter().sum::<f64>() / (to - from) as f64;
+                *smooth = raw[from..to].iter().sum::<f64>() / (to - from) as f64;
                 continue;
             }
             let rows = to - from;
@@ -459,7 +459,7 @@ fn smooth_between(command: &mut [f64], edges: &[Edge]) {
             let y = nalgebra::DVector::from_column_slice(&raw[from..to]);
             let normal = x.tr_mul(&x);
             if let Some(c) = normal.cholesky() {
-                command[k] = c.solve(&x.tr_mul(&y))[0];
+                *smooth = c.solve(&x.tr_mul(&y))[0];
             }
         }
     }
@@ -621,9 +621,9 @@ fn filled(column: &[f64]) -> Vec<f64> {
     out[..first].fill(column[first]);
     out[last..].fill(column[last]);
     for w in known.windows(2) {
-        for k in w[0] + 1..w[1] {
+        for (k, cell) in out.iter_mut().enumerate().take(w[1]).skip(w[0] + 1) {
             let u = (k - w[0]) as f64 / (w[1] - w[0]) as f64;
-            out[k] = column[w[0]] + (column[w[1]] - column[w[0]]) * u;
+            *cell = column[w[0]] + (column[w[1]] - column[w[0]]) * u;
         }
     }
     out

@@ -448,8 +448,11 @@ impl Scenario {
     }
 }
 
+/// Says what is wrong with a value: name, value, least, most, hint.
+type Within = dyn Fn(&str, f64, f64, f64, &str) -> Result<(), String>;
+
 impl Segment {
-    fn check(&self, within: &dyn Fn(&str, f64, f64, f64, &str) -> Result<(), String>) -> Result<(), String> {
+    fn check(&self, within: &Within) -> Result<(), String> {
         let share = "shares of the largest thrust, -1 to 1";
         match self {
             Self::Steps { levels, hold_s, ramp_s } => {

@@ -245,7 +245,7 @@ impl Tally {
             self.window_squares += error * error;
         }
         self.window_ticks += 1;
-        if self.seen % self.plot_every == 0 {
+        if self.seen.is_multiple_of(self.plot_every) {
             self.window.points.push([
                 s.time_s as f32,
                 s.reference_n as f32,
