@@ -536,7 +536,18 @@ pub fn scale(all: &[Prepared], rig: &Rig) -> Scale {
     let flux = stated.get(kort_thruster::parameters::Parameter::FluxCoefficient)
         * stated.get(kort_thruster::parameters::Parameter::DensityKgM3)
         * stated.area_m2();
-    let torque = if current > 0.0 { kt * current } else { cq * speed * speed };
+    let ohm = stated.get(kort_thruster::parameters::Parameter::WindingResistanceOhm);
+    let torque = if current > 0.0 {
+        kt * current
+    } else if cq > 0.0 {
+        cq * speed * speed
+    } else if ohm > 0.0 && rig.amplifier.kind == AmplifierKind::Voltage {
+        // A dry shaft without a current: what the largest voltage gives at standstill.
+        kt * command / ohm
+    } else {
+        // ... or what brings it to speed within a second.
+        rig.motor.inertia_kg_m2.value * speed
+    };
     Scale {
         shaft_speed_rad_s: speed.max(1e-6),
         torque_n_m: torque.max(1e-9),

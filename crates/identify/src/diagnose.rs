@@ -6,6 +6,7 @@ use kort_thruster::parameters::Parameters;
 use kort_thruster::rig::Rig;
 
 use crate::baseline::{self, Member, members, recompose};
+use crate::changes::{self, is_change};
 use crate::checks;
 use crate::data::{DataError, Driving, Prepared, Series, available, scale};
 use crate::errors;
@@ -176,7 +177,7 @@ fn write(
     thin: Option<String>,
 ) -> Diagnosis {
     let mut problem = search.problem.clone();
-    let held = held_out_rows(&problem);
+    let held = held_out_rows(&problem, &[&outcome.last]);
     let plain =
         |fit: &Fit, problem: &Problem| problem.residual(&problem.respond(&fit.hypothesis, &fit.values));
     let baseline_full = plain(&outcome.baseline, &problem);
@@ -234,16 +235,24 @@ fn write(
         let full_without = if outcome.places.len() == 1 { &baseline_full } else { &without };
         let located = locate(&search.problem, full_without, &last_full, &speed);
         let odds = words::odds(place);
+        let (regime, spans) =
+            match members(&search.problem, &outcome.last).into_iter().find(|m| is_change(m.0)) {
+                Some((term, values)) if term.id == place.chosen.id => {
+                    let end = search.problem.recordings[0].time_s.last().copied().unwrap_or(0.0);
+                    (words::changes(&values), changes::spans(&values, end))
+                }
+                _ => (located.regime.clone(), located.spans.clone()),
+            };
         mismatch.push(Mismatch {
             path: place.chosen.path.name().into(),
             channel: located.channel.into(),
-            regime: located.regime.clone(),
-            time_s: located.spans.clone(),
+            regime,
+            time_s: spans,
             significance_sigma: place.gain.max(0.0).sqrt(),
             share_of_excess_error: (place.gain / total_gain.max(1e-9)).clamp(0.0, 1.0),
         });
         if is_term(place.chosen) {
-            empirical_term = Some(empirical(search, &outcome.last, place.chosen, held_here));
+            empirical_term = Some(empirical(search, &outcome.last, &std_last, place.chosen, held_here));
             continue;
         }
         let same: Vec<String> = place.rivals.iter().map(|r| r.0.0.id.to_string()).collect();
@@ -293,9 +302,13 @@ fn write(
         mismatch.push(bare_mismatch(search, &outcome.baseline, &baseline_full, channel, size, &speed));
     }
     findings.sort_by(|a, b| b.probability.total_cmp(&a.probability));
-    let verdict = verdict(&outcome, thin.is_some());
+    let verdict = verdict(&outcome, &findings, thin.is_some());
     if let (Some(why), Verdict::InsufficientData) = (&thin, verdict) {
         notes.insert(0, why.clone());
+    }
+    if let Some((other, distance)) = outcome.elsewhere {
+        let gain = outcome.places.first().map_or(0.0, |p| p.gain);
+        notes.push(words::elsewhere(other, distance, gain));
     }
     notes.extend(words::unused(series, &search.problem, search.driver.as_deref()));
     let baseline = Baseline {
@@ -333,14 +346,18 @@ fn write(
     Diagnosis { report, traces: traces(&search.problem, &baseline_full, &last_full, &speed) }
 }
 
-fn verdict(outcome: &Outcome, thin: bool) -> Verdict {
+/// Share of the held-out error above the noise that names must remove where much is left beside them.
+const LEAST_REMOVED: f64 = 0.5;
+
+fn verdict(outcome: &Outcome, findings: &[Finding], thin: bool) -> Verdict {
+    let removed = findings.iter().map(|f| f.heldout.excess_error_removed).fold(0.0, f64::max);
     let total: f64 = outcome.places.iter().map(|p| p.gain).sum();
     let unnamed: f64 = outcome.places.iter().filter(|p| is_term(p.chosen)).map(|p| p.gain).sum();
     if outcome.places.is_empty() && outcome.excess.is_some() && !thin {
         Verdict::Unexplained
     } else if outcome.places.is_empty() {
         if thin { Verdict::InsufficientData } else { Verdict::NoMismatch }
-    } else if unnamed > 0.15 * total {
+    } else if unnamed > 0.15 * total || outcome.excess.is_some() && removed < LEAST_REMOVED {
         Verdict::Unexplained
     } else if outcome.places.iter().any(|p| !p.rivals.is_empty()) {
         Verdict::Ambiguous
@@ -452,7 +469,14 @@ fn rival_finding(
     }
 }
 
-fn empirical(search: &Search, last: &Fit, term: &'static Descriptor, heldout: HeldOut) -> EmpiricalTerm {
+fn empirical(
+    search: &Search,
+    last: &Fit,
+    std: &[f64],
+    term: &'static Descriptor,
+    heldout: HeldOut,
+) -> EmpiricalTerm {
+    let slot = last.hypothesis.effects.iter().position(|e| e.id == term.id);
     let values =
         members(&search.problem, last).into_iter().find(|m| m.0.id == term.id).map_or_else(Vec::new, |m| m.1);
     let (enters, variables) = words::enters(term);
@@ -464,6 +488,7 @@ fn empirical(search: &Search, last: &Fit, term: &'static Descriptor, heldout: He
             .iter()
             .map(|v| if *v == "column" { search.driver.clone().unwrap_or_default() } else { (*v).into() })
             .collect(),
+        parameters: slot.map_or_else(Vec::new, |slot| parameters(last, std, Some(slot))),
         heldout,
     }
 }

@@ -82,14 +82,56 @@ pub fn paired(before: &[f64], after: &[f64]) -> (f64, f64) {
     (mean * n, (var * n).sqrt())
 }
 
-/// Rows that the reported held-out score leaves out of the fit: every third of twelve blocks.
-pub fn held_out_rows(problem: &Problem) -> Vec<Vec<bool>> {
+/// Rows that the reported held-out score leaves out of the fit: every third of twelve blocks. Where
+/// a fit has something change in mid-run, the blocks are cut there too, and the middle ones of each
+/// stretch are left out: every level is then both fitted and judged, and the rows about the change
+/// tell when it came.
+pub fn held_out_rows(problem: &Problem, fits: &[&Fit]) -> Vec<Vec<bool>> {
+    let mut changes: Vec<f64> = fits.iter().flat_map(|f| crate::changes::instants(f)).collect();
+    changes.sort_by(f64::total_cmp);
     problem
         .recordings
         .iter()
         .map(|r| {
             let width = r.duration_s() / SPLIT_BLOCKS as f64 * (1.0 + 1e-9);
+            if !changes.is_empty() {
+                return between(&changes, &r.time_s, width);
+            }
             r.time_s.iter().map(|t| ((t - r.time_s[0]) / width) as usize % 3 == 2).collect()
         })
         .collect()
+}
+
+/// Middle thirds of the stretches between changes, in blocks of about `width`.
+fn between(changes: &[f64], time_s: &[f64], width: f64) -> Vec<bool> {
+    let end = time_s[time_s.len() - 1];
+    time_s
+        .iter()
+        .map(|t| {
+            let k = changes.partition_point(|c| c <= t);
+            let from = if k == 0 { time_s[0] } else { changes[k - 1].max(time_s[0]) };
+            let to = changes.get(k).map_or(end, |c| c.min(end));
+            let blocks = 3.0 * ((to - from) / (3.0 * width)).round().max(1.0);
+            let block = ((t - from) / (to - from).max(1e-9) * blocks * (1.0 - 1e-9)) as usize;
+            block % 3 == 1
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_stretch_between_changes_is_fitted_and_judged() {
+        let time_s: Vec<f64> = (0..3000).map(|k| 5.0 + 0.01 * f64::from(k)).collect();
+        let held = between(&[9.0, 10.2], &time_s, 2.5);
+        for (from, to) in [(5.0, 9.0), (9.0, 10.2), (10.2, 35.0)] {
+            let inside: Vec<bool> =
+                (0..3000).filter(|k| time_s[*k] >= from && time_s[*k] < to).map(|k| held[k]).collect();
+            let share = inside.iter().filter(|h| **h).count() as f64 / inside.len() as f64;
+            assert!((0.3..0.37).contains(&share), "{from}: {share}");
+            assert!(!inside[0] && !inside[inside.len() - 1], "the rows about a change are fitted");
+        }
+    }
 }

@@ -146,7 +146,7 @@ pub fn identify(
     let std = projector.std_errors();
     let full = problem.residual(&problem.respond(&best.hypothesis, &best.values));
     let floor = errors::noise_floor(problem, &full);
-    let held = held_out_rows(problem);
+    let held = held_out_rows(problem, &[]);
     let mut training = problem.clone();
     for (mask, held) in training.masked.iter_mut().zip(&held) {
         mask.iter_mut().zip(held).for_each(|(m, h)| *m |= *h);

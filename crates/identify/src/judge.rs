@@ -3,6 +3,7 @@
 use kort_thruster::effects::Descriptor;
 
 use crate::baseline::{Member, members, recompose};
+use crate::changes;
 use crate::data::{Series, available};
 use crate::errors;
 use crate::fit::{Fit, Problem};
@@ -34,6 +35,8 @@ pub struct Outcome {
     pub doubt: Option<(&'static Descriptor, f64, &'static str)>,
     /// Error above the noise that nothing explains: channel, root mean square over full scale.
     pub excess: Option<(&'static str, f64)>,
+    /// Changes in mid-run that were found might act here as well: term, distance in the criterion.
+    pub elsewhere: Option<(&'static Descriptor, f64)>,
 }
 
 /// Margin within which two explanations cannot be told apart.
@@ -56,9 +59,43 @@ pub fn run(
     let mut current = search.baseline(start);
     let offered = available(series, &search.problem.recordings);
     search.try_columns(series, &mut current, &offered);
-    let mut rounds: Vec<Vec<Candidate>> = Vec::new();
+    let named = names(search, current, Vec::new(), progress);
+    let left = excess(&search.problem, &named.last).1;
+    if left < rules::REAL_EXCESS {
+        return named;
+    }
+    // Much is left: did something change in mid-run? Slow noise learned without it hides it.
+    progress("looking for changes in mid-run");
+    let saved = (search.problem.recordings.clone(), search.problem.whiteners.clone());
+    if let Some(found) = changes::find(search, &named.baseline, &offered) {
+        let now = excess(&search.problem, &found.fit).1;
+        if now * now < rules::CHANGE_LEAVES * left * left {
+            let gain = criterion(&found.before) - criterion(&found.fit);
+            let change = Candidate {
+                effect: found.effect,
+                criterion: criterion(&found.fit),
+                fit: found.fit,
+                screened: gain,
+            };
+            let rival = found.rival;
+            let outcome = names(search, change.fit.clone(), vec![vec![change]], progress);
+            return Outcome { elsewhere: rival, ..outcome };
+        }
+    }
+    (search.problem.recordings, search.problem.whiteners) = saved;
+    named
+}
+
+/// Looks for names on top of what is known, round by round, and lets terms judge them.
+fn names(
+    search: &mut Search,
+    mut current: Fit,
+    known: Vec<Vec<Candidate>>,
+    progress: &(dyn Fn(&str) + Sync),
+) -> Outcome {
+    let mut rounds = known;
+    let mut so_far: f64 = rounds.iter().map(|r| r[0].screened).sum();
     let mut term: Option<Candidate> = None;
-    let mut so_far = 0.0;
     let mut doubt = None;
     while rounds.len() < rules::MOST_FOUND {
         progress(&format!("looking for effect {}", rounds.len() + 1));
@@ -112,7 +149,14 @@ pub fn run(
         }
         if term.is_none() {
             let excess = Some(excess).filter(|e| e.1 > rules::REAL_EXCESS);
-            return Outcome { baseline: current.clone(), last: current, places: Vec::new(), doubt, excess };
+            return Outcome {
+                baseline: current.clone(),
+                last: current,
+                places: Vec::new(),
+                doubt,
+                excess,
+                elsewhere: None,
+            };
         }
     }
     progress("weighing rivals");
@@ -121,7 +165,7 @@ pub fn run(
     let baseline = plain(search, &current);
     unnamed(search, &baseline, &mut current, &mut places, term);
     let excess = Some(excess(&search.problem, &current)).filter(|e| e.1 > rules::REAL_EXCESS);
-    Outcome { baseline, last: current, places, doubt, excess }
+    Outcome { baseline, last: current, places, doubt, excess, elsewhere: None }
 }
 
 /// The channel with most error above its noise: root mean square over full scale.

@@ -1,6 +1,7 @@
 //! Identification from recordings, and diagnosis: which physics did the model leave out?
 
 pub mod baseline;
+pub mod changes;
 pub mod checks;
 pub mod data;
 pub mod diagnose;

@@ -438,14 +438,16 @@ term!(
     |v, _| { Box::new(ThrustTerm { values: values(v), act: |v, tick, _| v.size * tick.extra }) }
 );
 
-fn thrust_measured(
+/// Thrust is measured.
+pub fn thrust_measured(
     _: &kort_thruster::rig::Rig,
     available: &kort_thruster::effects::Available,
 ) -> Result<(), &'static str> {
     if available.has("thrust_n") { Ok(()) } else { Err("thrust is not recorded") }
 }
 
-fn commanded(
+/// A command drives the model.
+pub fn commanded(
     _: &kort_thruster::rig::Rig,
     available: &kort_thruster::effects::Available,
 ) -> Result<(), &'static str> {

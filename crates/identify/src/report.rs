@@ -144,6 +144,8 @@ pub struct EmpiricalTerm {
     pub expression: String,
     /// Variables in it.
     pub variables: Vec<String>,
+    /// Fitted values.
+    pub parameters: Vec<ParameterReport>,
     /// Gain on held-out rows.
     pub heldout: HeldOut,
 }

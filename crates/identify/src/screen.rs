@@ -88,7 +88,7 @@ impl Projector {
     }
 
     /// Gram matrix and gradient of directions after the projection.
-    fn project(&self, fit: &Fit, directions: &[DVector<f64>]) -> (DMatrix<f64>, DVector<f64>) {
+    pub fn project(&self, fit: &Fit, directions: &[DVector<f64>]) -> (DMatrix<f64>, DVector<f64>) {
         let d = DMatrix::from_columns(directions);
         let mut cross = self.jacobian.tr_mul(&d);
         for (k, s) in self.scale.iter().enumerate() {

@@ -8,6 +8,7 @@ use kort_thruster::effects::{self, Available, Descriptor, Scale};
 use rayon::prelude::*;
 
 use crate::baseline::with_effect;
+use crate::changes;
 use crate::data::{Series, possible_drivers};
 use crate::fit::{Fit, Problem};
 use crate::heldout;
@@ -47,6 +48,9 @@ pub mod rules {
     pub const LEAST_EXCESS: f64 = 0.002;
     /// ... and above which a mismatch is real even if nothing describes it.
     pub const REAL_EXCESS: f64 = 0.006;
+    /// Changes in mid-run must leave less than this share of the squared error above the noise that
+    /// names leave.
+    pub const CHANGE_LEAVES: f64 = 0.6;
     /// A name must explain at least this share of what the best term explains to be followed.
     pub const LEAST_OF_TERM: f64 = 0.35;
     /// Most effects found in one recording.
@@ -248,7 +252,11 @@ impl<'a> Search<'a> {
 
     /// The best term without a name on top of a fit, if any promises something.
     pub fn best_term(&mut self, current: &mut Fit) -> Option<Candidate> {
-        let screened = screen(&self.problem, current, &self.terms, &self.scale, &mut self.known);
+        // Changes in mid-run that were found hold more than one switch could add.
+        let changed = current.hypothesis.effects.iter().any(|e| changes::is_change(e));
+        let terms: Vec<&'static Descriptor> =
+            self.terms.iter().copied().filter(|t| !(changed && t.id.ends_with("_switched"))).collect();
+        let screened = screen(&self.problem, current, &terms, &self.scale, &mut self.known);
         let mut chosen: Vec<Screened> = Vec::new();
         for s in screened {
             let fresh = chosen.iter().all(|c| c.effect.id != s.effect.id);

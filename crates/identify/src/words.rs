@@ -1,7 +1,8 @@
 //! What the report says in words, and the odds it gives.
 
-use kort_thruster::effects::Descriptor;
+use kort_thruster::effects::{Descriptor, Path};
 
+use crate::changes;
 use crate::data::Series;
 use crate::fit::Problem;
 use crate::judge::{Outcome, Place, margin};
@@ -73,6 +74,12 @@ pub fn why_not(leader: &str, distance: f64, gain: f64) -> String {
 /// What a term adds to, and its variables.
 pub fn enters(term: &Descriptor) -> (&'static str, &'static [&'static str]) {
     match term.id {
+        id if id.starts_with("term_shaft_changes") => {
+            ("load torque on the shaft [N m], against the rotation", &["time_s"])
+        }
+        id if id.starts_with("term_drive_changes") => ("drive command", &["command", "time_s"]),
+        id if id.starts_with("term_flow_changes") => ("ambient flow [m/s]", &["time_s"]),
+        id if id.starts_with("term_sensor_changes") => ("thrust reading [N]", &["time_s"]),
         "term_column_shaft" => ("shaft torque [N m]", &["column", "shaft_speed_rad_s"]),
         "term_column_drive" => ("drive command", &["column", "command"]),
         "term_column_ambient" => ("ambient flow [m/s]", &["column"]),
@@ -94,6 +101,9 @@ pub fn enters(term: &Descriptor) -> (&'static str, &'static [&'static str]) {
 
 /// The term's formula with numbers.
 pub fn expression(term: &Descriptor, values: &[f64], driver: Option<&str>) -> String {
+    if changes::is_change(term) {
+        return changed(term, values);
+    }
     let mut text = term.equation.to_string();
     let (size, reference, shape) = (
         values.first().copied().unwrap_or(0.0),
@@ -113,6 +123,50 @@ pub fn expression(term: &Descriptor, values: &[f64], driver: Option<&str>) -> St
     // The size last: "k" stands alone in every equation.
     let number = format!("{size:.5}");
     text.replace("-k ", &format!("-{number} ")).replace("+ k", &format!("+ {number}")).replace("--", "+")
+}
+
+/// The formula of changes in mid-run: every step with its instant.
+fn changed(term: &Descriptor, values: &[f64]) -> String {
+    let (head, unit) = match term.path {
+        Path::Shaft => ("as before", " N m"),
+        Path::Drive => ("command x (1", ""),
+        Path::Flow => ("as before", " m/s"),
+        _ => ("as before", " N"),
+    };
+    let mut text = head.to_string();
+    for (size, at) in changes::steps(values) {
+        let plus = if size < 0.0 { "-" } else { "+" };
+        text.push_str(&format!(" {plus} {:.4}{unit} from t = {at:.2} s on,", size.abs()));
+    }
+    text.pop();
+    if term.path == Path::Drive {
+        text.push(')');
+    }
+    text
+}
+
+/// When changes come.
+pub fn changes(values: &[f64]) -> String {
+    let list: Vec<String> = changes::steps(values).iter().map(|s| format!("{:.2} s", s.1)).collect();
+    format!("changes in mid-run, at {}", list.join(", "))
+}
+
+/// Another path on which the same changes might act.
+pub fn elsewhere(other: &Descriptor, distance: f64, gain: f64) -> String {
+    let what = match other.path {
+        Path::Shaft => "a load on the shaft",
+        Path::Drive => "a change of the drive's gain",
+        Path::Flow => "a change of the inflow",
+        _ => "a step of the thrust reading",
+    };
+    let how = if distance > 0.0 {
+        format!("fits worse by {distance:.0}")
+    } else {
+        format!("fits better by {:.0}, by how fast it acts", -distance)
+    };
+    format!(
+        "the same changes as {what} would be of another path: it {how} (of {gain:.0} in twice the log-likelihood); where the difference is small, only a recorded current or torque parts them"
+    )
 }
 
 /// Columns that were not used.

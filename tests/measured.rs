@@ -1,0 +1,54 @@
+//! Recordings that others measured, through the built program.
+
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+fn kort(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_kort")).args(arguments).output().unwrap()
+}
+
+fn diagnose(recording: &str, rig: &str, columns: &str) -> Value {
+    let output = kort(&["diagnose", recording, "--rig", rig, "--columns", columns, "--json"]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// The answer that the column map hides: when the person changed the brake, s.
+fn brake_changes(recording: &str) -> Vec<f64> {
+    let text = std::fs::read_to_string(recording).unwrap();
+    let mut lines = text.lines();
+    let header: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let level = header.iter().position(|c| *c == "damping_level").unwrap();
+    let rows: Vec<(f64, &str)> = lines
+        .map(|line| {
+            let cells: Vec<&str> = line.split(',').collect();
+            (cells[0].parse::<f64>().unwrap() / 1000.0, cells[level])
+        })
+        .collect();
+    rows.windows(2).filter(|w| w[0].1 != w[1].1).map(|w| w[1].0).collect()
+}
+
+#[test]
+fn a_brake_eased_in_mid_run_is_found_when_and_where_it_was() {
+    let recording = "tests/recordings/rosa-rotor-air-d445.csv";
+    let report = diagnose(recording, "config/thrusters/rosa-rotor.toml", "rosa-rotor-air");
+    let notes = report["notes"].to_string();
+    assert!(notes.contains("leaves out: damping_level"), "the answer is hidden: {notes}");
+
+    assert_eq!(report["verdict"], "unexplained", "{}", report["summary"]);
+    assert_eq!(report["mismatch"][0]["path"], "shaft");
+    let term = &report["empirical_term"];
+    assert_eq!(term["path"], "shaft");
+    let value = |name: &str| {
+        let list = term["parameters"].as_array().unwrap();
+        list.iter().find(|p| p["name"] == name).unwrap()["value"].as_f64().unwrap()
+    };
+    let truth = brake_changes(recording);
+    assert_eq!(truth.len(), 1);
+    let onset = value("onset_1_s");
+    assert!((onset - truth[0]).abs() < 0.15, "found at {onset} s, changed at {} s", truth[0]);
+    assert!(value("load_torque_1_n_m") < 0.0, "the brake was eased");
+    let removed = term["heldout"]["excess_error_removed"].as_f64().unwrap();
+    assert!(removed > 0.8, "{removed}");
+}
