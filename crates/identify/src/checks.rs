@@ -17,6 +17,10 @@ pub struct Checked {
 const FROZEN_ROWS: usize = 40;
 /// A spike stands out of its neighbours by this many times their usual distance.
 const SPIKE_RATIO: f64 = 40.0;
+/// A gap longer than this may hide changes of the drive, s.
+const LONG_GAP_S: f64 = 0.2;
+/// After such a gap the state is taken as known again, s.
+const SETTLE_S: f64 = 2.0;
 
 /// Runs all checks on one recording.
 pub fn check(series: &Series, rig: &Rig) -> Checked {
@@ -170,11 +174,26 @@ fn gaps(series: &Series, out: &mut Checked) {
     steps.sort_by(f64::total_cmp);
     let Some(usual) = steps.get(steps.len() / 2).copied() else { return };
     let wide = series.time_s.windows(2).filter(|w| w[1] - w[0] > 3.5 * usual).count();
-    if wide > 0 {
-        out.notes.push(format!(
-            "{}: the log has {wide} gaps longer than 3 intervals (longest {:.3} s); inputs are taken as straight across them",
-            series.name,
-            steps[steps.len() - 1]
-        ));
+    if wide == 0 {
+        return;
     }
+    // What the drive did in a long gap is not known, nor then the state after it.
+    let mut long = 0;
+    let mut known_from_s = f64::NEG_INFINITY;
+    for (k, w) in series.time_s.windows(2).enumerate() {
+        if w[1] - w[0] > (3.5 * usual).max(LONG_GAP_S) {
+            long += 1;
+            known_from_s = w[1] + SETTLE_S;
+        }
+        out.masked[k + 1] |= w[1] < known_from_s;
+    }
+    let left_out = match long {
+        0 => String::new(),
+        _ => format!("; the {SETTLE_S} s after each of the {long} longer than {LONG_GAP_S} s are left out"),
+    };
+    out.notes.push(format!(
+        "{}: the log has {wide} gaps longer than 3 intervals (longest {:.3} s); inputs are taken as straight across them{left_out}",
+        series.name,
+        steps[steps.len() - 1]
+    ));
 }

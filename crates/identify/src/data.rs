@@ -4,6 +4,8 @@ use kort_thruster::effects::{Available, Scale};
 use kort_thruster::plant::{Driven, Stimulus, Tick};
 use kort_thruster::rig::{AmplifierKind, Rig};
 
+use crate::refuse;
+
 /// A measured response that a model can be compared with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Response {
@@ -170,6 +172,48 @@ pub enum DataError {
         /// Rows needed.
         least: usize,
     },
+    /// A value that no thruster gives.
+    #[error(
+        "{recording}: {column} = {value:e} at {time_s} s is outside what is allowed: -{most:e} to {most:e}\nhint: is the unit right? a value not measured is an empty cell"
+    )]
+    Implausible {
+        /// The recording.
+        recording: String,
+        /// The column.
+        column: String,
+        /// When.
+        time_s: f64,
+        /// The value found.
+        value: f64,
+        /// Largest size allowed.
+        most: f64,
+    },
+    /// Rows closer together than any log writes them.
+    #[error(
+        "{recording}: rows are usually {interval_s:e} s apart; at least {least_s:e} s are needed\nhint: is time_s in seconds?"
+    )]
+    TooFast {
+        /// The recording.
+        recording: String,
+        /// Median time between rows, s.
+        interval_s: f64,
+        /// Shortest allowed, s.
+        least_s: f64,
+    },
+    /// More control ticks than can be simulated.
+    #[error(
+        "{recording}: time_s spans {seconds} s; at most {most_s:.0} s can be compared at this control rate (the longest gap is from {} to {} s)\nhint: is time_s in seconds? cut the recording at its gaps, or take a part of it", .gap_s[0], .gap_s[1]
+    )]
+    TooLong {
+        /// The recording.
+        recording: String,
+        /// Span found, s.
+        seconds: f64,
+        /// Longest allowed, s.
+        most_s: f64,
+        /// The longest gap, from and to, s.
+        gap_s: [f64; 2],
+    },
 }
 
 /// The coarsest step at which the plant is integrated, s.
@@ -188,6 +232,8 @@ impl Prepared {
         if rows < FEWEST_ROWS {
             return Err(DataError::TooShort { recording, rows, least: FEWEST_ROWS });
         }
+        let row_s = median_step(&series.time_s);
+        refuse::implausible(series, row_s)?;
         let driving = choose_driving(series, rig, speed_driven)
             .ok_or(DataError::NoDriving { recording: recording.clone() })?;
         let channels: Vec<Channel> = Response::ALL
@@ -201,7 +247,6 @@ impl Prepared {
         if !channels.iter().any(|c| c.response != Response::Current) {
             return Err(DataError::NoResponse { recording, driving: driving.column() });
         }
-        let row_s = median_step(&series.time_s);
         let tick_s = match rig.sensors.control_rate_hz {
             Some(rate) if 1.0 / rate <= row_s * 1.001 => {
                 let tick = 1.0 / rate;
@@ -209,6 +254,7 @@ impl Prepared {
             }
             _ => row_s / (row_s / COARSEST_TICK_S).ceil().max(1.0),
         };
+        refuse::too_long(series, tick_s)?;
         let recorded = filled(series.column(driving.column()).unwrap_or(&[]));
         let mut prepared = Self {
             name: recording,

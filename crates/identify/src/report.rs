@@ -30,8 +30,7 @@ pub struct ParameterReport {
     pub unit: String,
     /// Standard error of the fit, prior included.
     pub std_error: f64,
-    /// What the rig description states.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    /// What the rig description states; none where the fit has no prior.
     pub stated: Option<f64>,
     /// At the edge of what is allowed: a symptom, not a value.
     #[serde(skip_serializing_if = "Option::is_none")]

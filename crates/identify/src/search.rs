@@ -135,7 +135,7 @@ impl<'a> Search<'a> {
     pub fn baseline(&mut self, hypothesis: &crate::fit::Hypothesis) -> Fit {
         let mut at = hypothesis.clone();
         let mut fit = self.problem.fit(&at, &[], 8);
-        for _ in 0..3 {
+        for _ in 0..8 {
             at.start.clone_from(&fit.values);
             let moved = self.problem.place_edges(&at, &fit.values);
             if moved {

@@ -33,7 +33,7 @@ impl Quantity {
 #[derive(Debug, Error, Clone, PartialEq)]
 pub enum RigError {
     /// Not TOML.
-    #[error("{message}")]
+    #[error("{message}\nhint: write tables and values as config/thrusters/whitcomb-yoerger-1999.toml does")]
     Syntax {
         /// The parser's words, with line and column.
         message: String,
@@ -203,8 +203,9 @@ impl Rig {
     /// # Errors
     /// [`RigError`] names the key, the value found, what is allowed and what to do.
     pub fn from_toml(text: &str) -> Result<Self, RigError> {
-        let table: toml::Table =
-            text.parse().map_err(|e: toml::de::Error| RigError::Syntax { message: e.to_string() })?;
+        let table: toml::Table = text
+            .parse()
+            .map_err(|e: toml::de::Error| RigError::Syntax { message: e.to_string().trim_end().into() })?;
         check_keys(&table)?;
         let t = Reader { table: &table };
         let dry = t.text("propeller", "kind")?.as_deref() == Some("none");

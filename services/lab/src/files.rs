@@ -65,8 +65,15 @@ fn text_of(wanted: &Path, folder: &str, what: &str, shipped: &[(&str, &str)]) ->
 /// # Errors
 /// Names the file, the key, the value found and what is allowed.
 pub fn read_rig(wanted: &Path) -> Result<Rig, Failure> {
-    let text = text_of(wanted, "config/thrusters", "rig description", RIGS)?;
-    Rig::from_toml(&text).map_err(|e| Failure::in_file(wanted, e))
+    Rig::from_toml(&rig_text(wanted)?).map_err(|e| Failure::in_file(wanted, e))
+}
+
+/// A rig description's text by path or name.
+///
+/// # Errors
+/// There is no such file or rig.
+pub fn rig_text(wanted: &Path) -> Result<String, Failure> {
+    text_of(wanted, "config/thrusters", "rig description", RIGS)
 }
 
 /// A scenario's text by path or name.

@@ -1,0 +1,50 @@
+//! What no log of a thruster holds, refused before a simulation would need endless memory or leave
+//! the range of floating-point numbers.
+
+use crate::data::{DataError, KNOWN, Series};
+
+/// Largest size that a value of the contract's columns may have, in their units.
+const MOST: f64 = 1e6;
+/// The same for the unwrapped shaft angle, rad.
+const MOST_ANGLE_RAD: f64 = 1e9;
+/// Shortest usual log interval, s.
+const SHORTEST_INTERVAL_S: f64 = 1e-5;
+/// Most control ticks that a recording may span: five and a half hours at 500 Hz.
+const MOST_TICKS: f64 = 1e7;
+
+/// Refuses values and log intervals that no thruster gives.
+///
+/// # Errors
+/// Names the column, the instant, the value found and what is allowed.
+pub fn implausible(series: &Series, interval_s: f64) -> Result<(), DataError> {
+    let recording = series.name.clone();
+    for (column, values) in series.columns.iter().filter(|c| KNOWN.contains(&c.0.as_str())) {
+        let most = if column == "shaft_angle_rad" { MOST_ANGLE_RAD } else { MOST };
+        if let Some(row) = values.iter().position(|v| v.abs() > most) {
+            let (column, time_s, value) = (column.clone(), series.time_s[row], values[row]);
+            return Err(DataError::Implausible { recording, column, time_s, value, most });
+        }
+    }
+    if interval_s < SHORTEST_INTERVAL_S {
+        return Err(DataError::TooFast { recording, interval_s, least_s: SHORTEST_INTERVAL_S });
+    }
+    Ok(())
+}
+
+/// Refuses a recording that spans more control ticks than can be simulated.
+///
+/// # Errors
+/// Names the span, its longest gap and what is allowed.
+pub fn too_long(series: &Series, tick_s: f64) -> Result<(), DataError> {
+    let (first, last) = (series.time_s[0], series.time_s[series.time_s.len() - 1]);
+    if (last - first) / tick_s <= MOST_TICKS {
+        return Ok(());
+    }
+    let longest = series.time_s.windows(2).max_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0])));
+    Err(DataError::TooLong {
+        recording: series.name.clone(),
+        seconds: last - first,
+        most_s: MOST_TICKS * tick_s,
+        gap_s: longest.map_or([first, last], |w| [w[0], w[1]]),
+    })
+}
