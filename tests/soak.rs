@@ -75,6 +75,68 @@ fn a_dead_controller_is_survived_and_a_page_is_written() {
     assert!(html.contains("<svg") && html.contains("model2_inversion"));
 }
 
+/// The paper's rig states no winding resistance: what follows from it is not known, not nothing.
+#[test]
+fn what_the_rig_does_not_state_is_not_known() {
+    let folder = tempfile::tempdir().expect("folder");
+    let file = scenario(folder.path(), "");
+    let file = file.to_str().expect("utf-8");
+    let run = kort(&["soak", file, "--json", "--seeds", "1"]);
+    let report: Value = serde_json::from_slice(&run.stdout).expect("JSON");
+    let law = &report["scenarios"][0]["laws"][1];
+    assert!(law["scores"]["copper_loss_per_impulse_j_n_s"].is_null(), "{law}");
+    assert!(law["against_plain"]["energy_per_impulse_j_n_s"]["mean"].as_f64().is_some(), "{law}");
+    let table = text(&kort(&["soak", file, "--seeds", "1"]).stdout);
+    assert!(table.contains("not known"), "{table}");
+}
+
+/// A log of commands is played in newtons, or stretched; a law told the truth is what adaptation is held to.
+#[test]
+fn a_log_is_replayed_and_adaptation_is_held_to_the_truth() {
+    let folder = tempfile::tempdir().expect("folder");
+    let rows: String = (0..20).map(|k| format!("{k},{},{}\n", 40 + 10 * (k % 4), k % 3)).collect();
+    std::fs::write(folder.path().join("log.csv"), format!("time_s,thrust_cmd_n,stick\n{rows}")).expect("log");
+    let replay = |more: &str| format!("[[reference]]\nkind = \"replay\"\nfile = \"log.csv\"\n{more}");
+    let good = scenario(folder.path(), &replay(""));
+    let words = std::fs::read_to_string(&good).expect("scenario");
+    let head =
+        words.split("[[reference]]").next().expect("head").replace("duration_s = 12", "duration_s = 30");
+    let head = head
+        .replace("settle_s = 1\n", "settle_s = 15\nagainst_true_parameters = true\n")
+        .replace("velocity_servo\"", "adaptive_model2_inversion\"");
+    let change = "[[truth.change]]\nat_s = 2\nfactors = { lift_max = 0.7 }\n";
+    let write = |text: String| std::fs::write(&good, text).expect("scenario");
+    let path = good.to_str().expect("utf-8");
+
+    write(format!("{head}{}{change}", replay("")));
+    let run = kort(&["soak", path, "--json", "--seeds", "1"]);
+    assert!(run.status.success(), "{}", text(&run.stderr));
+    let report: Value = serde_json::from_slice(&run.stdout).expect("JSON");
+    let of = |i: usize| {
+        report["scenarios"][0]["laws"][i]["scores"]["error_over_true_parameters"]["mean"]
+            .as_f64()
+            .unwrap_or(0.0)
+    };
+    assert!(of(0) < 0.6 * of(1) && of(1) > 1.5, "adapting {} against {}", of(0), of(1));
+    assert!(report["scenarios"][0]["verdict"].as_str().is_some_and(|v| v.contains("true parameters told")));
+
+    write(format!("{head}{}{change}", replay("column = \"stick\"\n")));
+    let run = kort(&["soak", path, "--seeds", "1"]);
+    assert_eq!(run.status.code(), Some(2));
+    assert!(text(&run.stderr).contains("peak = 0.8"), "{}", text(&run.stderr));
+    write(format!("{head}{}{change}", replay("column = \"throttle\"\npeak = 0.5\n")));
+    let said = text(&kort(&["soak", path, "--seeds", "1"]).stderr);
+    assert!(said.contains("log.csv") && said.contains("stick"), "{said}");
+    write(format!(
+        "{head}{}{}",
+        replay("column = \"stick\"\npeak = 0.5\n"),
+        change.replace("at_s = 2", "at_s = 20")
+    ));
+    let run = kort(&["soak", path, "--seeds", "1"]);
+    assert_eq!(run.status.code(), Some(2));
+    assert!(text(&run.stderr).contains("settle_s"), "{}", text(&run.stderr));
+}
+
 #[test]
 fn wrong_input_is_named() {
     let folder = tempfile::tempdir().expect("folder");

@@ -4,7 +4,7 @@
 //! Every gain in this crate follows from these numbers by a bandwidth rule, so that one set of
 //! options serves a 1 kW test stand and a 76 mm thruster alike.
 
-use kort_thruster::blade::{Blade, Inflow};
+use kort_thruster::blade::{Blade, BladeLoad, BladeRow, Inflow};
 use kort_thruster::rig::{AmplifierKind, Rig};
 use thiserror::Error;
 
@@ -31,7 +31,7 @@ pub enum ModelError {
 /// neither current limit nor supply.
 const TIP_SPEED_MAX_M_S: f64 = 60.0;
 
-/// Rotational flow of the wake (physics.md C4, after Bachmayer, Whitcomb & Grosenbaugh 2000).
+/// Rotational flow of the wake (docs/theory.md, after Bachmayer, Whitcomb & Grosenbaugh 2000).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Swirl {
     /// Drag coefficient of the swirl, `dbr`.
@@ -88,8 +88,12 @@ impl StaticMap {
 /// The thruster as a controller sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ControlModel {
-    /// Blade row; its lift and drag are what adaptation moves.
+    /// Blade row; its lift and drag are what adaptation moves. Call [`Self::refresh`] after.
     pub blade: Blade,
+    /// The same with its products formed, for every load of every tick.
+    row: BladeRow,
+    /// Sine and cosine of the pitch.
+    pitch: (f64, f64),
     /// Accelerated water `rho a l gam`, kg.
     pub added_mass_kg: f64,
     /// Water in the duct `rho a l`, kg.
@@ -156,6 +160,8 @@ impl ControlModel {
         let counts = s.encoder_counts_per_rev.unwrap_or(65_536.0);
         let mut model = Self {
             blade,
+            row: blade.row(),
+            pitch: blade.pitch_rad.sin_cos(),
             added_mass_kg: rig.added_mass_kg(),
             duct_water_kg: rig.added_mass_kg() / rig.flow.added_mass_coefficient.value,
             flux_coefficient: rig.flow.flux_coefficient.value,
@@ -190,8 +196,10 @@ impl ControlModel {
         Ok(model)
     }
 
-    /// Makes the static map agree with the blade's coefficients; call after changing them.
+    /// Makes all that follows from the blade's coefficients agree with them; call after changing them.
     pub fn refresh(&mut self) {
+        self.row = self.blade.row();
+        self.pitch = self.blade.pitch_rad.sin_cos();
         self.map = self.solve_static_map();
     }
 
@@ -251,7 +259,7 @@ impl ControlModel {
         let flux = self.flux_coefficient * self.blade.density_kg_m3 * self.blade.area_m2();
         let surplus = |ratio: f64| {
             let swirl = self.steady_swirl(1.0, ratio);
-            let load = self.blade.load(Inflow { tangential_m_s: 1.0 - swirl, axial_m_s: ratio });
+            let load = self.row.load(1.0 - swirl, ratio);
             (load.thrust_n - flux * ratio * ratio, load)
         };
         let (mut low, mut high) = (0.0, self.blade.pitch_rad.tan());
@@ -276,7 +284,7 @@ impl ControlModel {
         let (mut low, mut high) = (tangential_m_s.min(0.0), tangential_m_s.max(0.0));
         for _ in 0..30 {
             let us = 0.5 * (low + high);
-            let q = self.blade.load(Inflow { tangential_m_s: tangential_m_s - us, axial_m_s }).torque_n_m;
+            let q = self.row.load(tangential_m_s - us, axial_m_s).torque_n_m;
             if q / self.blade.lever_m() > drag * us { low = us } else { high = us }
         }
         0.5 * (low + high)
@@ -293,18 +301,18 @@ impl ControlModel {
     }
 
     /// Thrust and torque at a shaft speed, flow and swirl.
-    pub fn load(&self, speed_rad_s: f64, flow_m_s: f64, swirl_m_s: f64) -> kort_thruster::blade::BladeLoad {
-        self.blade.load(self.blade.inflow(speed_rad_s, flow_m_s, swirl_m_s))
+    pub fn load(&self, speed_rad_s: f64, flow_m_s: f64, swirl_m_s: f64) -> BladeLoad {
+        self.row.load(self.row.lever_m * speed_rad_s - swirl_m_s, flow_m_s)
     }
 
     /// Thrust and torque with their slopes, from differentiating the singularity-free form.
     pub fn slopes(&self, inflow: Inflow) -> Slopes {
         let (ut, vp) = (inflow.tangential_m_s, inflow.axial_m_s);
-        let v = inflow.speed_m_s();
+        let v = (ut * ut + vp * vp).sqrt();
         if v < 1e-9 {
             return Slopes::default();
         }
-        let (s, c) = self.blade.pitch_rad.sin_cos();
+        let (s, c) = self.pitch;
         let (cl, cd) = (self.blade.lift_max, self.blade.drag_max);
         let wn = ut * s - vp * c;
         let wc = ut * c + vp * s;
@@ -489,7 +497,7 @@ flow_rate_hz = 20
     #[test]
     fn speed_loop_gives_the_papers_crossover() {
         let (w, gain) = stand().speed_loop(56f64.to_radians());
-        // physics.md D2 has 45 and 0.5 with one period of delay; here it is one and a half.
+        // docs/control.md D2 has 45 and 0.5 with one period of delay; here it is one and a half.
         assert!((w - 45.0).abs() < 5.0 && (gain - 0.5).abs() < 0.07, "{w} {gain}");
     }
 

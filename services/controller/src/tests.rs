@@ -28,6 +28,7 @@ struct Bench {
     gateway_speaks: bool,
     gateway_session: u64,
     setpoint: Setpoint,
+    thrust_n: f64,
 }
 
 impl Bench {
@@ -43,6 +44,7 @@ impl Bench {
             gateway_speaks: true,
             gateway_session: START - 5,
             setpoint: Setpoint { lease_until_ns: u64::MAX, ..Setpoint::default() },
+            thrust_n: f64::NAN,
         }
     }
 
@@ -51,7 +53,12 @@ impl Bench {
         self.sequence += 1;
         let header = |session| Header { sequence: self.sequence, stamp_ns: self.now, session };
         if self.servo_speaks {
-            let signals = Signals { shaft_speed_rad_s: 20.0, current_a: 1.0, ..Signals::UNKNOWN };
+            let signals = Signals {
+                shaft_speed_rad_s: 20.0,
+                current_a: 1.0,
+                thrust_n: self.thrust_n,
+                ..Signals::UNKNOWN
+            };
             let telemetry = Telemetry {
                 header: header(START - 9),
                 signals,
@@ -103,6 +110,31 @@ impl Bench {
         let reply = self.tick.request(&Request { header, ..request }, self.now).unwrap();
         (Outcome::from_u32(reply.outcome).unwrap(), reply.message.as_str().to_owned())
     }
+}
+
+/// A slow sensor's reading is held between readings; one that has fallen silent is not measured.
+#[test]
+fn a_silent_force_sensor_is_not_taken_for_its_last_word() {
+    let mut bench = Bench::new();
+    bench.tick = Tick::new(
+        &Rig::from_toml(RIG).unwrap(),
+        &ControllerConfig::with_law(LawKind::ThrustPi),
+        PERIOD,
+        START,
+    )
+    .unwrap();
+    bench.arm();
+    bench.give(SetpointKind::Thrust as u32, 50.0);
+    bench.thrust_n = 30.0;
+    for _ in 0..25 {
+        bench.step();
+    }
+    bench.thrust_n = f64::NAN;
+    let mut drives = [0.0; 500];
+    drives.fill_with(|| bench.step().drive);
+    assert!(drives[40] > drives[0] + 1e-3, "held between readings: the integral still runs");
+    let (held, silent) = (drives[40] - drives[0], drives[499] - drives[250]);
+    assert!(silent.abs() < 0.02 * held, "silent: it rests, {held} {silent}");
 }
 
 #[test]

@@ -11,7 +11,7 @@ use kort_proto::messages::{
     Command, ControllerState, DriveKind, Fresh, Freshness, LAWS, Outcome, Parameter, Process,
     REQUEST_LIFE_NS, Reply, Request, RequestKind, Setpoint, SetpointKind, Telemetry,
 };
-use kort_proto::signals::{Estimates, Signals};
+use kort_proto::signals::{Estimates, SIGNALS, Signals};
 use kort_proto::text::Text;
 use kort_thruster::rig::{AmplifierKind, Rig};
 
@@ -21,6 +21,9 @@ const LEASE_RAMP_NS: u64 = 400_000_000;
 /// Silent controller periods after which a peer counts as lost.
 const GATEWAY_PERIODS: u64 = 3;
 const SERVO_PERIODS: u64 = 10;
+/// A reading stands that long for what its sensor would say: the slow ones are read at 20 Hz. After
+/// that the value is not measured, and laws and observers go on without it.
+const READING_LIFE_NS: u64 = 250_000_000;
 
 /// State of the controller between setpoint and law. Starts at zero.
 #[derive(Clone, Copy, Debug)]
@@ -41,6 +44,8 @@ pub struct Tick {
     armed_at_ns: u64,
     drive_max: f64,
     measured: Signals,
+    /// When each of them was last read.
+    read_ns: [u64; SIGNALS.len()],
     last_ns: u64,
     latched: u64,
     limits: u64,
@@ -90,6 +95,7 @@ impl Tick {
             armed_at_ns: 0,
             drive_max: 0.0,
             measured: Signals::UNKNOWN,
+            read_ns: [0; SIGNALS.len()],
             last_ns: started_ns,
             latched: 0,
             limits: 0,
@@ -115,10 +121,13 @@ impl Tick {
         self.armed_at_ns = telemetry.armed_at_ns;
         self.drive_max = if telemetry.drive_max.is_finite() { telemetry.drive_max.max(0.0) } else { 0.0 };
         // A slow sensor shows a value only on some ticks: keep the newest of each.
-        for row in kort_proto::signals::SIGNALS {
+        for (row, read_ns) in SIGNALS.iter().zip(&mut self.read_ns) {
             let value = (row.get)(&telemetry.signals);
             if value.is_finite() {
+                *read_ns = now_ns;
                 (row.set)(&mut self.measured, value);
+            } else if now_ns.saturating_sub(*read_ns) > READING_LIFE_NS {
+                (row.set)(&mut self.measured, f64::NAN);
             }
         }
         // A needed sensor that is gone must not look alive.

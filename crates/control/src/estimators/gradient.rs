@@ -1,11 +1,11 @@
 //! Normalised gradient.
 //!
-//! Reference: Ioannou & Sun, Robust Adaptive Control, ch. 4; physics.md D9:
+//! Reference: Ioannou & Sun, Robust Adaptive Control, ch. 4; docs/control.md D9:
 //! `theta' = Proj(G phi e / (1 + phi' phi))`, with dead zone, box and freeze.
 //!
 //! Assumes: the equations of [`super::regression`]. Needs measured: shaft speed, current, thrust.
-//! Fails: slow along directions that are weakly excited; gives no standard error. Converges only
-//! under persistent excitation, but never leaves its box.
+//! Fails: as the equations do; slow along directions that are weakly excited; gives no standard
+//! error. Converges only under persistent excitation, but never leaves its box.
 
 use super::{AdaptationOptions, Adapted, COEFFICIENTS, EstimatorInput, Regression, beyond};
 use crate::model::ControlModel;

@@ -1,7 +1,7 @@
 //! Estimators: the model's coefficients while the thruster runs.
 //!
 //! Lift, drag and flux coefficient are linear in the equations of thrust, torque and momentum
-//! (physics.md D9). [`regression`] builds filtered, normalised equations and says when they carry
+//! (docs/control.md D9). [`regression`] builds filtered, normalised equations and says when they carry
 //! information; an estimator turns them into a correction; the corrected model feeds the law.
 
 mod gradient;

@@ -1,6 +1,6 @@
 //! The equations that adaptation learns from.
 //!
-//! Reference: physics.md D9. With `W = rho a wn / V`:
+//! Reference: docs/control.md D9. With `W = rho a wn / V`:
 //! ```text
 //! thrust    T                      = W [wc ut, -wn vp] [CL, CD]
 //! torque    kt im - I Om' - Qf     = re W [wc vp,  wn ut] [CL, CD]
@@ -9,6 +9,10 @@
 //! Both sides pass `lam/(s + lam)`, so that no derivative is taken: `F[x'] = lam (x - F[x])`. The
 //! flow comes from the momentum balance under the *measured* thrust, pulled by the flow meter
 //! where there is one: it does not depend on the coefficients that are being learnt.
+//!
+//! Assumes: inertia, torque constant, friction and added mass known; still water unless the ambient
+//! flow is measured. Needs measured: shaft speed, current, thrust; a flow meter helps in ambient flow.
+//! Fails: an ambient flow that nothing measures is learnt as lift and drag; so is a force sensor's bias.
 //!
 //! Equations are divided by full thrust and torque, coefficients by their stated values. A
 //! windowed Gram matrix of the equations' own directions (scaled to the level of operation) says

@@ -1,6 +1,6 @@
 //! Recursive least squares with forgetting.
 //!
-//! Reference: Astrom & Wittenmark, Adaptive Control, ch. 2; physics.md D9. Exponential forgetting
+//! Reference: Astrom & Wittenmark, Adaptive Control, ch. 2; docs/control.md D9. Exponential forgetting
 //! over `memory_s`, capped covariance (no wind-up while little is learnt), dead zone, box, freeze.
 //!
 //! Assumes: the equations of [`super::regression`]. Needs measured: shaft speed, current, thrust.

@@ -1,6 +1,6 @@
 //! Torque and power control combined, with anti-spin.
 //!
-//! Reference: Smogeli 2006; physics.md D6: `Qc = w Qq + (1 - w) Qp`, `w = exp(-k |n|^r)` with speed
+//! Reference: Smogeli 2006; docs/control.md D6: `Qc = w Qq + (1 - w) Qp`, `w = exp(-k |n|^r)` with speed
 //! as a share of top speed: torque near standstill, where power is singular, power at speed. When
 //! the observed load falls below a share of what the speed should carry, the shaft has lost its
 //! water: the speed is held at a cap until the load is back, then the cap is let go at a limited

@@ -4,8 +4,8 @@
 //! fixed number of Gauss-Newton steps (Diehl, Bock & Schloeder 2005, real-time iteration); the
 //! formulation is ours. Two currents are sought, one for the first few steps of the horizon and one
 //! for the rest, that bring the predicted thrust of Model 2 onto the reference soonest:
-//! `sum ((T_k - Td)/Tmax)^2 + r ((i1 - i_last)/Imax)^2`, with the speed error at the end of the horizon. The prediction holds shaft, flow, the drive's lag and
-//! what load the model does not explain (load observer, physics.md D7), which makes it offset-free.
+//! `sum ((T_k - Td)/Tmax)^2 + r ((i1 - i_last)/Imax)^2`, with the speed error at the end of the
+//! horizon. The prediction holds shaft, flow, the drive's lag and what load the model does not explain (load observer, docs/control.md D7), which makes it offset-free.
 //!
 //! Assumes: as `model2_inversion`. Needs measured: shaft speed; the rest sharpens the observer.
 //!

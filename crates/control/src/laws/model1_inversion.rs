@@ -1,6 +1,6 @@
 //! Model 1 (Yoerger) inverted.
 //!
-//! Reference: Yoerger, Cooke & Slotine 1990; (7)-(9) of Whitcomb & Yoerger; physics.md D3:
+//! Reference: Yoerger, Cooke & Slotine 1990; (7)-(9) of Whitcomb & Yoerger; docs/control.md D3:
 //! `tau = (1/2) eta r tan(p) Td + Omr' / beta`, `beta = 1 / (eta^2 r^2 tan^2(p) rho V)`.
 //!
 //! No single `eta` serves both terms: on the paper's stand (18) asks for 0.49, (20) for 2.31, and

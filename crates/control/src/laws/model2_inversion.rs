@@ -1,6 +1,6 @@
 //! Model 2 inverted to torque.
 //!
-//! Reference: Healey et al. 1995 for the model; physics.md D5 for the law:
+//! Reference: Healey et al. 1995 for the model; docs/control.md D5 for the law:
 //! `Omr` from `T(Omr, v^) = Td`, then `tau = Q(Omr, v^) + friction + I Omr' + kfb (Omr - Om)`.
 //! The cascade is input-to-state stable if the flow estimate's error is bounded.
 //!

@@ -1,6 +1,6 @@
 //! Model 3 inverted to a speed for the servo.
 //!
-//! Reference: Whitcomb & Yoerger 1999 (control paper, law re-derived); physics.md D4: from the
+//! Reference: Whitcomb & Yoerger 1999 (control paper, law re-derived); docs/control.md D4: from the
 //! observed flow solve `T(Om, v^) = Td` for the shaft speed, then servo on it with the static
 //! torque feedforward of (21).
 //!

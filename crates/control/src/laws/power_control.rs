@@ -1,6 +1,6 @@
 //! Power control.
 //!
-//! Reference: Smogeli 2006; physics.md D6: `Pr ~ |Tr|^1.5`, `Qp = Pr / |Om|`, with the rig's static
+//! Reference: Smogeli 2006; docs/control.md D6: `Pr ~ |Tr|^1.5`, `Qp = Pr / |Om|`, with the rig's static
 //! map in place of the open-water coefficients.
 //!
 //! Assumes: the shaft turns; power per thrust is the still-water one.

@@ -1,8 +1,8 @@
 //! Model 2 with rotational flow, inverted to torque.
 //!
 //! Reference: Bachmayer, Whitcomb & Grosenbaugh 2000 for the physics; the form is that of
-//! physics.md C4: `rho a l gr us' = Q/re - dbr rho a |vp| us`, blades meet `re Om - us`. The law is
-//! that of `model2_inversion` on the swirling water, with the observer's swirl.
+//! docs/theory.md (`rotational_flow`): `rho a l gr us' = Q/re - dbr rho a |vp| us`, blades meet
+//! `re Om - us`. The law is that of `model2_inversion` on the swirling water, with the observer's swirl.
 //!
 //! Assumes: as `model2_inversion`, and the two coefficients of the swirl. Lift and drag are moved
 //! so that the static map stays that of the rig, which was identified without swirl.

@@ -1,9 +1,15 @@
 //! The speed loop inside the laws: (21) of the paper with an integrator.
 //!
 //! `tau = feedforward + kfb (Omr - Om) + integral`. The gain follows from the rig by a bandwidth
-//! rule (physics.md D2): the crossover is where the drive's lag, the speed filter and one and a
+//! rule (docs/control.md D2): the crossover is where the drive's lag, the speed filter and one and a
 //! half periods leave the asked phase margin; on the paper's stand 56 degrees give 45 rad/s and
 //! `kfb` 0.5 N m s. The integral's corner is a fraction of the crossover.
+//!
+//! Assumes: the shaft is an integrator at crossover; inertia and lags as the rig states them.
+//! Needs measured: shaft speed.
+//!
+//! Fails: an inertia stated too large costs phase margin, one too small costs bandwidth; a torsional
+//! resonance below the crossover is outside the design.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,12 +1,12 @@
 //! Static inversion: constant torque from the bollard map, no feedback.
 //!
-//! Reference: (19), (20) of Whitcomb & Yoerger; physics.md D1. `tau = Td / 16.1` on the stand,
+//! Reference: (19), (20) of Whitcomb & Yoerger; docs/control.md D1. `tau = Td / 16.1` on the stand,
 //! plus the friction known at the speed the map expects.
 //!
 //! Assumes: still water, steady state, known torque constant. Needs measured: nothing.
 //!
 //! Fails: thrust rises only as fast as the bare shaft and water do (0.23 s on the stand, slower at
-//! low thrust); ambient flow shifts thrust per torque by the R3 shift; unknown friction is lost
+//! low thrust); ambient flow shifts thrust per torque; unknown friction is lost
 //! thrust; runs away when the blades ventilate.
 
 use super::{Demand, LawInput};

@@ -2,7 +2,7 @@
 //!
 //! Reference: the plain loop of the field; the design is ours. `tau = a1 Td + Kp e + Ki int(e)`,
 //! `e = Td - T`. The plant from torque to thrust is `1/a1` behind the slow flow pole `p`, which grows
-//! in proportion to shaft speed (similarity, physics.md A8), so the zero follows it:
+//! in proportion to shaft speed (similarity, docs/theory.md), so the zero follows it:
 //! `Kp = a1 w / p`, `Ki = a1 w`, `w = bandwidth_ratio x p`, kept under a fifth of what the sensor's
 //! filter and the drive allow.
 //!

@@ -1,6 +1,6 @@
 //! Torque control.
 //!
-//! Reference: Smogeli 2006; physics.md D6: `Qr = (KQ0 / KT0) D Tr`, here with the rig's own static
+//! Reference: Smogeli 2006; docs/control.md D6: `Qr = (KQ0 / KT0) D Tr`, here with the rig's own static
 //! map in place of the open-water coefficients, plus friction at the measured speed.
 //!
 //! Assumes: torque per thrust is nearly constant, which holds under varying inflow much better

@@ -1,6 +1,6 @@
 //! Model 2 inversion trimmed by the force sensor.
 //!
-//! Reference: physics.md D5, last sentence. A slow integral of `Td - T` moves the reference that
+//! Reference: docs/control.md D5, last sentence. A slow integral of `Td - T` moves the reference that
 //! `model2_inversion` is given; the model gives the transient, the sensor the level. The bandwidth is
 //! a fraction of the servo's crossover (a fifth at most) and must stay below the stand's lowest
 //! resonance.

@@ -1,12 +1,13 @@
 //! Velocity servo on the static map, with torque feedforward.
 //!
 //! Reference: (18), (21) of Whitcomb & Yoerger: `Omr = sgn(Td) sqrt(|Td| / C0)`,
-//! `tau = a1 Td + kfb (Omr - Om)`, here with an integrator (physics.md D2).
+//! `tau = a1 Td + kfb (Omr - Om)`, here with an integrator (docs/control.md D2).
 //!
 //! Assumes: still water and steady state, so that speed stands for thrust.
 //! Needs measured: shaft speed.
 //!
-//! Fails: ambient flow is a thrust error at full size (R1 shift: -20 % at 1.5 N m in 0.3 m/s); a
+//! Fails: ambient flow is a thrust error at full size (thrust per speed squared falls by 20 % at
+//! 1.5 N m in 0.3 m/s); a
 //! step of speed throws thrust up by about a factor of two before the water has been accelerated.
 //! Hides friction, inertia and torque-constant faults from thrust, which is its strength.
 

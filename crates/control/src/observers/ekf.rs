@@ -1,6 +1,7 @@
 //! Extended Kalman filter of shaft, flow, swirl, ambient flow and unexplained load.
 //!
-//! Reference: physics.md D8; Kalman filter with Joseph-form updates after Bucy & Joseph 1968.
+//! Reference: docs/control.md D8; Kalman filter with scalar updates (Bucy & Joseph 1968), the covariance kept
+//! symmetric and within its prior.
 //! State `[Om, vp, us, va, Qd, Om_f]`; `Om_f` is the speed behind the rig's filter, which is what is
 //! measured. Shaft and water follow Model 2 (with swirl where the model has it) by midpoint steps
 //! of at most what the thruster's fastest pole allows; `va` and `Qd` are first-order Gauss-Markov, so that
@@ -18,7 +19,7 @@
 use nalgebra::{SMatrix, SVector};
 
 use super::{ObserverInput, ObserverOptions, Water};
-use crate::model::ControlModel;
+use crate::model::{ControlModel, Slopes};
 use crate::signals::{Estimate, Estimated};
 
 /// Number of states.
@@ -204,7 +205,8 @@ impl Belief {
         self.started = false;
     }
 
-    /// Scalar update with sensitivities `ph = P h`, innovation variance `s`; Joseph form, expanded.
+    /// Scalar update with sensitivities `ph = P h` and innovation variance `s`. With the optimal gain
+    /// `ph / s` the Joseph form `(I - K h')P(I - K h')' + K r K'` comes down to `P - ph ph' / s`.
     pub(super) fn update(&mut self, channel: usize, innovation: f64, ph: Vector, s: f64, dt: f64) {
         match self.gates[channel].judge(innovation, s, dt) {
             Verdict::Use => {}
@@ -220,8 +222,11 @@ impl Belief {
         }
         let k = ph / s;
         self.x += k * innovation;
-        // (I - K h')P(I - K h')' + K r K' = P - K ph' - ph K' + s K K'
-        self.p += k * k.transpose() * s - k * ph.transpose() - ph * k.transpose();
+        for j in 0..N {
+            for i in 0..N {
+                self.p[(i, j)] -= k[i] * ph[j];
+            }
+        }
     }
 
     pub(super) fn linear(&mut self, channel: usize, state: usize, value: f64, variance: f64, dt: f64) {
@@ -230,9 +235,30 @@ impl Belief {
         self.update(channel, value - self.x[state], ph, s, dt);
     }
 
+    /// `P h` and `h' P h` of thrust, `h` its slopes by speed, flow and swirl.
+    fn thrust_doubt(&self, model: &ControlModel, s: &Slopes) -> (Vector, f64) {
+        let h = [
+            (SPEED, model.blade.lever_m() * s.thrust_by_tangential),
+            (FLOW, s.thrust_by_axial),
+            (SWIRL, -s.thrust_by_tangential),
+        ];
+        let mut ph = Vector::zeros();
+        for (k, slope) in h {
+            for i in 0..N {
+                ph[i] += slope * self.p[(i, k)];
+            }
+        }
+        (ph, h.iter().map(|(k, slope)| slope * ph[*k]).sum())
+    }
+
     /// Symmetry, positive diagonals, states in their box.
     pub(super) fn tidy(&mut self, model: &ControlModel) {
-        self.p = 0.5 * (self.p + self.p.transpose());
+        for i in 0..N {
+            for j in 0..i {
+                let mean = 0.5 * (self.p[(i, j)] + self.p[(j, i)]);
+                (self.p[(i, j)], self.p[(j, i)]) = (mean, mean);
+            }
+        }
         for i in 0..N {
             let floor = 1e-12 * self.noise.prior[i];
             let ceiling = 4.0 * self.noise.prior[i].max(1e-300);
@@ -271,8 +297,8 @@ impl Belief {
     pub(super) fn estimate(&self, model: &ControlModel) -> Estimate {
         let of = |i: usize| Estimated { value: self.x[i], std_error: self.p[(i, i)].max(0.0).sqrt() };
         let s = model.slopes(model.blade.inflow(self.x[SPEED], self.x[FLOW], self.x[SWIRL]));
-        let h = thrust_row(model, &s);
-        let thrust_var = (h.transpose() * self.p * h)[0].max(0.0);
+        let (_, variance) = self.thrust_doubt(model, &s);
+        let thrust_var = variance.max(0.0);
         Estimate {
             shaft_speed_rad_s: of(SPEED),
             flow_m_s: of(FLOW),
@@ -285,12 +311,28 @@ impl Belief {
     }
 }
 
-fn thrust_row(model: &ControlModel, s: &crate::model::Slopes) -> Vector {
-    let mut h = Vector::zeros();
-    h[SPEED] = model.blade.lever_m() * s.thrust_by_tangential;
-    h[FLOW] = s.thrust_by_axial;
-    h[SWIRL] = -s.thrust_by_tangential;
-    h
+/// How a next state follows from a state, to first order: the rows of `f` hold few entries, and
+/// what is zero is left out. Gives `f p f'` of a symmetric `p`.
+fn carried(f: &Matrix, p: &Matrix) -> Matrix {
+    let once = by_transpose(p, f).transpose();
+    by_transpose(&once, f)
+}
+
+/// `a b'`.
+#[inline(always)]
+fn by_transpose(a: &Matrix, b: &Matrix) -> Matrix {
+    let mut out = Matrix::zeros();
+    for i in 0..N {
+        for k in 0..N {
+            let factor = b[(i, k)];
+            if factor != 0.0 {
+                for j in 0..N {
+                    out[(j, i)] += factor * a[(j, k)];
+                }
+            }
+        }
+    }
+    out
 }
 
 /// A running EKF.
@@ -320,10 +362,8 @@ impl Ekf {
         if let Some(thrust) = input.measured.thrust_n.filter(|_| self.options.use_thrust) {
             let x = &self.belief.x;
             let s = model.slopes(model.blade.inflow(x[SPEED], x[FLOW], x[SWIRL]));
-            let h = thrust_row(model, &s);
-            let ph = self.belief.p * h;
-            let variance = h.dot(&ph) + thrust_var;
-            self.belief.update(1, thrust - s.thrust_n, ph, variance, dt);
+            let (ph, variance) = self.belief.thrust_doubt(model, &s);
+            self.belief.update(1, thrust - s.thrust_n, ph, variance + thrust_var, dt);
         }
         if let Some(flow) = input.measured.flow_m_s.filter(|_| self.options.use_flow) {
             self.belief.linear(2, FLOW, flow, flow_var, dt);
@@ -336,7 +376,7 @@ impl Ekf {
         let b = &mut self.belief;
         let f = transition(model, &b.x, &b.noise, dt);
         b.x = b.noise.advance(model, &b.x, motor_n_m, dt);
-        b.p = f * b.p * f.transpose();
+        b.p = carried(&f, &b.p);
         for i in 0..N {
             b.p[(i, i)] += b.noise.process[i] * dt;
         }
@@ -374,7 +414,7 @@ fn transition(model: &ControlModel, x: &Vector, noise: &Noise, dt: f64) -> Matri
         a[(SWIRL, j)] *= swirl_step;
     }
     let step = a * dt;
-    let mut f = Matrix::identity() + step + step * step * 0.5;
+    let mut f = Matrix::identity() + step + by_transpose(&step, &step.transpose()) * 0.5;
     let keep = filter_keep(model, dt);
     for j in 0..N {
         f[(FILTERED, j)] = 0.5 * (1.0 - keep) * f[(SPEED, j)];
@@ -389,6 +429,16 @@ fn transition(model: &ControlModel, x: &Vector, noise: &Noise, dt: f64) -> Matri
 mod tests {
     use super::*;
     use crate::model::tests::stand;
+
+    #[test]
+    fn a_sparse_product_is_the_dense_one() {
+        let f =
+            Matrix::from_fn(|i, j| if (i * j) % 3 == 1 { 0.0 } else { (i as f64 - 2.5) * (j as f64 + 0.7) });
+        let a = Matrix::from_fn(|i, j| ((i * 7 + j * 3) % 5) as f64 - 2.0);
+        let p = a * a.transpose();
+        assert!((carried(&f, &p) - f * p * f.transpose()).abs().max() < 1e-9);
+        assert!((by_transpose(&a, &f) - a * f.transpose()).abs().max() < 1e-12);
+    }
 
     #[test]
     fn transition_agrees_with_differences() {

@@ -1,9 +1,10 @@
 //! Load-torque observer: what the water asks of the shaft, without a model of the water.
 //!
-//! Reference: Smogeli 2006; physics.md D7: `Om^' = (tau - Q^ - Qf)/I + l1 e`, `Q^' = -l2 e`,
+//! Reference: Smogeli 2006; docs/control.md D7: `Om^' = (tau - Q^ - Qf)/I + l1 e`, `Q^' = -l2 e`,
 //! `e = Om - Om^`; a shaft that spins faster than expected carries less load. The poles lie five
 //! times slower than the speed filter, which is not modelled.
 //!
+//! Assumes: inertia, torque constant and friction known; the load changes slower than the observer.
 //! Needs measured: shaft speed; motor torque measured or commanded.
 //! Fails: slower than the load it watches; friction and torque-constant errors count as load.
 

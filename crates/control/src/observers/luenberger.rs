@@ -1,7 +1,7 @@
 //! Luenberger observer of shaft, flow and ambient flow.
 //!
 //! Reference: after Fossen & Blanke 2000 (flow observer of a three-state thruster); gains from
-//! physics.md D8. With `e = Om - Om^`, the speed filter carried as a state:
+//! docs/control.md D8. With `e = Om - Om^`, the speed filter carried as a state:
 //! `Om^' = (kt im - Q^ - Qf)/I + l1 e`, `v^' = (T^ - dbeta rho a (v^ - va^)|v^|)/m + l2 sgn(Om) e`.
 //! Both poles are placed at `-p`, `p` from the lags of the speed measurement:
 //! `l2 = T_Om/m + (p - lambda)^2 I/|Q_v|`, scheduled on the slopes; below a tenth of top speed `Q_v`

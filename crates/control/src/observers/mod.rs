@@ -149,6 +149,7 @@ struct Water {
 type Rates = [f64; 4];
 
 impl Water {
+    #[inline]
     fn rates(&self, model: &ControlModel, motor_n_m: f64) -> Rates {
         let load = model.load(self.speed_rad_s, self.flow_m_s, self.swirl_m_s);
         [
@@ -160,6 +161,7 @@ impl Water {
         ]
     }
 
+    #[inline]
     fn moved(&self, rates: Rates, dt_s: f64) -> Self {
         Self {
             speed_rad_s: self.speed_rad_s + rates[0] * dt_s,
@@ -182,6 +184,7 @@ impl Water {
     }
 
     /// Held inside what the thruster can reach, so that no input leads to an overflow.
+    #[inline]
     fn boxed(mut self, model: &ControlModel) -> Self {
         let speed = 2.0 * model.speed_max_rad_s;
         let flow = 3.0 * model.map.flow_m * model.speed_max_rad_s + 4.0;

@@ -1,6 +1,6 @@
 //! Open-loop flow: the momentum balance driven by the measured speed.
 //!
-//! Reference: physics.md D4, `m vp' = T(Om, v^) - dbeta rho a (v^ - va)|v^|`; it contracts by itself
+//! Reference: docs/control.md D4, `m vp' = T(Om, v^) - dbeta rho a (v^ - va)|v^|`; it contracts by itself
 //! (38 ms at 60 rad/s on the stand), so it needs no correction while the model holds.
 //!
 //! Assumes: still water, unless the ambient flow is measured. Needs measured: shaft speed.
@@ -20,18 +20,19 @@ impl OpenLoop {
     /// One step.
     pub fn tick(&mut self, input: &ObserverInput) -> Estimate {
         let model = input.model;
-        let motor = model.torque_constant_nm_a * input.current_a;
-        let before = self.water;
-        self.water = self.water.step(model, motor, input.dt_s);
-        if let Some(speed) = input.measured.shaft_speed_rad_s {
-            // The measured speed drives the water; the model's is for when there is none.
-            let mean = Water { speed_rad_s: speed, ..before };
-            self.water =
-                mean.step(model, model.load(speed, before.flow_m_s, before.swirl_m_s).torque_n_m, input.dt_s);
-            self.water.speed_rad_s = speed;
-        }
-        self.water.ambient_m_s = input.measured.ambient_m_s.unwrap_or(0.0);
-        self.water = self.water.boxed(model);
+        self.water = match input.measured.shaft_speed_rad_s {
+            // The measured speed drives the water, under the load that keeps it where it is.
+            Some(speed) => {
+                let driven = Water { speed_rad_s: speed, ..self.water };
+                let load = model.load(speed, driven.flow_m_s, driven.swirl_m_s);
+                let stepped = driven.step(model, load.torque_n_m, input.dt_s);
+                Water { speed_rad_s: speed, ..stepped }
+            }
+            // The model's own speed is for when there is none.
+            None => self.water.step(model, model.torque_constant_nm_a * input.current_a, input.dt_s),
+        };
+        // Within the box that a step leaves the rest in.
+        self.water.ambient_m_s = input.measured.ambient_m_s.unwrap_or(0.0).clamp(-4.0, 4.0);
         self.water.estimate(model)
     }
 }

@@ -1,11 +1,14 @@
 //! Unscented Kalman filter with the state of the EKF.
 //!
-//! Reference: Julier & Uhlmann 1997; physics.md D8 recommends it near standstill, where `|Om|` and
+//! Reference: Julier & Uhlmann 1997; docs/control.md D8 recommends it near standstill, where `|Om|` and
 //! `|vp|` have kinks that a slope does not see. `2n + 1` points with `kappa = 1`; all weights are positive,
 //! so the covariance stays one. Speed and flow are linear in the state and take the scalar
 //! update of the EKF; thrust takes a second set of points.
 //!
-//! Assumes, needs, fails: as `ekf`, at about three times its cost.
+//! Assumes: blade coefficients, inertia and torque constant known, as `ekf`.
+//! Needs measured: shaft speed and current; thrust, flow and ambient where there are any.
+//! Fails: as `ekf`, model error goes into load or inflow; at several times the cost of `ekf`, for little
+//! away from standstill.
 
 use super::ekf::{Belief, FILTERED, FLOW, Matrix, N, SPEED, SWIRL, Vector};
 use super::{ObserverInput, ObserverOptions};

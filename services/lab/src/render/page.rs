@@ -89,7 +89,9 @@ impl Page {
 
 /// A table; cells that read as numbers stand right.
 pub fn table(head: &[&str], rows: &[Vec<String>]) -> Markup {
-    let numeric = |text: &str| text.trim_end_matches(" %").trim_start_matches("± ").parse::<f64>().is_ok();
+    let numeric = |text: &str| {
+        text.trim_end_matches(" %").trim_start_matches("± ").split(" ± ").all(|x| x.parse::<f64>().is_ok())
+    };
     let right: Vec<bool> = (0..head.len())
         .map(|i| {
             let cells: Vec<&String> = rows.iter().filter_map(|r| r.get(i)).filter(|c| *c != "-").collect();

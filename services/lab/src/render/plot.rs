@@ -12,6 +12,8 @@ pub enum Mark {
     Dashed,
     /// A dot a point.
     Dots,
+    /// A large dot a point, the series' name beside it.
+    Named,
 }
 
 /// One series.
@@ -90,9 +92,9 @@ impl Chart {
                 @if drawn.is_some() { (PreEscaped(svg)) } @else { p class="soft" { "nothing to draw" } }
                 figcaption {
                     (self.caption)
-                    @for (i, s) in self.series.iter().enumerate().filter(|(_, s)| !s.name.is_empty()) {
+                    @for (i, s) in self.series.iter().enumerate().filter(|(_, s)| !s.name.is_empty() && s.mark != Mark::Named) {
                         " " span style=(format!("color:{};white-space:nowrap", hex(i))) {
-                            (match s.mark { Mark::Line => "━ ", Mark::Dashed => "╌ ", Mark::Dots => "● " }) (s.name)
+                            (match s.mark { Mark::Line => "━ ", Mark::Dashed => "╌ ", _ => "● " }) (s.name)
                         }
                     }
                 }
@@ -114,7 +116,8 @@ impl Chart {
             let size = high - low;
             if size > 0.0 { 0.04 * size } else { 0.5 * low.abs().max(1.0) }
         };
-        let (px, py) = (if b[1] > b[0] { 0.0 } else { pad(b[0], b[1]) }, pad(b[2], b[3]));
+        let named = self.series.iter().any(|s| s.mark == Mark::Named);
+        let (px, py) = (if b[1] > b[0] && !named { 0.0 } else { pad(b[0], b[1]) }, pad(b[2], b[3]));
         Some([b[0] - px, b[1] + px, b[2] - py, b[3] + py])
     }
 
@@ -145,9 +148,14 @@ impl Chart {
                 .filter(|s| s.1 > b[0] && s.0 < b[1])
                 .map(|s| Rectangle::new([(s.0.max(b[0]), b[2]), (s.1.min(b[1]), b[3])], shade)),
         )?;
+        let mut labels = Labels::default();
         for (i, series) in self.series.iter().enumerate() {
             let colour = COLOURS[i % COLOURS.len()];
             match series.mark {
+                Mark::Named => {
+                    chart.draw_series(series.points.iter().map(|p| Circle::new(*p, 5, colour.filled())))?;
+                    labels.0.extend(series.points.iter().map(|p| (chart.backend_coord(p), i)));
+                }
                 Mark::Dots => {
                     let every = series.points.len().div_ceil(DOTS).max(1);
                     let finite = |p: &&(f64, f64)| p.0.is_finite() && p.1.is_finite();
@@ -172,9 +180,47 @@ impl Chart {
                 }
             }
         }
+        for (dot, at, i) in labels.placed(|i| self.series[i].name.len()) {
+            let colour = COLOURS[i % COLOURS.len()];
+            if (at.1 - dot.1).abs() > LABEL_PX / 2 {
+                root.draw(&PathElement::new(vec![dot, at], colour.stroke_width(1)))?;
+            }
+            let style = TextStyle::from(("sans-serif", 14).into_font()).color(&colour);
+            root.draw(&Text::new(self.series[i].name.clone(), (at.0, at.1 - 7), style))?;
+        }
         root.present()?;
         drop(chart);
         Ok(())
+    }
+}
+
+/// Height of a label and width of one of its letters, pixels.
+const LABEL_PX: i32 = 15;
+const LETTER_PX: i32 = 8;
+
+/// Names beside dots: where the dot is, and whose.
+#[derive(Default)]
+struct Labels(Vec<((i32, i32), usize)>);
+
+impl Labels {
+    /// Dot, place of the label and its series; from the top down, a label that would cover another
+    /// goes further down.
+    fn placed(mut self, letters: impl Fn(usize) -> usize) -> Vec<((i32, i32), (i32, i32), usize)> {
+        self.0.sort_by_key(|((_, y), _)| *y);
+        let mut placed: Vec<((i32, i32), (i32, i32), usize)> = Vec::new();
+        let width = |i: usize| LETTER_PX * letters(i) as i32;
+        for (dot, i) in self.0 {
+            let right = dot.0 + 9 + width(i) < WIDTH as i32;
+            let mut at = (if right { dot.0 + 9 } else { dot.0 - 9 - width(i) }, dot.1);
+            for (_, other, j) in &placed {
+                let apart = other.0 > at.0 + width(i) || at.0 > other.0 + width(*j);
+                if !apart && (at.1 - other.1).abs() < LABEL_PX {
+                    at.1 = other.1 + LABEL_PX;
+                }
+            }
+            placed.push((dot, at, i));
+        }
+        placed
     }
 }
 
@@ -219,6 +265,18 @@ mod tests {
         let thin = runs(&points);
         assert!(thin[0].len() <= 2 * LINE_POINTS);
         assert!(thin[0].iter().any(|p| p.1 == 7.0));
+    }
+
+    #[test]
+    fn labels_do_not_cover_each_other() {
+        let labels = Labels(vec![((100, 50), 0), ((104, 52), 1), ((110, 49), 2), ((880, 50), 3)]);
+        let placed = labels.placed(|_| 10);
+        for (k, a) in placed.iter().enumerate() {
+            assert!(a.1.0 >= 0 && a.1.0 + 80 < 900, "{a:?}");
+            for b in &placed[k + 1..] {
+                assert!((a.1.1 - b.1.1).abs() >= LABEL_PX || (a.1.0 - b.1.0).abs() > 80, "{a:?} {b:?}");
+            }
+        }
     }
 
     #[test]

@@ -28,6 +28,8 @@ pub struct Chain {
     sequence: u64,
     command: Option<Command>,
     setpoint: Setpoint,
+    /// The setpoint was given while armed: one that came with the arming does not count yet.
+    given_armed: bool,
     disarmed_s: f64,
     /// Fault bits that the servo has latched since start, and how often it went off by itself.
     trips: u32,
@@ -63,6 +65,7 @@ impl Chain {
             sequence: 0,
             command: None,
             setpoint: Setpoint::default(),
+            given_armed: false,
             disarmed_s: OPERATOR_S,
             trips: 0,
             was_armed: false,
@@ -146,9 +149,9 @@ impl Chain {
                 self.was_armed = self.servo.armed();
             }
         }
-        // A setpoint counts if it was given after the arming.
-        let changed = self.setpoint.value != thrust_n || !armed;
-        if changed {
+        // A setpoint counts if it was given after the arming; `armed` is as the servo ticked.
+        if self.setpoint.value != thrust_n || !armed || !self.given_armed {
+            self.given_armed = armed;
             self.setpoint.generation += 1;
             self.setpoint.given_at_ns = now;
             self.setpoint.kind = SetpointKind::Thrust as u32;
@@ -190,5 +193,30 @@ fn settings(rig: &Rig, controller: &Controller, period_ns: u64) -> Settings {
             spike_rad_s: 10.0 * fastest + 4.0 * model.speed_quantum_rad_s,
             winding: (model.winding_resistance_ohm.unwrap_or(f64::NAN), model.torque_constant_nm_a),
         },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use kort_thruster::rig::Rig;
+
+    const RIG: &str = include_str!("../../../../config/thrusters/whitcomb-yoerger-1999.toml");
+
+    /// A reference that never changes is followed from the first ticks, and again after a fault.
+    #[test]
+    fn a_constant_setpoint_counts_after_every_arming() {
+        let rig = Rig::from_toml(RIG).unwrap();
+        let mut chain = Chain::new(&rig, &ControllerConfig::default(), 1e-3).unwrap();
+        let still = Signals { shaft_speed_rad_s: 0.0, current_a: 0.0, ..Signals::UNKNOWN };
+        let drives = |chain: &mut Chain, ticks: u32| {
+            (0..ticks).map(|_| chain.tick(&still, 50.0, true).command).fold(0.0, f64::max)
+        };
+        assert!(drives(&mut chain, 20) > 1.0);
+        for _ in 0..20 {
+            chain.tick(&still, 50.0, false);
+        }
+        assert_eq!((chain.trips(), drives(&mut chain, 100)), (1, 0.0), "off until the operator acts");
+        assert!(drives(&mut chain, 600) > 1.0);
     }
 }

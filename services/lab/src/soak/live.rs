@@ -105,7 +105,7 @@ fn drive(
     random.set_stream(1);
     let mut player = Player::new(&l.scenario.references, &l.replayed, random);
     let dt = 1.0 / RATE_HZ;
-    let resistance = l.rig.motor.winding_resistance_ohm.map_or(0.0, |r| r.value);
+    let resistance = l.rig.motor.winding_resistance_ohm.map(|r| r.value);
     let mut tally = Tally::new(
         dt,
         l.thrust_max_n,

@@ -10,15 +10,18 @@ mod run;
 mod scenario;
 mod score;
 mod sea;
+mod truth;
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use kort_control::{ConfigError, ControlModel, ControllerConfig, LawKind, ModelError};
-use kort_recording::Recording;
 use kort_thruster::rig::Rig;
 use rayon::prelude::*;
 use thiserror::Error;
+
+use crate::failure::Failure;
+use crate::files;
 
 pub use live::{LiveError, live};
 pub use metrics::{Metrics, MetricsError};
@@ -26,7 +29,7 @@ pub use page::page;
 use reference::Replayed;
 pub use report::Report;
 use report::{LawResult, ScenarioResult};
-use run::Prepared;
+use run::{Knows, Prepared};
 use scenario::{Scenario, ScenarioError, Segment};
 use score::Outcome;
 
@@ -57,13 +60,16 @@ pub enum SoakError {
         source: ConfigError,
     },
     /// A recording to replay.
-    #[error("{file}: {message}")]
+    #[error("replay of {file}: {message}")]
     Replay {
         /// The recording.
         file: String,
         /// What is wrong.
         message: String,
     },
+    /// A recording or column map that cannot be read; its words name it.
+    #[error(transparent)]
+    Input(#[from] Failure),
     /// No controller can be designed for the rig.
     #[error("{file}: {source}")]
     Model {
@@ -87,6 +93,13 @@ pub struct Loaded {
     seeds: u32,
 }
 
+impl Loaded {
+    /// Virtual time that one law takes with one seed, s.
+    fn virtual_s(&self) -> f64 {
+        self.scenario.duration_s * if self.scenario.against_true_parameters { 2.0 } else { 1.0 }
+    }
+}
+
 /// Reads a scenario, its rig, its recordings and the controllers to compare.
 ///
 /// # Errors
@@ -102,7 +115,11 @@ pub fn load(path: &Path, controllers: Option<&[String]>, seeds: Option<u32>) -> 
         .iter()
         .map(|name| Ok((name.clone(), controller(name, folder)?)))
         .collect::<Result<_, SoakError>>()?;
-    let replayed = scenario.references.iter().map(|s| replay(s, folder)).collect::<Result<_, _>>()?;
+    let replayed = scenario
+        .references
+        .iter()
+        .map(|s| replay(s, folder, model.thrust_max_n))
+        .collect::<Result<_, _>>()?;
     let seeds = seeds.unwrap_or(scenario.seeds);
     Ok(Loaded { scenario, rig, replayed, thrust_max_n: model.thrust_max_n, controllers, seeds })
 }
@@ -131,29 +148,27 @@ fn controller(name: &str, folder: &Path) -> Result<ControllerConfig, SoakError> 
 }
 
 /// The column a segment replays; `None` for other segments.
-fn replay(segment: &Segment, folder: &Path) -> Result<Option<Replayed>, SoakError> {
-    let Segment::Replay { file, column, peak } = segment else { return Ok(None) };
-    let path = folder.join(file);
-    let error = |message: String| SoakError::Replay { file: path.display().to_string(), message };
-    let (times, values) = replayed_column(&path, column).map_err(error)?;
-    let largest = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-    if largest <= 0.0 || times.is_empty() {
+fn replay(segment: &Segment, folder: &Path, thrust_max_n: f64) -> Result<Option<Replayed>, SoakError> {
+    let Segment::Replay { file, columns, column, peak } = segment else { return Ok(None) };
+    let error = |message: String| SoakError::Replay { file: file.clone(), message };
+    let map = files::read_columns(columns.as_deref())?;
+    let recording = files::replayed_recording(file, Some(folder), map.as_ref())?;
+    let values = recording.column(column).ok_or_else(|| {
+        let names: Vec<&str> = recording.columns.iter().map(|c| c.name.as_str()).collect();
+        error(format!("there is no column `{column}`\nhint: it has {}", names.join(", ")))
+    })?;
+    let sampled: Vec<(f64, f64)> =
+        recording.time_s.iter().copied().zip(values.iter().copied()).filter(|(_, v)| v.is_finite()).collect();
+    let largest = sampled.iter().fold(0.0_f64, |m, (_, v)| m.max(v.abs()));
+    if largest <= 0.0 {
         return Err(error(format!("column `{column}` has no value but zero\nhint: name another `column`")));
     }
-    let start = times[0];
+    let scale = peak.map_or(1.0 / thrust_max_n, |peak| peak / largest);
+    let start = sampled[0].0;
     Ok(Some(Replayed {
-        time_s: times.iter().map(|t| t - start).collect(),
-        share: values.iter().map(|v| v * peak / largest).collect(),
+        time_s: sampled.iter().map(|(t, _)| t - start).collect(),
+        share: sampled.iter().map(|(_, v)| (v * scale).clamp(-1.0, 1.0)).collect(),
     }))
-}
-
-/// Times and values of a column where it is sampled.
-fn replayed_column(path: &Path, column: &str) -> Result<(Vec<f64>, Vec<f64>), String> {
-    let recording = Recording::read(path, None).map_err(|e| e.to_string())?;
-    let values = recording.column(column).ok_or_else(|| {
-        format!("there is no column `{column}`\nhint: a recording with thrust commands has `thrust_cmd_n`")
-    })?;
-    Ok(recording.time_s.iter().zip(values).filter(|(_, v)| v.is_finite()).map(|(t, v)| (*t, *v)).unzip())
 }
 
 /// Where a run stands, for whoever looks on.
@@ -174,7 +189,7 @@ pub fn soak(loaded: &[Loaded], seed: u64, jobs: usize, watch: &Watch) -> Result<
         .enumerate()
         .flat_map(|(s, l)| (0..l.controllers.len()).flat_map(move |c| (0..l.seeds).map(move |k| (s, c, k))))
         .collect();
-    let virtual_s: f64 = runs.iter().map(|(s, ..)| loaded[*s].scenario.duration_s).sum();
+    let virtual_s: f64 = runs.iter().map(|(s, ..)| loaded[*s].virtual_s()).sum();
     let bar = crate::progress::bar(virtual_s as u64, "virtual seconds");
     let done_ms = AtomicU64::new(0);
     let outcomes: Vec<Result<Outcome, SoakError>> = pool.install(|| {
@@ -189,17 +204,28 @@ pub fn soak(loaded: &[Loaded], seed: u64, jobs: usize, watch: &Watch) -> Result<
                     thrust_max_n: l.thrust_max_n,
                 };
                 let last = AtomicU64::new(0);
-                let progress = |share: f64, rms_n: f64, energy_j: f64| {
-                    let now = (share * l.scenario.duration_s * 1e3) as u64;
+                let moved = |virtual_s: f64| {
+                    let now = (virtual_s * 1e3) as u64;
                     let before = last.swap(now, Ordering::Relaxed);
                     let total = done_ms.fetch_add(now - before, Ordering::Relaxed) + now - before;
                     bar.set_position(total / 1000);
+                };
+                let progress = |share: f64, rms_n: f64, energy_j: f64| {
+                    moved(share * l.scenario.duration_s);
                     if let Some(metrics) = watch.metrics {
                         metrics.progress(name, &l.scenario.name, k, share, rms_n, energy_j);
                     }
                 };
-                run::run(&prepared, config, seed.wrapping_add(u64::from(k)), &progress)
-                    .map_err(|source| SoakError::Model { file: l.scenario.name.clone(), source })
+                let seed = seed.wrapping_add(u64::from(k));
+                let failed = |source| SoakError::Model { file: l.scenario.name.clone(), source };
+                let mut outcome =
+                    run::run(&prepared, config, seed, Knows::Stated, &progress).map_err(failed)?;
+                if l.scenario.against_true_parameters {
+                    let progress = |share: f64, _: f64, _: f64| moved((1.0 + share) * l.scenario.duration_s);
+                    let told = run::run(&prepared, config, seed, Knows::Truth, &progress).map_err(failed)?;
+                    outcome.compare(&told);
+                }
+                Ok(outcome)
             })
             .collect()
     });
@@ -224,4 +250,26 @@ pub fn soak(loaded: &[Loaded], seed: u64, jobs: usize, watch: &Watch) -> Result<
         virtual_s / took.max(1e-9)
     );
     Ok(Report::new(loaded.iter().map(|l| l.scenario.duration_s).sum(), virtual_s, scenarios))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_shipped_scenario_loads() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../config/scenarios");
+        let mut names = Vec::new();
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.file_name().is_some_and(|n| n.to_string_lossy().starts_with("soak-")) {
+                let loaded = load(&path, None, None).unwrap_or_else(|e| panic!("{e}"));
+                names.push(loaded.scenario.name);
+            }
+        }
+        names.sort();
+        let count = names.len();
+        names.dedup();
+        assert!(count >= 12 && names.len() == count, "{names:?}");
+    }
 }

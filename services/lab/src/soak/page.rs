@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use super::report::{LawResult, Report, ScenarioResult};
+use super::report::{LawResult, OF_PLAIN, Report, ScenarioResult};
 use super::score::{Point, SCORES, Score};
 use crate::render::{Chart, Mark, Page, Series, facts, note, number, table};
 
@@ -11,7 +11,7 @@ pub fn page(report: &Report) -> String {
     let mut page = Page::new(
         "Controllers compared",
         format!(
-            "kort soak: {:.0} virtual seconds; figures are means over seeds with 95 % intervals",
+            "kort soak: {:.0} virtual seconds; figures are means over seeds ± half their 95 % interval",
             report.virtual_seconds
         ),
     );
@@ -35,45 +35,99 @@ fn scenario(s: &ScenarioResult) -> Markup {
     }
 }
 
+/// Tables of the scores: heading, and what stands in it.
+const TABLES: [(&str, &[(&str, &str)]); 3] = [
+    (
+        "Thrust",
+        &[
+            ("thrust_rms_n", "RMS error [N]"),
+            (OF_PLAIN, "of plain"),
+            ("thrust_p95_n", "95 % below [N]"),
+            ("thrust_bias_n", "mean [N]"),
+            ("rise_time_s", "rise [s]"),
+            ("settle_time_s", "settle [s]"),
+            ("overshoot_pct", "overshoot [%]"),
+        ],
+    ),
+    (
+        "Energy and wear",
+        &[
+            ("energy_j", "energy [J]"),
+            ("energy_per_impulse_j_n_s", "J per N s"),
+            ("copper_loss_per_impulse_j_n_s", "I²R J per N s"),
+            ("saturation_share", "at a limit"),
+            ("current_travel_a_s", "wear [A/s]"),
+        ],
+    ),
+    (
+        "Estimates, faults, limits",
+        &[
+            ("flow_rms_m_s", "flow error [m/s]"),
+            ("parameter_error", "parameter error"),
+            ("error_over_true_parameters", "error, times that told the truth"),
+            ("faults_injected", "faults"),
+            ("faults_survived", "survived"),
+            ("trips", "trips"),
+            ("limits_broken", "limits broken"),
+        ],
+    ),
+];
+
 fn scores(s: &ScenarioResult) -> Markup {
-    let columns: Vec<&str> =
-        SCORES.iter().map(|(n, _)| *n).filter(|n| s.laws.iter().any(|l| l.score(n).is_some())).collect();
+    html! {
+        @for (heading, columns) in TABLES {
+            h3 { (heading) }
+            (scores_of(s, columns))
+        }
+    }
+}
+
+fn scores_of(s: &ScenarioResult, columns: &[(&str, &str)]) -> Markup {
+    let columns: Vec<_> =
+        columns.iter().filter(|(score, _)| s.laws.iter().any(|l| s.figure(l, score).is_some())).collect();
     let mut head = vec!["controller"];
-    head.extend(&columns);
+    head.extend(columns.iter().map(|(_, words)| *words));
     let rows: Vec<Vec<String>> = s
         .laws
         .iter()
         .map(|l| {
-            let name = if l.efficient(&s.laws) { format!("{} *", l.name) } else { l.name.clone() };
+            let name = if l.efficient(&s.laws) { format!("{}\u{a0}*", l.name) } else { l.name.clone() };
             std::iter::once(name)
-                .chain(columns.iter().map(|c| l.score(c).map_or_else(|| "-".into(), cell)))
+                .chain(columns.iter().map(|(score, _)| s.figure(l, score).map_or_else(|| "-".into(), cell)))
                 .collect()
         })
         .collect();
     table(&head, &rows)
 }
 
+/// Mean and half the width of its interval, the latter to two digits.
 fn cell(score: Score) -> String {
-    if score.ci95[0] == score.ci95[1] {
+    let half = 0.5 * (score.ci95[1] - score.ci95[0]);
+    if score.mean.is_nan() {
+        "not known".into()
+    } else if half == 0.0 {
         number(score.mean)
     } else {
-        format!("{} ({} to {})", number(score.mean), number(score.ci95[0]), number(score.ci95[1]))
+        let digits = (1 - half.log10().floor() as i32).clamp(0, 5) as usize;
+        format!("{:.digits$} ± {half:.digits$}", score.mean)
     }
 }
 
 fn pareto(s: &ScenarioResult) -> Markup {
-    let mut chart = Chart::new(
-        "Thrust error against energy: nearer the lower left corner is better",
-        "thrust error [N RMS]",
-        "energy [kJ]",
-    );
+    let words = "Thrust error against energy: nearer the lower left corner is better; the dashed line joins \
+                 the laws (*) that no other betters in both";
+    let mut chart = Chart::new(words, "thrust error [N RMS]", "energy [kJ]");
+    chart.height = 420;
+    let place = |l: &LawResult| (l.mean("thrust_rms_n"), 1e-3 * l.mean("energy_j"));
+    let finite = |(x, y): &(f64, f64)| x.is_finite() && y.is_finite();
     for l in &s.laws {
-        let (x, y) = (l.mean("thrust_rms_n"), 1e-3 * l.mean("energy_j"));
-        if x.is_finite() && y.is_finite() {
-            chart = chart.with(Series::new(l.name.clone(), Mark::Dots, &[x], &[y]));
-        }
+        let at = place(l);
+        chart = chart.with(Series { name: l.name.clone(), mark: Mark::Named, points: vec![at] });
     }
-    chart.draw()
+    let mut front: Vec<(f64, f64)> =
+        s.laws.iter().filter(|l| l.efficient(&s.laws)).map(place).filter(finite).collect();
+    front.sort_by(|a, b| a.0.total_cmp(&b.0));
+    chart.with(Series { name: String::new(), mark: Mark::Dashed, points: front }).draw()
 }
 
 /// The best, the plain and the worst law, each once.

@@ -1,22 +1,27 @@
 //! The comparison: scores with intervals over seeds, a verdict in words, text and JSON.
 
+use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use serde_json::{Map, Value, json};
 
-use super::score::{Outcome, SCORES, Score, Window, summarise};
+use super::score::{Outcome, SCORES, Score, Window, summarise, summarise_ratios};
 
 /// The plain law that the others are measured against.
 const PLAIN: &str = "velocity_servo";
+/// What is compared with the plain law's, seed by seed.
+const AGAINST_PLAIN: [&str; 3] = ["thrust_rms_n", "energy_j", "energy_per_impulse_j_n_s"];
+/// What adaptation is held to: error over that with true parameters.
+const RECOVERED: f64 = 1.2;
 
 /// One controller in one scenario.
 pub struct LawResult {
     /// Name of the controller.
     pub name: String,
-    /// Scores over seeds, in the order of [`SCORES`].
+    /// Scores over seeds, in the order of [`SCORES`]; NaN is not known.
     pub scores: Vec<(&'static str, Score)>,
-    /// Thrust RMS and energy by seed, for paired comparison.
-    pub by_seed: Vec<(f64, f64)>,
+    /// Scores seed by seed, for paired comparison.
+    pub by_seed: Vec<BTreeMap<&'static str, f64>>,
     /// Worst window over all seeds.
     pub worst: Window,
 }
@@ -31,13 +36,16 @@ impl LawResult {
                 (!values.is_empty()).then(|| (*score, summarise(&values)))
             })
             .collect();
-        let by_seed = outcomes.iter().map(|o| (o.scores["thrust_rms_n"], o.scores["energy_j"])).collect();
-        let worst = outcomes
-            .into_iter()
-            .map(|o| o.worst)
-            .max_by(|a, b| a.rms_n.total_cmp(&b.rms_n))
-            .unwrap_or_default();
+        let (by_seed, windows): (Vec<_>, Vec<_>) = outcomes.into_iter().map(|o| (o.scores, o.worst)).unzip();
+        let worst = windows.into_iter().max_by(|a, b| a.rms_n.total_cmp(&b.rms_n)).unwrap_or_default();
         Self { name: name.into(), scores, by_seed, worst }
+    }
+
+    /// A score as a multiple of another law's, seed by seed: both met the same sea.
+    pub fn ratio(&self, to: &Self, score: &str) -> Option<Score> {
+        let values: Option<Vec<f64>> =
+            self.by_seed.iter().zip(&to.by_seed).map(|(a, b)| Some(a.get(score)? / b.get(score)?)).collect();
+        values.filter(|v| !v.is_empty()).map(|v| summarise_ratios(&v))
     }
 
     /// A score by name.
@@ -84,16 +92,15 @@ impl ScenarioResult {
         self.laws.iter().min_by(|a, b| a.mean("thrust_rms_n").total_cmp(&b.mean("thrust_rms_n")))
     }
 
+    /// A score, or the thrust error over the plain law's.
+    pub fn figure(&self, law: &LawResult, score: &str) -> Option<Score> {
+        if score == OF_PLAIN { law.ratio(self.plain()?, "thrust_rms_n") } else { law.score(score) }
+    }
+
     /// The plain law, if it ran.
     pub fn plain(&self) -> Option<&LawResult> {
         self.laws.iter().find(|l| l.name == PLAIN)
     }
-}
-
-/// Ratio of two laws' figures, seed by seed: both met the same sea.
-fn ratio(of: &LawResult, to: &LawResult, pick: fn(&(f64, f64)) -> f64) -> Score {
-    let values: Vec<f64> = of.by_seed.iter().zip(&to.by_seed).map(|(a, b)| pick(a) / pick(b)).collect();
-    summarise(&values)
 }
 
 fn interval(s: Score) -> String {
@@ -115,13 +122,19 @@ fn verdict(laws: &[LawResult]) -> String {
     );
     let plain = laws.iter().find(|l| l.name == PLAIN);
     if let Some(plain) = plain.filter(|p| p.name != best.name) {
-        let (error, energy) = (ratio(best, plain, |x| x.0), ratio(best, plain, |x| x.1));
-        let _ = write!(words, ", {} of {PLAIN}'s, for {} of its energy", interval(error), interval(energy));
+        let of = |score| best.ratio(plain, score).map_or_else(|| "an unknown share".into(), interval);
+        let _ = write!(
+            words,
+            ", {} of {PLAIN}'s, for {} of its energy and {} of its energy per newton-second",
+            of(AGAINST_PLAIN[0]),
+            of(AGAINST_PLAIN[1]),
+            of(AGAINST_PLAIN[2])
+        );
     } else if plain.is_some() && order.len() > 1 {
         words += "; the plain law wins here";
     }
-    if let Some(next) = order.get(1) {
-        let lead = ratio(next, best, |x| x.0);
+    if let Some((next, lead)) = order.get(1).and_then(|next| Some((next, next.ratio(best, "thrust_rms_n")?)))
+    {
         if best.by_seed.len() < 2 {
             let _ = write!(
                 words,
@@ -146,6 +159,7 @@ fn verdict(laws: &[LawResult]) -> String {
             );
         }
     }
+    words += &recovered(laws);
     let broken: Vec<&str> =
         laws.iter().filter(|l| l.mean("limits_broken") > 0.0).map(|l| l.name.as_str()).collect();
     if !broken.is_empty() {
@@ -161,6 +175,58 @@ fn verdict(laws: &[LawResult]) -> String {
     }
     words + "."
 }
+
+/// How near the adapting laws come to their error with true parameters, where that was run.
+fn recovered(laws: &[LawResult]) -> String {
+    let of: Vec<(&LawResult, Score)> =
+        laws.iter().filter_map(|l| Some((l, l.score("error_over_true_parameters")?))).collect();
+    if of.is_empty() {
+        return String::new();
+    }
+    let list = |adapts: bool| {
+        let some = of.iter().filter(|(l, _)| l.score("parameter_error").is_some() == adapts);
+        some.map(|(l, s)| format!("{} {}", l.name, interval(*s))).collect::<Vec<_>>().join(", ")
+    };
+    let mut words = format!(
+        ". Error as a multiple of that with true parameters told: {}",
+        [list(true), list(false)]
+            .into_iter()
+            .filter(|l| !l.is_empty())
+            .collect::<Vec<_>>()
+            .join("; without adaptation ")
+    );
+    let adapting = of.iter().filter(|(l, _)| l.score("parameter_error").is_some());
+    let (back, short): (Vec<_>, Vec<_>) = adapting.partition(|(_, s)| s.mean <= RECOVERED);
+    for (laws, which) in [(back, "Back within"), (short, "NOT back within")] {
+        let names: Vec<&str> = laws.iter().map(|(l, _)| l.name.as_str()).collect();
+        if !names.is_empty() {
+            let _ = write!(words, ". {which} {RECOVERED}: {}", names.join(", "));
+        }
+    }
+    words
+}
+
+/// Not a score of its own: thrust error over the plain law's.
+pub const OF_PLAIN: &str = "of plain";
+
+/// Columns of the text: score, heading, digits.
+const COLUMNS: [(&str, &str, usize); 15] = [
+    ("thrust_rms_n", "RMS N", 2),
+    (OF_PLAIN, OF_PLAIN, 3),
+    ("thrust_p95_n", "95 % N", 2),
+    ("rise_time_s", "rise s", 3),
+    ("settle_time_s", "settle s", 3),
+    ("overshoot_pct", "over %", 1),
+    ("energy_per_impulse_j_n_s", "J/Ns", 3),
+    ("copper_loss_per_impulse_j_n_s", "I2R J/Ns", 3),
+    ("saturation_share", "limit", 3),
+    ("current_travel_a_s", "wear A/s", 1),
+    ("flow_rms_m_s", "flow m/s", 3),
+    ("parameter_error", "param", 3),
+    ("error_over_true_parameters", "of true", 3),
+    ("faults_survived", "survived", 1),
+    ("limits_broken", "broken", 0),
+];
 
 /// The whole comparison.
 pub struct Report {
@@ -189,11 +255,17 @@ impl Report {
                     .laws
                     .iter()
                     .map(|l| {
+                        let known = |s: &Score| if s.mean.is_nan() { Value::Null } else { json!(s) };
                         let scores: Map<String, Value> =
-                            l.scores.iter().map(|(n, s)| ((*n).into(), json!(s))).collect();
+                            l.scores.iter().map(|(n, s)| ((*n).into(), known(s))).collect();
+                        let against: Option<Map<String, Value>> = s.plain().map(|plain| {
+                            let ratio = |n: &str| Some((n.into(), known(&l.ratio(plain, n)?)));
+                            AGAINST_PLAIN.into_iter().filter_map(ratio).collect()
+                        });
                         json!({
                             "name": l.name,
                             "scores": scores,
+                            "against_plain": against,
                             "seeds": l.by_seed.len(),
                             "pareto": l.efficient(&s.laws),
                             "worst_window": {
@@ -219,32 +291,20 @@ impl Report {
         let mut out = String::new();
         for s in &self.scenarios {
             let _ = writeln!(out, "{}: {}", s.name, s.what);
-            let columns: &[(&str, &str, usize)] = &[
-                ("thrust_rms_n", "RMS N", 2),
-                ("thrust_p95_n", "95 % N", 2),
-                ("rise_time_s", "rise s", 3),
-                ("settle_time_s", "settle s", 3),
-                ("overshoot_pct", "over %", 1),
-                ("energy_per_impulse_j_n_s", "J/Ns", 3),
-                ("copper_loss_per_impulse_j_n_s", "I2R J/Ns", 3),
-                ("saturation_share", "limit", 3),
-                ("current_travel_a_s", "wear A/s", 1),
-                ("flow_rms_m_s", "flow m/s", 3),
-                ("parameter_error", "param", 3),
-                ("faults_survived", "survived", 1),
-                ("limits_broken", "broken", 0),
-            ];
+            let shown = |score: &str| s.laws.iter().any(|l| s.figure(l, score).is_some());
+            let columns: Vec<_> = COLUMNS.iter().filter(|(score, ..)| shown(score)).collect();
             let wide = s.laws.iter().map(|l| l.name.len()).max().unwrap_or(0).max(10);
             let _ = write!(out, "  {:wide$}", "controller");
-            for (_, head, _) in columns {
+            for (_, head, _) in &columns {
                 let _ = write!(out, " {head:>9}");
             }
             out.push('\n');
             for l in &s.laws {
                 let _ = write!(out, "  {:wide$}", l.name);
-                for (name, _, digits) in columns {
-                    let _ = match l.score(name) {
-                        Some(score) => write!(out, " {:>9.*}", digits, score.mean),
+                for (score, _, digits) in &columns {
+                    let _ = match s.figure(l, score).map(|x| x.mean) {
+                        Some(x) if x.is_nan() => write!(out, " {:>9}", "not known"),
+                        Some(x) => write!(out, " {x:>9.digits$}"),
                         None => write!(out, " {:>9}", "-"),
                     };
                 }

@@ -1,8 +1,9 @@
 //! One controller through one scenario with one seed, on virtual time.
 
+use std::collections::HashMap;
+
 use kort_control::{ControllerConfig, Limit, ModelError};
 use kort_proto::signals::Signals;
-use kort_thruster::effects::{self, Descriptor, Scale};
 use kort_thruster::parameters::{Parameter, Parameters};
 use kort_thruster::plant::{Plant, Tick};
 use kort_thruster::rig::{AmplifierKind, Rig};
@@ -15,6 +16,7 @@ use super::reference::{Player, Replayed};
 use super::scenario::{Channel, Lie, ProcessFault, ProcessFaultKind, Scenario, is_on};
 use super::score::{Outcome, Sample, Tally};
 use super::sea::{Now, STEP_S, Sea};
+use super::truth;
 
 /// What every run of a scenario shares.
 pub struct Prepared<'a> {
@@ -28,6 +30,15 @@ pub struct Prepared<'a> {
     pub thrust_max_n: f64,
 }
 
+/// What the controller is told of the thruster.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Knows {
+    /// What the rig states.
+    Stated,
+    /// What is true after the last change of the scenario, which is then true from the start.
+    Truth,
+}
+
 /// Told now and then how far a run is: share done, thrust RMS so far, energy so far.
 pub type Progress<'a> = &'a (dyn Fn(f64, f64, f64) + Sync);
 
@@ -39,14 +50,15 @@ pub fn run(
     prepared: &Prepared,
     config: &ControllerConfig,
     seed: u64,
+    knows: Knows,
     progress: Progress,
 ) -> Result<Outcome, ModelError> {
-    Bench::new(prepared, config, seed)?.run(progress)
+    Bench::new(prepared, config, seed, knows)?.run(progress)
 }
 
 /// A stream of random numbers of its own for each purpose, so that a law that draws none changes
 /// nothing for the others: all laws meet the same sea.
-fn stream(seed: u64, purpose: u64) -> ChaCha8Rng {
+pub(super) fn stream(seed: u64, purpose: u64) -> ChaCha8Rng {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     random.set_stream(purpose);
     random
@@ -58,12 +70,12 @@ struct Bench<'a> {
     chain: Chain,
     plant: Plant,
     truth: Parameters,
+    knows: Knows,
     seed: u64,
     noise: ChaCha8Rng,
     held_flow_m_s: Option<f64>,
     held: [Option<f64>; 4],
     flow_due_s: f64,
-    resistance_ohm: f64,
     /// End of the newest fault that the scenario put in, s.
     fault_until_s: f64,
     down: bool,
@@ -74,22 +86,35 @@ struct Bench<'a> {
 }
 
 impl<'a> Bench<'a> {
-    fn new(prepared: &'a Prepared<'a>, config: &ControllerConfig, seed: u64) -> Result<Self, ModelError> {
+    fn new(
+        prepared: &'a Prepared<'a>,
+        config: &ControllerConfig,
+        seed: u64,
+        knows: Knows,
+    ) -> Result<Self, ModelError> {
         let dt = 1.0 / prepared.scenario.control_rate_hz;
-        let chain = Chain::new(prepared.rig, config, dt)?;
-        let truth = true_parameters(prepared, seed);
+        let mut parameters = truth::parameters(prepared, seed);
+        let chain = match knows {
+            Knows::Stated => Chain::new(prepared.rig, config, dt)?,
+            Knows::Truth => {
+                for change in &prepared.scenario.truth.change {
+                    truth::change(&mut parameters, &change.factors);
+                }
+                Chain::new(&truth::told(prepared.rig, &parameters), config, dt)?
+            }
+        };
         Ok(Self {
             prepared,
             dt,
-            plant: plant(prepared, &truth, &chain, dt),
-            truth,
+            plant: truth::plant(prepared, &parameters, &chain, dt),
+            truth: parameters,
+            knows,
             chain,
             seed,
             noise: stream(seed, 3),
             held_flow_m_s: None,
             held: [None; 4],
             flow_due_s: 0.0,
-            resistance_ohm: prepared.rig.motor.winding_resistance_ohm.map_or(0.0, |r| r.value),
             fault_until_s: f64::NEG_INFINITY,
             down: false,
             injected: 0,
@@ -114,13 +139,14 @@ impl<'a> Bench<'a> {
             self.dt,
             scale,
             rig.motor.torque_constant_nm_a.value,
-            self.resistance_ohm,
+            rig.motor.winding_resistance_ohm.map(|r| r.value),
             scenario.settle_s,
         );
         let ticks = (scenario.duration_s / self.dt).round() as u64;
         let (mut sea_from, mut sea_to) = (Now::default(), sea.at(0.0));
         let mut sea_time = -STEP_S;
-        let mut changes = scenario.truth.change.iter().peekable();
+        let changes = if self.knows == Knows::Stated { scenario.truth.change.as_slice() } else { &[] };
+        let mut changes = changes.iter().peekable();
         let report_every = (ticks / 200).max(1);
         for k in 0..ticks {
             let time = k as f64 * self.dt;
@@ -241,12 +267,10 @@ impl<'a> Bench<'a> {
         }
     }
 
-    fn change(&mut self, factors: &std::collections::HashMap<Parameter, f64>) {
-        for (parameter, factor) in factors {
-            self.truth.set(*parameter, self.truth.get(*parameter) * factor);
-        }
+    fn change(&mut self, factors: &HashMap<Parameter, f64>) {
+        truth::change(&mut self.truth, factors);
         let (at, sensed) = (*self.plant.truth(), *self.plant.sensed());
-        self.plant = plant(self.prepared, &self.truth, &self.chain, self.dt);
+        self.plant = truth::plant(self.prepared, &self.truth, &self.chain, self.dt);
         self.plant.start(at.time_s, at.shaft_speed_rad_s, at.axial_m_s, sensed.current_a, at.shaft_angle_rad);
     }
 
@@ -338,52 +362,4 @@ impl<'a> Bench<'a> {
 
 fn model_speed(chain: &Chain) -> f64 {
     chain.controller().nominal().speed_max_rad_s
-}
-
-/// The stated parameters, the scenario's factors, and a spread drawn from the seed.
-fn true_parameters(prepared: &Prepared, seed: u64) -> Parameters {
-    let truth = &prepared.scenario.truth;
-    let mut p = Parameters::stated(prepared.rig);
-    let mut random = stream(seed, 4);
-    for parameter in
-        [Parameter::LiftMax, Parameter::DragMax, Parameter::FluxCoefficient, Parameter::AddedMassCoefficient]
-    {
-        let normal: f64 = StandardNormal.sample(&mut random);
-        p.set(parameter, p.get(parameter) * (truth.spread * normal).exp());
-    }
-    for (parameter, factor) in &truth.factors {
-        p.set(*parameter, p.get(*parameter) * factor);
-    }
-    p
-}
-
-fn plant(prepared: &Prepared, truth: &Parameters, chain: &Chain, dt: f64) -> Plant {
-    let scenario = prepared.scenario;
-    let model = chain.controller().nominal();
-    let scale = Scale {
-        shaft_speed_rad_s: model.speed_max_rad_s,
-        torque_n_m: model.torque_constant_nm_a * model.current_limit_a,
-        thrust_n: model.thrust_max_n,
-        flow_m_s: model.map.flow_m * model.speed_max_rad_s,
-        current_a: model.current_limit_a,
-        command: model.current_limit_a,
-        supply_v: model.supply_v.unwrap_or(0.0),
-        inertia_kg_m2: model.inertia_kg_m2,
-        tick_s: dt,
-        duration_s: scenario.duration_s,
-    };
-    let hooked: Vec<(&Descriptor, Vec<f64>)> = scenario
-        .effects
-        .iter()
-        .filter_map(|spec| {
-            let descriptor = effects::find(&spec.id)?;
-            let values = (descriptor.parameters)(&scale)
-                .iter()
-                .map(|p| spec.values.get(p.name).copied().unwrap_or(p.start))
-                .collect();
-            Some((descriptor, values))
-        })
-        .collect();
-    let effects: Vec<(&Descriptor, &[f64])> = hooked.iter().map(|(d, v)| (*d, v.as_slice())).collect();
-    Plant::new(scenario.model, prepared.rig, truth, &effects, dt).with_encoder_quantised(true)
 }

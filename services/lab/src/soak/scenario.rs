@@ -59,6 +59,10 @@ pub struct Scenario {
     /// True parameters.
     #[serde(default)]
     pub truth: Truth,
+    /// Each law runs once more, told the true parameters (those after the last change) from the start:
+    /// its error is then given as a multiple of that run's.
+    #[serde(default)]
+    pub against_true_parameters: bool,
     /// Physics that the controllers' model leaves out.
     #[serde(default, rename = "effect")]
     pub effects: Vec<EffectSpec>,
@@ -214,15 +218,19 @@ pub enum Segment {
         /// How long, s.
         for_s: f64,
     },
-    /// The `thrust_cmd_n` (or another column) of a recording.
+    /// A column of a recording: its thrust commands, or the log of a joystick. The last value of a
+    /// column stays in force until the next.
     Replay {
-        /// Recording, relative to the scenario file.
-        file: PathBuf,
+        /// Recording: relative to the scenario file, or the name of a shipped one.
+        file: String,
+        /// Column map of a foreign log.
+        columns: Option<String>,
         /// Column.
         #[serde(default = "thrust_column")]
         column: String,
-        /// The column is scaled so that its largest value becomes this share of the largest thrust.
-        peak: f64,
+        /// The column is scaled so that its largest size becomes this share of the largest thrust;
+        /// without it the column is in newtons, held within the largest thrust.
+        peak: Option<f64>,
     },
 }
 
@@ -400,6 +408,12 @@ impl Scenario {
         within("noise.thrust", self.noise.thrust, 0.0, 1.0, "share of the largest thrust")?;
         within("noise.flow", self.noise.flow, 0.0, 2.0, "share of the flow")?;
         within("noise.current", self.noise.current, 0.0, 1.0, "share of the current limit")?;
+        if self.against_true_parameters
+            && let Some(last) = self.truth.change.iter().map(|c| c.at_s).reduce(f64::max)
+        {
+            let hint = "what is scored must come after the last [[truth.change]], with time to adapt";
+            within("settle_s", self.settle_s, last, 0.9 * self.duration_s, hint)?;
+        }
         if self.controllers.is_empty() {
             return Err(
                 "`controllers` is empty\nhint: controllers = [\"velocity_servo\", \"model2_inversion\"]"
@@ -479,7 +493,11 @@ impl Segment {
                 within("amplitude", *amplitude, 0.0, 1.0, share)?;
                 within("for_s", *for_s, 0.1, 1e7, "seconds")
             }
-            Self::Replay { peak, .. } => within("peak", *peak, 0.0, 1.0, share),
+            Self::Replay { peak: Some(peak), .. } => within("peak", *peak, 0.0, 1.0, share),
+            Self::Replay { column, .. } if !column.ends_with("_n") => Err(format!(
+                "`column` = \"{column}\" of a replay is not in newtons and has no `peak`\nhint: peak = 0.8 stretches it to 0.8 of the largest thrust"
+            )),
+            Self::Replay { .. } => Ok(()),
         }
     }
 }

@@ -38,12 +38,19 @@ pub const SCORES: &[(&str, &str)] = &[
     ("rise_time_s", "time to 90 % of a step, s"),
     ("settle_time_s", "time until thrust stays within 5 % of a step, s"),
     ("overshoot_pct", "overshoot of a step, %"),
-    ("energy_j", "electrical energy: motor torque times speed where it drives, and copper loss, J"),
+    (
+        "energy_j",
+        "electrical energy: motor torque times speed where it drives, and copper loss where the rig states a winding resistance, J",
+    ),
     ("energy_per_impulse_j_n_s", "energy per newton-second given, J/(N s)"),
-    ("copper_loss_per_impulse_j_n_s", "copper loss per newton-second given, J/(N s)"),
+    (
+        "copper_loss_per_impulse_j_n_s",
+        "copper loss (I2R) per newton-second given, J/(N s); not known if the rig states no winding resistance",
+    ),
     ("saturation_share", "share of time at a limit"),
     ("current_travel_a_s", "travel of the motor current per second: wear, A/s"),
     ("flow_rms_m_s", "observer's flow error, root mean square, m/s"),
+    ("error_over_true_parameters", "thrust error, RMS, over that of the same law told the true parameters"),
     ("parameter_error", "largest relative error of an adapted coefficient at the end"),
     ("faults_injected", "faults put in"),
     ("faults_survived", "faults after which thrust came back"),
@@ -57,8 +64,11 @@ const STEP_WINDOW_S: f64 = 6.0;
 pub const WINDOW_S: f64 = 8.0;
 /// Samples a second kept for plots.
 const PLOT_HZ: f64 = 100.0;
-/// Bins of the error histogram: logarithmic, 32 an octave, from 2^-20 of full scale.
-const BINS: usize = 32 * 22;
+/// Bins of the error histogram: 64 an octave, from 2^-20 of full scale to 4 times it.
+const BIN_BITS: u32 = 6;
+const BINS: usize = 22 << BIN_BITS;
+/// 2^-20 as the exponent of a number in memory.
+const LEAST_EXPONENT: u64 = 1023 - 20;
 
 /// A step of the reference under way.
 #[derive(Clone, Copy, Debug)]
@@ -87,7 +97,7 @@ pub struct Window {
 pub struct Tally {
     dt_s: f64,
     scale_n: f64,
-    resistance_ohm: f64,
+    resistance_ohm: Option<f64>,
     torque_constant_nm_a: f64,
     settle_s: f64,
     ticks: u64,
@@ -116,12 +126,12 @@ pub struct Tally {
 }
 
 impl Tally {
-    /// For a thruster with a largest thrust, torque constant and winding resistance.
+    /// For a thruster with a largest thrust, torque constant and, where it is known, winding resistance.
     pub fn new(
         dt_s: f64,
         scale_n: f64,
         torque_constant_nm_a: f64,
-        resistance_ohm: f64,
+        resistance_ohm: Option<f64>,
         settle_s: f64,
     ) -> Self {
         let plot_every = (1.0 / (PLOT_HZ * dt_s)).round().max(1.0) as u64;
@@ -176,7 +186,7 @@ impl Tally {
             return;
         }
         let dt = self.dt_s;
-        let copper = self.resistance_ohm * s.current_a * s.current_a;
+        let copper = self.resistance_ohm.unwrap_or(0.0) * s.current_a * s.current_a;
         let shaft = self.torque_constant_nm_a * s.current_a * s.shaft_speed_rad_s;
         self.energy_j += (copper + shaft.max(0.0)) * dt;
         self.copper_j += copper * dt;
@@ -291,7 +301,9 @@ impl Tally {
         scores.insert("energy_j", self.energy_j);
         if self.impulse_n_s > 0.0 {
             scores.insert("energy_per_impulse_j_n_s", self.energy_j / self.impulse_n_s);
-            scores.insert("copper_loss_per_impulse_j_n_s", self.copper_j / self.impulse_n_s);
+            let copper =
+                if self.resistance_ohm.is_some() { self.copper_j / self.impulse_n_s } else { f64::NAN };
+            scores.insert("copper_loss_per_impulse_j_n_s", copper);
         }
         scores.insert("saturation_share", self.saturated as f64 / n);
         scores.insert("current_travel_a_s", self.travel_a / seconds);
@@ -314,24 +326,32 @@ impl Tally {
     }
 }
 
+/// The exponent and the leading bits of the fraction are a logarithmic scale, straight within an octave.
 fn bin(share: f64) -> usize {
-    if share <= 0.0 {
-        return 0;
-    }
-    ((share.log2() + 20.0) * 32.0).clamp(0.0, BINS as f64 - 1.0) as usize
+    let place = share.to_bits() >> (52 - BIN_BITS);
+    (place.saturating_sub(LEAST_EXPONENT << BIN_BITS) as usize).min(BINS - 1)
 }
 
+/// Lower edge of a bin.
 fn edge(bin: usize) -> f64 {
-    (bin as f64 / 32.0 - 20.0).exp2()
+    f64::from_bits((bin as u64 + (LEAST_EXPONENT << BIN_BITS)) << (52 - BIN_BITS))
 }
 
 /// Scores and worst window of one run.
 #[derive(Clone, Debug, Default)]
 pub struct Outcome {
-    /// Scores by name.
+    /// Scores by name; NaN is not known.
     pub scores: BTreeMap<&'static str, f64>,
     /// Worst window.
     pub worst: Window,
+}
+
+impl Outcome {
+    /// The error as a multiple of that of the same law told the true parameters.
+    pub fn compare(&mut self, told: &Self) {
+        let ratio = self.scores["thrust_rms_n"] / told.scores["thrust_rms_n"];
+        self.scores.insert("error_over_true_parameters", ratio);
+    }
 }
 
 /// Mean and its interval over seeds.
@@ -356,6 +376,13 @@ pub fn summarise(values: &[f64]) -> Score {
     Score { mean, ci95: [mean - half, mean + half] }
 }
 
+/// Geometric mean and 95 % interval of ratios: of two laws on the same sea, seed by seed.
+pub fn summarise_ratios(values: &[f64]) -> Score {
+    let logs: Vec<f64> = values.iter().map(|v| v.ln()).collect();
+    let Score { mean, ci95: [low, high] } = summarise(&logs);
+    Score { mean: mean.exp(), ci95: [low.exp(), high.exp()] }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -366,7 +393,7 @@ mod tests {
 
     #[test]
     fn a_first_order_step_is_measured() {
-        let mut tally = Tally::new(1e-3, 100.0, 1.0, 1.0, 0.0);
+        let mut tally = Tally::new(1e-3, 100.0, 1.0, Some(1.0), 0.0);
         tally.tick(&sample(0.0, 0.0, 0.0));
         for k in 0..3000 {
             let t = f64::from(k) * 1e-3;
@@ -380,12 +407,27 @@ mod tests {
 
     #[test]
     fn ninety_five_percent_of_the_time() {
-        let mut tally = Tally::new(1e-3, 100.0, 1.0, 1.0, 0.0);
+        let mut tally = Tally::new(1e-3, 100.0, 1.0, Some(1.0), 0.0);
         for k in 0..10_000 {
             tally.tick(&sample(0.0, 0.0, f64::from(k) * 1e-3));
         }
         let p95 = tally.finish(&[]).scores["thrust_p95_n"];
-        assert!((p95 - 9.5).abs() < 0.25, "{p95}");
+        assert!((p95 - 9.5).abs() < 0.15, "{p95}");
+    }
+
+    #[test]
+    fn ratios_have_an_interval_above_zero() {
+        let s = summarise_ratios(&[0.5, 2.0]);
+        assert!(
+            (s.mean - 1.0).abs() < 1e-12 && s.ci95[0] > 0.0 && (s.ci95[0] * s.ci95[1] - 1.0).abs() < 1e-9
+        );
+    }
+
+    #[test]
+    fn what_is_not_known_stays_so() {
+        let mut tally = Tally::new(1e-3, 100.0, 1.0, None, 0.0);
+        tally.tick(&Sample { current_a: 3.0, ..sample(0.0, 10.0, 9.0) });
+        assert!(tally.finish(&[]).scores["copper_loss_per_impulse_j_n_s"].is_nan());
     }
 
     #[test]
