@@ -4,6 +4,8 @@
 
 mod run;
 mod state;
+#[cfg(test)]
+mod tests;
 
 pub use run::{Response, Stimulus, simulate};
 pub use state::{Balance, Drive, Driven, Foil, Local, Sensed, Tick};
@@ -54,9 +56,11 @@ pub struct Plant {
     filters: Filters,
     sensed: Sensed,
     at: Local,
-    /// Rates at the end of the last tick: the first stage of the next, since nothing jumps there
-    /// but the command, which acts through the current.
+    /// Rates at the end of the last tick: the first stage of the next, where no input jumps.
     last_rates: Option<States>,
+    /// Whether those rates can hold at all: no effect keeps a memory that changes between ticks
+    /// and acts on the rates.
+    rates_may_hold: bool,
     quantise_encoder: bool,
 }
 
@@ -152,8 +156,13 @@ impl Plant {
         let hooked = |used: fn(&crate::effects::Hooks) -> bool| -> Vec<usize> {
             (0..effects.len()).filter(|i| used(&effects[*i].effect.hooks())).collect()
         };
+        let changes_between_ticks = |e: &Hooked| {
+            let h = e.effect.hooks();
+            (h.drive || h.sense) && (h.inflow || h.foil || h.balance)
+        };
         Self {
             model,
+            rates_may_hold: !effects.iter().any(changes_between_ticks),
             parameters: *parameters,
             sensors: rig.sensors,
             amplifier: rig.amplifier.kind,
@@ -255,7 +264,7 @@ impl Plant {
             self.effects[*i].effect.drive(tick, &mut drive);
         }
         let (half, full) = (self.current_path(tick, &drive, 0.5 * dt), self.current_path(tick, &drive, dt));
-        let from = self.current_a;
+        let from = self.current_path(tick, &drive, 0.0);
         let speed = match self.amplifier {
             AmplifierKind::Speed if tick.driven == Driven::Command => {
                 let (now, tau) = (self.x[SPEED], drive.time_constant_s);
@@ -275,9 +284,10 @@ impl Plant {
         let mut x = x0;
         prescribe(&mut x, 0.0);
         let start = x;
+        let begin = self.local_at(&x, from, 0.0, tick, &drive);
         let k1 = match self.last_rates {
-            Some(rates) => rates,
-            None => self.rates::<HOOKED>(&x, &self.local_at(&x, from, 0.0, tick, &drive)).0,
+            Some(rates) if self.rates_may_hold && begin.continues::<HOOKED>(&self.at) => rates,
+            _ => self.rates::<HOOKED>(&x, &begin).0,
         };
         x = self.advance(HOOKED, &start, &k1, 0.5 * dt);
         prescribe(&mut x, 0.5);
@@ -328,6 +338,9 @@ impl Plant {
         }
         if drive.time_constant_s <= 0.0 {
             return target;
+        }
+        if after_s == 0.0 {
+            return self.current_a;
         }
         // The stated lag's decay is at hand; an effect may have changed the lag.
         let (stated, half, full) = self.decays.drive;

@@ -105,6 +105,24 @@ pub struct Local {
     pub blade_torque_n_m: f64,
 }
 
+impl Local {
+    /// Whether nothing that acts on the rates jumps from `before` to here; the end of one tick and
+    /// the start of the next may differ in rounding. Without effects (`HOOKED` false) depth,
+    /// temperature and supply do not act.
+    #[inline(always)]
+    pub(super) fn continues<const HOOKED: bool>(&self, before: &Self) -> bool {
+        let near = |a: f64, b: f64| (a - b).abs() <= 1e-12 * (a.abs() + b.abs());
+        near(self.current_a, before.current_a)
+            && near(self.ambient_m_s, before.ambient_m_s)
+            && near(self.shaft_speed_rad_s, before.shaft_speed_rad_s)
+            && (!HOOKED
+                || near(self.shaft_angle_rad, before.shaft_angle_rad)
+                    && self.depth_m == before.depth_m
+                    && self.temperature_c == before.temperature_c
+                    && (self.supply_v == before.supply_v || near(self.supply_v, before.supply_v)))
+    }
+}
+
 /// The blade section at work.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Foil {

@@ -1,0 +1,75 @@
+//! The step at input jumps, against the same plant stepped a hundred times finer.
+
+use super::{Driven, Plant, Tick};
+use crate::models::ModelName;
+use crate::parameters::{Parameter as P, Parameters};
+use crate::rig::Rig;
+
+const COARSE_S: f64 = 5e-3;
+const FINER: usize = 100;
+const TICKS: usize = 80;
+
+/// Shaft speed and axial flow after each coarse tick.
+fn run(lag_s: f64, split: usize, input: impl Fn(usize) -> Tick) -> Vec<[f64; 2]> {
+    let rig = Rig::from_toml(include_str!("../../../../config/thrusters/whitcomb-yoerger-1999.toml"))
+        .expect("the shipped rig");
+    let mut parameters = Parameters::stated(&rig);
+    parameters.set(P::TimeConstantS, lag_s);
+    let mut plant = Plant::new(ModelName::Model2, &rig, &parameters, &[], COARSE_S / split as f64);
+    let mut seen = Vec::new();
+    for i in 0..TICKS {
+        for j in 0..split {
+            let part = 1.0 / split as f64;
+            let tick = input(i);
+            let at = |(a, b): (f64, f64), p: f64| a + (b - a) * p;
+            let ends = |ends| (at(ends, j as f64 * part), at(ends, (j + 1) as f64 * part));
+            let driven = match tick.driven {
+                Driven::Current(a, b) => {
+                    let (a, b) = ends((a, b));
+                    Driven::Current(a, b)
+                }
+                other => other,
+            };
+            let time_s = (i as f64 + j as f64 * part) * COARSE_S;
+            plant.step(&Tick { time_s, driven, ambient_m_s: ends(tick.ambient_m_s), ..tick });
+        }
+        seen.push([plant.truth().shaft_speed_rad_s, plant.truth().axial_m_s]);
+    }
+    seen
+}
+
+/// Largest difference from the finely stepped plant.
+fn error(lag_s: f64, input: impl Fn(usize) -> Tick + Copy) -> f64 {
+    run(lag_s, 1, input)
+        .iter()
+        .zip(run(lag_s, FINER, input))
+        .flat_map(|(a, b)| [a[0] - b[0], a[1] - b[1]])
+        .fold(0.0, |worst, e| worst.max(e.abs()))
+}
+
+/// A level that jumps every eighth tick.
+fn level(i: usize) -> f64 {
+    [6.0, -4.0, 2.0, 9.0, -9.0][(i / 8) % 5]
+}
+
+#[test]
+fn a_jump_of_the_command_without_drive_lag_costs_no_accuracy() {
+    let e = error(0.0, |i| Tick { command: level(i), ..Tick::default() });
+    assert!(e < 5e-3, "{e}");
+}
+
+#[test]
+fn a_jump_of_a_recorded_current_costs_no_accuracy() {
+    let e = error(0.0, |i| Tick { driven: Driven::Current(level(i), level(i) + 0.2), ..Tick::default() });
+    assert!(e < 5e-3, "{e}");
+}
+
+#[test]
+fn a_jump_of_the_ambient_flow_costs_no_accuracy() {
+    let e = error(0.01, |i| Tick {
+        command: 6.0,
+        ambient_m_s: (0.1 * level(i), 0.1 * level(i)),
+        ..Tick::default()
+    });
+    assert!(e < 5e-3, "{e}");
+}
