@@ -1,0 +1,288 @@
+//! The source itself: which way crates depend, what pure crates may touch, files that nothing uses,
+//! files that grow too long, pages that are missing.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use kort_proto::faults::Fault;
+use kort_thruster::effects;
+
+/// What each crate of ours may depend on. Anything else is a wrong turn.
+const DIRECTION: &[(&str, &[&str])] = &[
+    ("crates/thruster", &[]),
+    ("crates/truth", &[]),
+    ("proto", &[]),
+    ("crates/recording", &["kort-proto"]),
+    ("crates/control", &["kort-thruster"]),
+    ("crates/identify", &["kort-thruster", "kort-recording"]),
+    ("services/servo", &["kort-thruster", "kort-proto"]),
+    ("services/controller", &["kort-thruster", "kort-control", "kort-proto"]),
+    ("services/gateway", &["kort-thruster", "kort-control", "kort-recording", "kort-proto"]),
+    (
+        "services/lab",
+        &[
+            "kort-thruster",
+            "kort-control",
+            "kort-recording",
+            "kort-identify",
+            "kort-truth",
+            "kort-proto",
+            "kort-servo",
+            "kort-controller",
+        ],
+    ),
+    (".", &["kort-servo", "kort-controller", "kort-gateway", "kort-lab", "kort-proto"]),
+];
+
+/// Crates without clock, thread, file or socket.
+const PURE: &[&str] = &["crates/thruster", "crates/truth", "crates/control", "crates/identify"];
+
+/// Lines a source file may have.
+const LINES: usize = 500;
+/// Files that were longer, or nearly so, when this test was written, with what they may have: to be split.
+const LONG: &[(&str, usize)] = &[
+    ("crates/control/src/model.rs", 560),
+    ("crates/identify/src/changes.rs", 620),
+    ("crates/identify/src/data.rs", 740),
+    ("crates/identify/src/diagnose.rs", 560),
+    ("crates/thruster/src/plant/mod.rs", 600),
+    ("crates/thruster/src/rig.rs", 560),
+    ("crates/thruster/src/scenario/excitation.rs", 600),
+    ("proto/src/messages.rs", 540),
+    ("services/lab/src/soak/scenario.rs", 560),
+    ("tests/gateway.rs", 560),
+];
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn read(path: impl AsRef<Path>) -> String {
+    let path = root().join(path);
+    std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+}
+
+/// Rust files under a folder, relative to the repository.
+fn sources(folder: &str) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    let mut open = vec![root().join(folder)];
+    while let Some(folder) = open.pop() {
+        for entry in std::fs::read_dir(&folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                open.push(path);
+            } else if path.extension().is_some_and(|e| e == "rs") {
+                found.push(path.strip_prefix(root()).unwrap().to_path_buf());
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
+fn every_source() -> Vec<PathBuf> {
+    ["crates", "services", "proto", "tests", "benches"].iter().flat_map(|f| sources(f)).collect()
+}
+
+/// A file's code: comments, and what only tests see, left out.
+fn code(path: &Path) -> String {
+    let text = read(path);
+    let shipped = text.split("#[cfg(test)]\nmod tests").next().unwrap_or_default();
+    shipped.lines().map(|line| line.split("//").next().unwrap_or_default()).collect::<Vec<_>>().join("\n")
+}
+
+/// Names in one table of a crate's manifest.
+fn dependencies(folder: &str, table: &str) -> BTreeSet<String> {
+    let manifest: toml::Table = read(Path::new(folder).join("Cargo.toml")).parse().unwrap();
+    manifest
+        .get(table)
+        .and_then(toml::Value::as_table)
+        .map(|t| t.keys().cloned().collect())
+        .unwrap_or_default()
+}
+
+#[test]
+fn crates_depend_in_one_direction() {
+    let mut folders = BTreeSet::from([".".to_string()]);
+    let manifest: toml::Table = read("Cargo.toml").parse().unwrap();
+    for member in manifest["workspace"]["members"].as_array().unwrap() {
+        match member.as_str().unwrap().strip_suffix("/*") {
+            None => folders.insert(member.as_str().unwrap().into()),
+            Some(parent) => {
+                for entry in std::fs::read_dir(root().join(parent)).unwrap() {
+                    folders.insert(format!("{parent}/{}", entry.unwrap().file_name().to_string_lossy()));
+                }
+                true
+            }
+        };
+    }
+    let listed: BTreeSet<String> = DIRECTION.iter().map(|d| d.0.to_string()).collect();
+    assert_eq!(folders, listed, "a crate without its line in DIRECTION, or the other way round");
+    for (folder, allowed) in DIRECTION {
+        for name in dependencies(folder, "dependencies").iter().filter(|n| n.starts_with("kort")) {
+            assert!(allowed.contains(&name.as_str()), "{folder} must not depend on {name}");
+        }
+    }
+}
+
+#[test]
+fn pure_crates_have_no_clock_thread_file_or_socket() {
+    const OUTSIDE: &[&str] = &[
+        "tokio",
+        "axum",
+        "iceoryx2",
+        "rustix",
+        "libc",
+        "ureq",
+        "tokio-tungstenite",
+        "prometheus",
+        "clap",
+        "tempfile",
+    ];
+    for folder in PURE {
+        let used = dependencies(folder, "dependencies");
+        for name in OUTSIDE {
+            assert!(!used.contains(*name), "{folder} is pure and must not depend on {name}");
+        }
+        assert!(
+            *folder == "crates/identify" || !used.contains("rayon"),
+            "{folder}: threads belong to identify"
+        );
+        // A program beside the library may write files.
+        let library =
+            sources(&format!("{folder}/src")).into_iter().filter(|p| !p.parent().unwrap().ends_with("bin"));
+        for path in library {
+            let code = code(&path);
+            for module in ["time", "thread", "fs", "net", "process", "env"] {
+                let name = format!("std::{module}");
+                let at = code.match_indices(&name).find(|(i, _)| {
+                    !code[i + name.len()..].starts_with(|c: char| c.is_alphanumeric() || c == '_')
+                });
+                assert!(at.is_none(), "{} is pure and must not use {name}", path.display());
+            }
+        }
+    }
+}
+
+#[test]
+fn the_truth_simulation_serves_the_proof_alone() {
+    for path in sources("services").into_iter().chain(sources("crates")).chain(sources("proto")) {
+        let proof = path.starts_with("services/lab/src/commands/prove") || path.starts_with("crates/truth");
+        assert!(proof || !code(&path).contains("kort_truth"), "{} must not use kort_truth", path.display());
+    }
+    // No inverse crime: neither side knows the other's equations.
+    for table in ["dependencies", "dev-dependencies"] {
+        let ours: Vec<String> =
+            dependencies("crates/truth", table).into_iter().filter(|n| n.starts_with("kort")).collect();
+        assert!(ours.is_empty(), "crates/truth must know none of {ours:?}");
+    }
+}
+
+/// Files that no `mod` line names are not compiled: they are dead.
+#[test]
+fn every_file_is_part_of_its_crate() {
+    let all = ["crates", "services", "proto"].iter().flat_map(|f| sources(f));
+    for path in
+        all.filter(|p| p.components().any(|c| c.as_os_str() == "src") || p.starts_with("services/kort"))
+    {
+        let stem = path.file_stem().unwrap().to_string_lossy().into_owned();
+        let folder = path.parent().unwrap();
+        if matches!(stem.as_str(), "lib" | "main") || folder.ends_with("bin") {
+            continue;
+        }
+        let (name, folder) = if stem == "mod" {
+            (folder.file_name().unwrap().to_string_lossy().into_owned(), folder.parent().unwrap())
+        } else {
+            (stem, folder)
+        };
+        let parents = [
+            folder.join("mod.rs"),
+            folder.join("lib.rs"),
+            folder.join("main.rs"),
+            folder.with_extension("rs"),
+        ];
+        let declared = parents.iter().filter(|p| root().join(p).is_file()).any(|p| {
+            let text = read(p);
+            let words = format!("mod {name};");
+            // Effects are listed by name in a macro that declares them.
+            let listed = text.contains("pub mod $name;").then(|| format!("{name},"));
+            text.lines()
+                .map(str::trim)
+                .any(|l| l == words || l.ends_with(&format!(" {words}")) || listed.as_deref() == Some(l))
+        });
+        assert!(declared, "{}: no `mod {name};` names it", path.display());
+    }
+}
+
+/// One thing, one file, one line in its registry.
+#[test]
+fn every_effect_model_law_observer_and_estimator_is_registered() {
+    let ids: BTreeSet<&str> = effects::ALL.iter().map(|e| e.id).collect();
+    assert_eq!(ids.len(), effects::ALL.len(), "two effects of one name");
+    for (folder, helpers) in [
+        ("crates/thruster/src/effects", &["memory"][..]),
+        ("crates/thruster/src/models", &["linear", "steady"]),
+        ("crates/control/src/laws", &["speed_loop"]),
+        ("crates/control/src/observers", &["load_torque"]),
+        ("crates/control/src/estimators", &["regression"]),
+    ] {
+        let registry = read(Path::new(folder).join("mod.rs"));
+        for path in sources(folder) {
+            let name = path.file_stem().unwrap().to_string_lossy().into_owned();
+            if name == "mod" || helpers.contains(&name.as_str()) {
+                continue;
+            }
+            if folder.ends_with("effects") {
+                assert!(ids.contains(name.as_str()), "{}: not in effects::ALL", path.display());
+            } else {
+                assert!(
+                    registry.contains(&format!("\"{name}\"")),
+                    "{}: no such name in mod.rs",
+                    path.display()
+                );
+            }
+        }
+    }
+    for id in ids {
+        let file = format!("crates/thruster/src/effects/{id}.rs");
+        assert!(root().join(&file).is_file(), "{id} is not in {file}");
+    }
+}
+
+#[test]
+fn every_effect_and_every_fault_has_its_page() {
+    let catalogue = read("docs/catalogue.md");
+    for effect in effects::ALL {
+        assert!(catalogue.contains(&format!("`{}`", effect.id)), "docs/catalogue.md lacks {}", effect.id);
+    }
+    let pages: BTreeSet<String> = std::fs::read_dir(root().join("docs/faults"))
+        .unwrap()
+        .map(|e| e.unwrap().path().file_stem().unwrap().to_string_lossy().into_owned())
+        .filter(|name| name != "README")
+        .collect();
+    let faults: BTreeSet<String> = Fault::ALL.iter().map(|f| f.name().to_string()).collect();
+    assert_eq!(pages, faults, "docs/faults and the faults differ");
+    for fault in Fault::ALL {
+        let page = read(format!("docs/faults/{}.md", fault.name()));
+        assert!(page.contains(&fault.code().to_string()), "docs/faults/{}.md lacks its code", fault.name());
+    }
+}
+
+#[test]
+fn no_file_grows_too_long() {
+    for path in every_source() {
+        let lines = read(&path).lines().count();
+        let most = LONG.iter().find(|l| Path::new(l.0) == path).map_or(LINES, |l| l.1);
+        assert!(lines <= most, "{} has {lines} lines; allowed: {most}: split it", path.display());
+    }
+}
+
+#[test]
+fn nothing_is_left_for_later() {
+    for path in every_source().into_iter().filter(|p| !p.ends_with("tidy.rs")) {
+        let code = code(&path);
+        for left in ["todo!", "unimplemented!", "dbg!", "FIXME", "XXX"] {
+            assert!(!code.contains(left), "{}: {left}", path.display());
+        }
+    }
+}
