@@ -52,3 +52,17 @@ fn a_brake_eased_in_mid_run_is_found_when_and_where_it_was() {
     let removed = term["heldout"]["excess_error_removed"].as_f64().unwrap();
     assert!(removed > 0.8, "{removed}");
 }
+
+#[test]
+fn a_log_of_commands_alone_says_what_it_lacks_and_that_the_supply_sags() {
+    let recording = "tests/recordings/vortex-auv-pool-heave-1.csv";
+    let columns = ["--columns", "vortex-auv-pool"];
+    for command in ["diagnose", "fit"] {
+        let rig = ["--rig", "config/thrusters/t200.toml"];
+        let output = kort(&[&[command, recording][..], &rig, &columns].concat());
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert!(said.contains("no measured response beside it") && said.contains("hint:"), "{said}");
+        assert!(said.contains("supply_v sags as the 8 commands together rise"), "{said}");
+    }
+}

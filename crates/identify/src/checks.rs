@@ -37,6 +37,7 @@ pub fn check(series: &Series, rig: &Rig) -> Checked {
     unsigned_speed(series, &mut out);
     rest_bias(series, &mut out);
     gaps(series, &mut out);
+    out.notes.extend(supply_sag(series).map(|sag| format!("{}: {sag}", series.name)));
     out
 }
 
@@ -167,6 +168,42 @@ fn rest_bias(series: &Series, out: &mut Checked) {
             ));
         }
     }
+}
+
+/// A recorded supply that falls as the commands rise. Power goes with the cube of a duty or a
+/// speed; every thruster whose command is recorded loads the same supply.
+pub fn supply_sag(series: &Series) -> Option<String> {
+    let supply = series.column("supply_v")?;
+    let commands: Vec<&[f64]> = series
+        .columns
+        .iter()
+        .filter(|c| ["duty_cmd", "speed_cmd_rad_s", "voltage_cmd_v"].iter().any(|n| c.0.starts_with(n)))
+        .filter_map(|c| series.column(&c.0))
+        .collect();
+    let rows: Vec<(f64, f64)> = (0..supply.len())
+        .filter(|k| supply[*k].is_finite() && commands.iter().all(|c| c[*k].is_finite()))
+        .map(|k| (commands.iter().map(|c| c[k].abs().powi(3)).sum(), supply[k]))
+        .collect();
+    let n = rows.len() as f64;
+    if commands.is_empty() || rows.len() < 50 {
+        return None;
+    }
+    let (mx, my) = (rows.iter().map(|r| r.0).sum::<f64>() / n, rows.iter().map(|r| r.1).sum::<f64>() / n);
+    let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
+    for (x, y) in &rows {
+        xx += (x - mx).powi(2);
+        xy += (x - mx) * (y - my);
+        yy += (y - my).powi(2);
+    }
+    let correlation = xy / (xx * yy).sqrt().max(1e-300);
+    let top = rows.iter().map(|r| r.0).fold(0.0, f64::max);
+    let (rest, full) = (my - xy / xx.max(1e-300) * mx, my + xy / xx.max(1e-300) * (top - mx));
+    (correlation < -0.4 && rest - full > 0.01 * rest).then(|| {
+        let of = if commands.len() > 1 { format!("the {} commands together rise", commands.len()) } else { "the command rises".into() };
+        format!(
+            "supply_v sags as {of}: about {rest:.2} V at rest, {full:.2} V at the largest load (correlation {correlation:.2} with the commands cubed); a constant supply would be wrong here"
+        )
+    })
 }
 
 fn gaps(series: &Series, out: &mut Checked) {

@@ -152,13 +152,15 @@ pub enum DataError {
     },
     /// Nothing to compare with.
     #[error(
-        "{recording}: driven by {driving}, but no measured response beside it\nhint: record shaft_speed_rad_s, thrust_n, torque_n_m or flow_m_s as well"
+        "{recording}: driven by {driving}, but no measured response beside it: {found}\nhint: record shaft_speed_rad_s, thrust_n, torque_n_m or flow_m_s as well; a log of commands alone can be replayed (kort simulate, a segment of kind \"replay\"), not diagnosed"
     )]
     NoResponse {
         /// The recording.
         recording: String,
         /// The driving column.
         driving: &'static str,
+        /// What there is instead.
+        found: String,
     },
     /// Too short.
     #[error(
@@ -245,7 +247,8 @@ impl Prepared {
             .filter_map(|r| Channel::new(series, r))
             .collect();
         if !channels.iter().any(|c| c.response != Response::Current) {
-            return Err(DataError::NoResponse { recording, driving: driving.column() });
+            let found = instead(series, driving.column());
+            return Err(DataError::NoResponse { recording, driving: driving.column(), found });
         }
         let tick_s = match rig.sensors.control_rate_hz {
             Some(rate) if 1.0 / rate <= row_s * 1.001 => {
@@ -436,6 +439,25 @@ impl Channel {
             full_scale,
         })
     }
+}
+
+/// What a recording without a usable response holds.
+fn instead(series: &Series, driving: &str) -> String {
+    let few = Response::ALL.into_iter().filter(|r| r.name() != driving).find_map(|r| {
+        let samples = series.column(r.name())?.iter().filter(|v| v.is_finite()).count();
+        (samples < FEWEST_ROWS)
+            .then(|| format!("{} has {samples} samples, at least {FEWEST_ROWS} are needed", r.name()))
+    });
+    if let Some(few) = few {
+        return few;
+    }
+    let others: Vec<&str> =
+        series.columns.iter().map(|c| c.0.as_str()).filter(|n| *n != driving && *n != "time_s").collect();
+    let mut found = if others.is_empty() { "nothing else is in it".into() } else { others.join(", ") };
+    if let Some(sag) = crate::checks::supply_sag(series) {
+        found.push_str(&format!("\nnote: {sag}"));
+    }
+    found
 }
 
 /// The driving column, by preference: a command that fits the drive, then measured current, then speed.

@@ -131,6 +131,12 @@ impl<'a> Setup<'a> {
             .iter()
             .map(|p| p.channels.iter().map(|c| Whitener::flat(0.02 * c.full_scale, c.rows.len())).collect())
             .collect();
+        if settled(&recordings) {
+            notes.push(
+                "a table of settled points: nothing in it accelerates, so inertia, added mass, lags and delays do not show; in bollard pull every point has the same angle of attack. kort fit-table makes a rig from such a table and says what it cannot fix"
+                    .into(),
+            );
+        }
         let prescribed = recordings.iter().all(|p| p.driving == Driving::Speed);
         let current = recordings
             .iter()
@@ -165,6 +171,17 @@ fn too_thin(recordings: &[Prepared]) -> Option<String> {
         .sum();
     (changes < 3)
         .then(|| "the driving signal hardly changes: steady data cannot part physics from parameters".into())
+}
+
+/// One sample a step of the command, each just before the next: a table of settled points.
+fn settled(recordings: &[Prepared]) -> bool {
+    recordings.iter().all(|r| {
+        r.channels.iter().all(|c| {
+            let last = c.rows.iter().filter(|k| r.command.get(**k + 1).is_none_or(|n| *n != r.command[**k]));
+            let alone = c.rows.windows(2).all(|w| w[1] > w[0] + 1);
+            alone && last.count() as f64 > 0.8 * c.rows.len() as f64
+        })
+    })
 }
 
 fn write(
