@@ -1,3 +1,5 @@
+use proptest::prelude::*;
+
 use super::*;
 
 const HEAD: &str = "[time]\nsource = \"t\"\nunit = \"ms\"\n";
@@ -61,4 +63,31 @@ fn every_shipped_map_reads() {
     let error = ColumnMap::find("quarter-drone").unwrap_err().to_string();
     assert!(error.contains("quarter_drone"), "{error}");
     assert!(ColumnMap::find("quarter_drone:x").is_err(), "has no runs to choose from");
+}
+
+proptest! {
+    #[test]
+    fn any_text_is_read_or_refused(text in "\\PC{0,200}") {
+        if let Err(error) = ColumnMap::from_toml("m", &text) {
+            prop_assert!(error.to_string().contains("hint:"));
+        }
+    }
+
+    #[test]
+    fn a_map_with_odd_values_is_refused_or_gives_finite_values(
+        key in prop::sample::select(vec!["sign", "scale", "offset", "table", "sign_of", "sign_zero", "unit"]),
+        value in prop_oneof![
+            any::<f64>().prop_map(|x| format!("{x:e}")),
+            prop::sample::select(vec!["nan", "\"rpm\"", "[]", "[[0, 1], [1, 2]]", "[[0, nan], [1, 2]]", "\"b\""]).prop_map(String::from),
+            "[ -~]{0,10}",
+        ],
+        source in -1e6..1e6_f64,
+    ) {
+        let unit = if key == "unit" { "" } else { "unit = \"N\"\n" };
+        let text = format!("{HEAD}[columns.thrust_n]\nsource = \"f\"\n{unit}{key} = {value}\n");
+        match ColumnMap::from_toml("m", &text) {
+            Ok(map) => prop_assert!(!map.columns[0].apply(source).is_nan()),
+            Err(error) => prop_assert!(error.to_string().contains("hint:")),
+        }
+    }
 }
