@@ -320,6 +320,13 @@ fn write(
     }
     findings.sort_by(|a, b| b.probability.total_cmp(&a.probability));
     let verdict = verdict(&outcome, &findings, thin.is_some());
+    if outcome.excess.is_some() && verdict == Verdict::Unexplained {
+        // Much is left: a name that hardly removes anything of it is no finding.
+        let (kept, weak): (Vec<Finding>, Vec<Finding>) =
+            findings.into_iter().partition(|f| f.heldout.excess_error_removed > LEAST_OF_A_FINDING);
+        findings = kept;
+        alternatives.extend(weak.into_iter().map(words::weak));
+    }
     if let (Some(why), Verdict::InsufficientData) = (&thin, verdict) {
         notes.insert(0, why.clone());
     }
@@ -365,6 +372,9 @@ fn write(
 
 /// Share of the held-out error above the noise that names must remove where much is left beside them.
 const LEAST_REMOVED: f64 = 0.5;
+
+/// Share below which a name is set aside where much is left.
+const LEAST_OF_A_FINDING: f64 = 0.2;
 
 fn verdict(outcome: &Outcome, findings: &[Finding], thin: bool) -> Verdict {
     let removed = findings.iter().map(|f| f.heldout.excess_error_removed).fold(0.0, f64::max);
@@ -515,16 +525,22 @@ fn traces(problem: &Problem, before: &Stack, after: &Stack, speed: &[Vec<f64>]) 
     for (r, recording) in problem.recordings.iter().enumerate() {
         let since = since_edge(recording);
         for (c, channel) in recording.channels.iter().enumerate() {
-            let minus = |residual: &[f64]| channel.values.iter().zip(residual).map(|(m, e)| m - e).collect();
+            // A run-in is left out: the state before the first row is not known.
+            let masked = &problem.masked[r];
+            let from = channel.rows.iter().position(|k| !masked[*k]).unwrap_or(0);
+            let from = if masked[..channel.rows[from]].iter().all(|m| *m) { from } else { 0 };
+            let minus = |residual: &[f64]| {
+                channel.values[from..].iter().zip(&residual[from..]).map(|(m, e)| m - e).collect()
+            };
             channels.push(Trace {
                 recording: recording.name.clone(),
                 channel: channel.response.name(),
-                time_s: channel.rows.iter().map(|k| recording.time_s[*k]).collect(),
-                measured: channel.values.clone(),
+                time_s: channel.rows[from..].iter().map(|k| recording.time_s[*k]).collect(),
+                measured: channel.values[from..].to_vec(),
                 baseline: minus(&before[r][c]),
                 explained: minus(&after[r][c]),
-                shaft_speed_rad_s: channel.rows.iter().map(|k| speed[r][*k]).collect(),
-                since_step_s: channel.rows.iter().map(|k| since[*k]).collect(),
+                shaft_speed_rad_s: channel.rows[from..].iter().map(|k| speed[r][*k]).collect(),
+                since_step_s: channel.rows[from..].iter().map(|k| since[*k]).collect(),
             });
         }
     }

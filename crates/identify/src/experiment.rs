@@ -87,13 +87,18 @@ fn unexplained(outcome: &Outcome) -> Option<NextExperiment> {
     let (text, words) = SIGNALS[1];
     let mut scenario: Scenario = toml::from_str(text).ok()?;
     scenario.name = "locate-the-unknown".into();
+    let why = if crate::changes::is_change(term.chosen) {
+        "with the change in force and without it, current recorded: a load takes the same torque at every level, a drive that loses gain a share of it".into()
+    } else {
+        format!(
+            "steady levels both ways show on the {} path how the unknown term goes with speed and direction; then repeat this run to see whether it stays",
+            term.chosen.path.name()
+        )
+    };
     Some(NextExperiment {
         separates: vec!["unknown".into()],
         excitation: words.into(),
-        why: format!(
-            "steady levels both ways show on the {} path how the unknown term goes with speed and direction; then repeat this run to see whether it stays",
-            term.chosen.path.name()
-        ),
+        why,
         scenario: serde_json::to_value(&scenario).ok()?,
     })
 }

@@ -7,7 +7,9 @@ use crate::data::Series;
 use crate::fit::Problem;
 use crate::judge::{Outcome, Place, margin};
 use crate::locate;
-use crate::report::{Baseline, EmpiricalTerm, Finding, HeldOut, Mismatch, NextExperiment, Verdict};
+use crate::report::{
+    Alternative, Baseline, EmpiricalTerm, Finding, HeldOut, Mismatch, NextExperiment, Verdict,
+};
 
 /// How sure a lone name is when nothing comes near it; measured on tuning seeds.
 const SURE: f64 = 0.93;
@@ -68,6 +70,18 @@ pub fn why_not(leader: &str, distance: f64, gain: f64) -> String {
         format!("explains {share:.0} % of what {leader} explains; the rest stays in the residual")
     } else {
         format!("explains nothing of what {leader} explains")
+    }
+}
+
+/// A name that was fitted and removes next to nothing of a large error.
+pub fn weak(finding: Finding) -> Alternative {
+    Alternative {
+        effect: finding.effect,
+        probability: 0.1 * finding.probability,
+        why_not: format!(
+            "fits better within the noise's colour, but removes only {:.0} % of the error above the noise on held-out data",
+            100.0 * finding.heldout.excess_error_removed.max(0.0)
+        ),
     }
 }
 

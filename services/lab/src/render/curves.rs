@@ -97,7 +97,11 @@ fn residuals(trace: &Trace) -> (Vec<f64>, Vec<f64>) {
 /// The window with most error explained, or (if nothing was found) with most error.
 fn worst(trace: &Trace, before: &[f64], after: &[f64], found: bool) -> std::ops::Range<usize> {
     let t = &trace.time_s;
-    let weight = |k: usize| before[k] * before[k] - if found { after[k] * after[k] } else { 0.0 };
+    let gain = |k: usize| before[k] * before[k] - after[k] * after[k];
+    let total: f64 = before.iter().map(|b| b * b).sum();
+    // Where nothing was explained in this channel, the largest error is worth a look.
+    let found = found && (0..t.len()).map(gain).filter(|g| *g > 0.0).sum::<f64>() > 1e-3 * total;
+    let weight = |k: usize| if found { gain(k) } else { before[k] * before[k] };
     let (mut from, mut sum) = (0, 0.0);
     let mut best = (f64::NEG_INFINITY, 0..t.len().min(1));
     for to in 0..t.len() {
@@ -180,6 +184,15 @@ mod tests {
     #[test]
     fn the_window_covers_the_worst_stretch() {
         let trace = trace();
+        let (before, after) = residuals(&trace);
+        let at = worst(&trace, &before, &after, true);
+        assert!(trace.time_s[at.start] <= 6.0 && trace.time_s[at.end - 1] >= 6.99, "{at:?}");
+    }
+
+    #[test]
+    fn a_channel_that_nothing_changed_shows_its_largest_error() {
+        let mut trace = trace();
+        trace.explained.clone_from(&trace.baseline);
         let (before, after) = residuals(&trace);
         let at = worst(&trace, &before, &after, true);
         assert!(trace.time_s[at.start] <= 6.0 && trace.time_s[at.end - 1] >= 6.99, "{at:?}");

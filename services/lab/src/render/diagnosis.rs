@@ -37,7 +37,8 @@ pub fn page(diagnosis: &Diagnosis, rig: &Rig) -> String {
         page.section("Tried and set aside", rivals(report));
     }
     if let Some(next) = &report.next_experiment {
-        let parts: Vec<String> = next.separates.iter().map(|s| plain(s)).collect();
+        let parts: Vec<String> =
+            next.separates.iter().filter(|s| *s != "unknown").map(|s| plain(s)).collect();
         page.section(
             "The next experiment",
             html! {
@@ -115,6 +116,7 @@ fn empirical(term: &EmpiricalTerm) -> Markup {
         p { "It acts on the " (term.path) " path and adds to the " (term.enters) ":" }
         pre { (term.expression) }
         p class="soft" { "in terms of " (term.variables.join(", ")) }
+        (values(&term.parameters))
         p { "The term " (gain(&term.heldout)) "." }
         (heldout(&term.heldout))
     }
