@@ -218,6 +218,19 @@ fn the_end_of_a_lease_ramps_down_within_half_a_second_then_stops() {
 }
 
 #[test]
+fn a_refused_setpoint_counts_once_however_often_it_is_sent() {
+    let mut bench = Bench::thrusting();
+    for refused in 1..=3 {
+        bench.give(SetpointKind::Thrust as u32, f64::NAN);
+        for _ in 0..20 {
+            bench.step();
+        }
+        assert_eq!(bench.tick.state().setpoints_invalid, refused);
+    }
+    assert!(bench.step().drive > 0.5, "the setpoint before stays in force");
+}
+
+#[test]
 fn a_switch_of_law_is_bumpless_and_all_or_nothing() {
     let mut bench = Bench::thrusting();
     for law in LawKind::ALL {

@@ -50,6 +50,8 @@ pub struct Tick {
     latched: u64,
     limits: u64,
     invalid: u64,
+    /// Session and generation of the setpoint refused last: it comes again with every heartbeat.
+    refused: Option<(u64, u64)>,
     output: Output,
     in_force: f64,
 }
@@ -100,6 +102,7 @@ impl Tick {
             latched: 0,
             limits: 0,
             invalid: 0,
+            refused: None,
             output: Output::default(),
             in_force: 0.0,
         })
@@ -171,7 +174,13 @@ impl Tick {
                 let session = message.header.session;
                 self.setpoint = Some(Accepted { kind, value, session, generation: message.generation });
             }
-            _ => self.invalid = self.invalid.wrapping_add(1),
+            _ => {
+                let refused = Some((message.header.session, message.generation));
+                if self.refused != refused {
+                    self.invalid = self.invalid.wrapping_add(1);
+                    self.refused = refused;
+                }
+            }
         }
     }
 

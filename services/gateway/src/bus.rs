@@ -237,6 +237,7 @@ impl Bridge {
         let heard = self.link.thruster.heard();
         let mut desk = self.link.thruster.desk();
         desk.expire(now);
+        // Nothing is lost here: a setpoint is accepted only once this thread has heard the arming.
         if !heard.armed(now) {
             desk.rest();
         }
@@ -266,5 +267,38 @@ impl Pending {
 
     fn finish(self) {
         let _ = self.ask.answer.send(self.replies);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use kort_proto::signals::Signals;
+
+    fn sample(time_ms: u64, flow_m_s: f64) -> Telemetry {
+        let signals = Signals { flow_m_s, thrust_cmd_n: f64::NAN, ..Signals::UNKNOWN };
+        Telemetry { time_ns: time_ms * 1_000_000, signals, ..Telemetry::default() }
+    }
+
+    #[test]
+    fn a_slow_meter_shows_between_its_readings_and_a_silent_one_for_a_second() {
+        let mut held = Held::default();
+        held.take(&sample(5_000, 0.7));
+        for (time_ms, shown) in [(5_001, 0.7), (5_999, 0.7), (6_000, f64::NAN), (60_000, f64::NAN)] {
+            held.take(&sample(time_ms, f64::NAN));
+            let flow = held.fill(sample(time_ms, f64::NAN)).signals.flow_m_s;
+            assert!(flow == shown || flow.is_nan() && shown.is_nan(), "{time_ms} ms: {flow}");
+        }
+        held.take(&sample(60_001, 0.2));
+        assert_eq!(held.fill(sample(60_001, 0.2)).signals.flow_m_s, 0.2);
+    }
+
+    #[test]
+    fn a_command_that_is_not_given_is_not_held() {
+        let mut held = Held::default();
+        let mut given = sample(1_000, 0.7);
+        given.signals.thrust_cmd_n = 50.0;
+        held.take(&given);
+        assert!(held.fill(sample(1_001, 0.7)).signals.thrust_cmd_n.is_nan());
     }
 }

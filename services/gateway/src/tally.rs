@@ -4,7 +4,7 @@ use std::sync::Mutex;
 
 use kort_proto::faults::Fault;
 use kort_proto::messages::{ControllerState, Telemetry, Timing};
-use kort_proto::signals::{ESTIMATES, SIGNALS};
+use kort_proto::signals::{ESTIMATES, Kind, SIGNALS};
 
 use crate::thruster::lock;
 use crate::windows::{Summary, Window};
@@ -86,12 +86,16 @@ impl Counts {
         }
     }
 
-    /// Metric name, meaning and last window of every signal and estimate.
-    pub fn windows(&self) -> impl Iterator<Item = (&'static str, &'static str, Option<Summary>)> {
-        let signals =
-            SIGNALS.iter().zip(&self.signals).map(|(row, w)| (row.metric, row.meaning, w.complete()));
-        let estimates =
-            ESTIMATES.iter().zip(&self.estimates).map(|(row, w)| (row.metric, row.meaning, w.complete()));
+    /// Kind, metric name, meaning and last window of every signal and estimate.
+    pub fn windows(&self) -> impl Iterator<Item = (Kind, &'static str, &'static str, Option<Summary>)> {
+        let signals = SIGNALS
+            .iter()
+            .zip(&self.signals)
+            .map(|(row, w)| (row.kind, row.metric, row.meaning, w.complete()));
+        let estimates = ESTIMATES
+            .iter()
+            .zip(&self.estimates)
+            .map(|(row, w)| (row.kind, row.metric, row.meaning, w.complete()));
         signals.chain(estimates)
     }
 }

@@ -10,6 +10,7 @@ use axum::response::IntoResponse;
 use kort_proto::faults::Fault;
 use kort_proto::limits::Limit;
 use kort_proto::messages::{LATENESS_BOUNDS_NS, Timing};
+use kort_proto::signals::Kind as SignalKind;
 use prometheus::proto::{Bucket, Counter, Gauge, Histogram, LabelPair, Metric, MetricFamily, MetricType};
 use prometheus::{TEXT_FORMAT, TextEncoder};
 use utoipa_axum::{router::OpenApiRouter, routes};
@@ -69,10 +70,12 @@ fn gather(app: &App) -> Families {
     families
 }
 
-/// One row of `proto/src/signals.rs` is one metric here.
+/// One row of `proto/src/signals.rs` is one metric here; a process that is away has no values.
 fn signals(families: &mut Families, thruster: &Thruster, tally: &Tally) {
-    for (metric, meaning, window) in tally.counts().windows() {
-        let Some(window) = window else { continue };
+    let (servo, controller) = thruster.heard().alive(Instant::now());
+    for (kind, metric, meaning, window) in tally.counts().windows() {
+        let alive = if kind == SignalKind::Estimated { controller } else { servo };
+        let Some(window) = window.filter(|_| alive) else { continue };
         for (stat, value) in [("min", window.min), ("mean", window.mean), ("max", window.max)] {
             families.gauge(metric, meaning, &[("thruster", &thruster.id), ("stat", stat)], value);
         }
@@ -148,6 +151,8 @@ fn state(families: &mut Families, thruster: &Thruster, tally: &Tally) {
                 count as f64,
             );
         }
+    }
+    if let Some(telemetry) = heard.telemetry(now) {
         families.gauge(
             "thermal_load_ratio",
             "Share of the I2t budget in use.",
@@ -162,6 +167,8 @@ fn state(families: &mut Families, thruster: &Thruster, tally: &Tally) {
             &label,
             state.setpoints_invalid as f64,
         );
+    }
+    if let Some(state) = heard.controller(now) {
         families.gauge(
             "controller_info",
             "Always 1; the label says which law runs.",
