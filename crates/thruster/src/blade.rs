@@ -108,8 +108,9 @@ pub struct BladeRow {
     drag_kg_m: f64,
 }
 
-/// Below this square of the speed through the water, m^2/s^2, loads are zero: it keeps the
-/// quotient finite, and the loads it drops are below 1e-190 N.
+/// Added to the square of the speed through the water, m^2/s^2: keeps the quotient finite where
+/// nothing moves, vanishes in rounding everywhere else, and costs no branch, so that the compiler
+/// may work on several trajectories at once.
 const STILL: f64 = 1e-200;
 
 impl BladeRow {
@@ -118,13 +119,10 @@ impl BladeRow {
     pub fn load(&self, tangential_m_s: f64, axial_m_s: f64) -> BladeLoad {
         let (ut, vp) = (tangential_m_s, axial_m_s);
         let v2 = ut * ut + vp * vp;
-        if v2 < STILL {
-            return BladeLoad::default();
-        }
         let wn = ut * self.sin_pitch - vp * self.cos_pitch;
         let wc = ut * self.cos_pitch + vp * self.sin_pitch;
         // wn / V written as wn V / V^2: root and quotient do not wait for each other.
-        let (root, inverse) = (v2.sqrt(), 1.0 / v2);
+        let (root, inverse) = (v2.sqrt(), 1.0 / (v2 + STILL));
         let lift = self.lift_kg_m * wc;
         let drag = self.drag_kg_m * wn;
         let ahead = wn * (lift * ut - drag * vp);
