@@ -5,15 +5,11 @@ mod common;
 
 use std::time::{Duration, Instant};
 
-use common::{PERIOD_NS, Site, Stack, alive, children, kill, run, wait};
+use common::{PERIOD_NS, Site, Stack, alive, at_zero, children, kill, run, wait};
 use kort_proto::faults::Fault;
 use kort_proto::messages::Telemetry;
 
 const LEASE_MS: u64 = 60_000;
-
-fn at_zero(t: &Telemetry) -> bool {
-    t.armed == 0 && t.signals.current_cmd_a == 0.0
-}
 
 /// Thrust is at zero within a number of controller periods after an instant, by the servo's own
 /// clock; two more are allowed for a busy machine.
@@ -92,6 +88,47 @@ fn a_killed_servo_is_replaced_by_one_at_zero() {
     assert!(at_zero(&fresh), "{fresh:?}");
     watch.stays_at_zero(Duration::from_millis(700));
     stack.thrust(60.0, LEASE_MS);
+}
+
+#[test]
+fn of_two_thrusters_the_one_goes_on_when_the_others_servo_dies() {
+    let mut stack = Stack::start_at(Site::new().with_t2());
+    stack.at("t2").wait_until_up();
+    // A machine that stands still may stop t1 by itself; were it the death of t2, it did so every time.
+    let went_on = (0..5).any(|_| {
+        stack.at("t1").thrust(80.0, LEASE_MS);
+        stack.at("t2").thrust(15.0, LEASE_MS);
+        let mut other = stack.watch();
+        let session = other.next().header.session;
+        let mut going_on = stack.at("t1").watch();
+        let armed_at = going_on.next().armed_at_ns;
+
+        kill(stack.at("t2").process_of("servo"), "KILL");
+        let fresh = other.until("a successor", |t| t.header.session != session);
+        assert!(at_zero(&fresh), "{fresh:?}");
+        other.stays_at_zero(Duration::from_millis(700));
+        let now = now_ns();
+        let t1 = going_on.until("t1 after all that", |t| t.time_ns > now);
+        let thrusts = (t1.signals.thrust_n - 80.0).abs() < 16.0;
+        (t1.armed, t1.faults, t1.armed_at_ns) == (1, 0, armed_at) && thrusts
+    });
+    assert!(went_on, "t1 stopped with t2");
+    stack.at("t2").thrust(10.0, LEASE_MS);
+}
+
+#[test]
+fn a_setpoint_right_after_the_arming_is_kept() {
+    let mut stack = Stack::start();
+    stack.thrust(40.0, LEASE_MS);
+    for newton in 41..=50 {
+        stack.expect("POST", "/disarm", None);
+        stack.expect("POST", "/arm", None);
+        let thrust_n = f64::from(newton);
+        stack.expect("PUT", "/setpoint", Some(serde_json::json!({"thrust_n": thrust_n})));
+        let mut watch = stack.watch();
+        watch.until("the drive to follow", |t| t.armed != 0 && t.signals.thrust_cmd_n == thrust_n);
+        assert_eq!(stack.state().unwrap()["setpoint"]["thrust_n"], thrust_n);
+    }
 }
 
 #[test]

@@ -85,6 +85,12 @@ pub fn run(config: &Config, deployment: &Deployment) -> Result<(), UpError> {
     for role in &mut roles {
         start(role)?;
     }
+    match &config.file {
+        Some(file) => println!("config   {}", file.display()),
+        None => {
+            println!("config   as built in; --config FILE takes another, config/kort.toml is found by itself")
+        }
+    }
     println!("console  http://{}/", gateway.bind);
     println!("API      http://{}/v1/thrusters   (described at /docs)", gateway.bind);
     println!("Ctrl-C stops all, thrust at zero first");

@@ -47,6 +47,23 @@ limits = {{ full_drive_s = 0.005 }}
         Self { folder, port }
     }
 
+    /// A second thruster beside the first, of another kind: t2, a T200.
+    pub fn with_t2(self) -> Self {
+        let rig = concat!(env!("CARGO_MANIFEST_DIR"), "/config/thrusters/t200.toml");
+        let mut config = std::fs::read_to_string(self.config()).unwrap();
+        config += &format!(
+            r#"
+[thrusters.t2]
+rig = "{rig}"
+amplifier = "simulated"
+servo = {{ rate_hz = 400 }}
+controller = {{ rate_hz = 50, law = "model3_inversion" }}
+"#
+        );
+        std::fs::write(self.config(), config).unwrap();
+        self
+    }
+
     pub fn config(&self) -> PathBuf {
         self.folder.path().join("kort.toml")
     }
@@ -116,7 +133,8 @@ pub fn run(command: &mut Command) -> Output {
 pub struct Stack {
     pub site: Site,
     pub supervisor: Child,
-    lease: String,
+    thruster: &'static str,
+    leases: std::collections::BTreeMap<&'static str, String>,
 }
 
 impl Stack {
@@ -126,9 +144,15 @@ impl Stack {
 
     pub fn start_at(site: Site) -> Self {
         let supervisor = site.spawn("up");
-        let stack = Self { site, supervisor, lease: String::new() };
+        let stack = Self { site, supervisor, thruster: "t1", leases: Default::default() };
         stack.wait_until_up();
         stack
+    }
+
+    /// From here on everything is about this thruster.
+    pub fn at(&mut self, thruster: &'static str) -> &mut Self {
+        self.thruster = thruster;
+        self
     }
 
     /// All three processes speak.
@@ -147,21 +171,16 @@ impl Stack {
             .timeout_global(Some(Duration::from_secs(5)))
             .build()
             .into();
-        let url = format!("http://127.0.0.1:{}/v1/thrusters/t1{path}", self.site.port);
-        let request = ureq::http::Request::builder()
-            .method(method)
-            .uri(url)
-            .header("Lease-Id", &self.lease)
-            .header("Content-Type", "application/json");
-        let body = body.map(|b| b.to_string()).unwrap_or_default();
-        let request = if self.lease.is_empty() {
-            let mut request = request.body(body).ok()?;
-            request.headers_mut().remove("Lease-Id");
-            request
-        } else {
-            request.body(body).ok()?
+        let url = format!("http://127.0.0.1:{}/v1/thrusters/{}{path}", self.site.port, self.thruster);
+        let lease = self.leases.get(self.thruster);
+        let request =
+            ureq::http::Request::builder().method(method).uri(url).header("Content-Type", "application/json");
+        let request = match lease {
+            Some(lease) => request.header("Lease-Id", lease),
+            None => request,
         };
-        let mut response = agent.run(request).ok()?;
+        let body = body.map(|b| b.to_string()).unwrap_or_default();
+        let mut response = agent.run(request.body(body).ok()?).ok()?;
         let text = response.body_mut().read_to_string().ok()?;
         Some((response.status().as_u16(), serde_json::from_str(&text).unwrap_or(Value::Null)))
     }
@@ -180,15 +199,15 @@ impl Stack {
     /// Takes the lease, clears, arms and asks for a thrust; waits until it is there.
     pub fn thrust(&mut self, newton: f64, ttl_ms: u64) {
         let lease = wait("the lease", || {
-            if !self.lease.is_empty() {
+            if self.leases.contains_key(self.thruster) {
                 self.http("DELETE", "/lease", None)?;
-                self.lease.clear();
+                self.leases.remove(self.thruster);
             }
             let (status, body) =
                 self.http("POST", "/lease", Some(json!({"holder": "test", "ttl_ms": ttl_ms})))?;
             (status == 201).then_some(body)
         });
-        self.lease = lease["lease_id"].as_str().unwrap().to_owned();
+        self.leases.insert(self.thruster, lease["lease_id"].as_str().unwrap().to_owned());
         wait("faults to clear and the servo to arm", || {
             self.http("POST", "/clear-faults", None)?;
             let (status, _) = self.http("POST", "/arm", None)?;
@@ -204,12 +223,20 @@ impl Stack {
 
     /// Listens to the servo past the gateway.
     pub fn watch(&self) -> Watch {
-        Watch::new(&self.site.deployment())
+        Watch::new(&self.site.deployment(), self.thruster)
     }
 
     /// Process of a child by its role.
     pub fn process(&self, role: &str) -> Option<u32> {
-        children(self.supervisor.id()).into_iter().find(|(_, r)| r == role).map(|(pid, _)| pid)
+        let mine = |pid: u32| {
+            let line = std::fs::read(format!("/proc/{pid}/cmdline")).unwrap_or_default();
+            let mut words = line.split(|b| *b == 0).skip_while(|w| *w != b"--thruster").skip(1);
+            words.next().is_none_or(|id| id == self.thruster.as_bytes())
+        };
+        children(self.supervisor.id())
+            .into_iter()
+            .find(|(pid, r)| r == role && mine(*pid))
+            .map(|(pid, _)| pid)
     }
 
     pub fn process_of(&self, role: &str) -> u32 {
@@ -258,20 +285,21 @@ pub fn children(parent: u32) -> Vec<(u32, String)> {
 /// Reads every telemetry sample of a servo from shared memory.
 pub struct Watch {
     deployment: Deployment,
+    thruster: &'static str,
     ports: GatewayPorts,
 }
 
 impl Watch {
-    pub fn new(deployment: &Deployment) -> Self {
-        let ports = wait("shared memory", || GatewayPorts::open(deployment, "t1").ok());
-        Self { deployment: deployment.clone(), ports }
+    pub fn new(deployment: &Deployment, thruster: &'static str) -> Self {
+        let ports = wait("shared memory", || GatewayPorts::open(deployment, thruster).ok());
+        Self { deployment: deployment.clone(), thruster, ports }
     }
 
     /// Next sample.
     pub fn next(&mut self) -> Telemetry {
         wait("telemetry", || {
             if self.deployment.generation().is_some_and(|g| g != self.ports.generation)
-                && let Ok(ports) = GatewayPorts::open(&self.deployment, "t1")
+                && let Ok(ports) = GatewayPorts::open(&self.deployment, self.thruster)
             {
                 self.ports = ports;
             }
@@ -297,9 +325,16 @@ impl Watch {
         let end = Instant::now() + time;
         while Instant::now() < end {
             let t = self.next();
-            assert_eq!((t.armed, t.signals.current_cmd_a), (0, 0.0), "{t:?}");
+            assert!(at_zero(&t), "{t:?}");
         }
     }
+}
+
+/// Disarmed, and the drive, whatever its kind, is asked for nothing.
+pub fn at_zero(t: &Telemetry) -> bool {
+    let s = &t.signals;
+    let asked = [s.current_cmd_a, s.voltage_cmd_v, s.speed_cmd_rad_s];
+    t.armed == 0 && asked.into_iter().find(|c| !c.is_nan()) == Some(0.0)
 }
 
 /// Is a process there (and no zombie)?

@@ -39,7 +39,7 @@ struct Theirs(Model2, DriveInput);
 
 impl<const N: usize> System<f64, SVector<f64, N>> for Theirs {
     fn system(&self, _: f64, x: &SVector<f64, N>, dx: &mut SVector<f64, N>) {
-        *dx = rates(&self.0, &self.1, x.as_ref()).into();
+        *dx = rates(&self.0, &self.1, &x.data.0[0]).into();
     }
 }
 
