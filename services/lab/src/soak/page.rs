@@ -36,7 +36,7 @@ fn scenario(s: &ScenarioResult) -> Markup {
 }
 
 /// Tables of the scores: heading, and what stands in it.
-const TABLES: [(&str, &[(&str, &str)]); 3] = [
+const TABLES: [(&str, &[(&str, &str)]); 4] = [
     (
         "Thrust",
         &[
@@ -44,10 +44,11 @@ const TABLES: [(&str, &[(&str, &str)]); 3] = [
             (OF_PLAIN, "of plain"),
             ("thrust_p95_n", "95 % below [N]"),
             ("thrust_bias_n", "mean [N]"),
-            ("rise_time_s", "rise [s]"),
-            ("settle_time_s", "settle [s]"),
-            ("overshoot_pct", "overshoot [%]"),
         ],
+    ),
+    (
+        "Steps",
+        &[("rise_time_s", "rise [s]"), ("settle_time_s", "settle [s]"), ("overshoot_pct", "overshoot [%]")],
     ),
     (
         "Energy and wear",
@@ -75,16 +76,20 @@ const TABLES: [(&str, &[(&str, &str)]); 3] = [
 
 fn scores(s: &ScenarioResult) -> Markup {
     html! {
-        @for (heading, columns) in TABLES {
+        @for (heading, columns) in TABLES.iter().filter(|(_, columns)| !columns_of(s, columns).is_empty()) {
             h3 { (heading) }
             (scores_of(s, columns))
         }
     }
 }
 
+/// Columns that some law has a figure in.
+fn columns_of<'a>(s: &ScenarioResult, columns: &'a [(&'a str, &'a str)]) -> Vec<&'a (&'a str, &'a str)> {
+    columns.iter().filter(|(score, _)| s.laws.iter().any(|l| s.figure(l, score).is_some())).collect()
+}
+
 fn scores_of(s: &ScenarioResult, columns: &[(&str, &str)]) -> Markup {
-    let columns: Vec<_> =
-        columns.iter().filter(|(score, _)| s.laws.iter().any(|l| s.figure(l, score).is_some())).collect();
+    let columns = columns_of(s, columns);
     let mut head = vec!["controller"];
     head.extend(columns.iter().map(|(_, words)| *words));
     let rows: Vec<Vec<String>> = s

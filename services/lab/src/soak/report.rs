@@ -210,7 +210,7 @@ fn recovered(laws: &[LawResult]) -> String {
 pub const OF_PLAIN: &str = "of plain";
 
 /// Columns of the text: score, heading, digits.
-const COLUMNS: [(&str, &str, usize); 15] = [
+const COLUMNS: [(&str, &str, usize); 16] = [
     ("thrust_rms_n", "RMS N", 2),
     (OF_PLAIN, OF_PLAIN, 3),
     ("thrust_p95_n", "95 % N", 2),
@@ -224,6 +224,7 @@ const COLUMNS: [(&str, &str, usize); 15] = [
     ("flow_rms_m_s", "flow m/s", 3),
     ("parameter_error", "param", 3),
     ("error_over_true_parameters", "of true", 3),
+    ("faults_injected", "faults", 1),
     ("faults_survived", "survived", 1),
     ("limits_broken", "broken", 0),
 ];
@@ -291,7 +292,12 @@ impl Report {
         let mut out = String::new();
         for s in &self.scenarios {
             let _ = writeln!(out, "{}: {}", s.name, s.what);
-            let shown = |score: &str| s.laws.iter().any(|l| s.figure(l, score).is_some());
+            // Where no fault was put in, none survived says nothing.
+            let faults = s.laws.iter().any(|l| l.score("faults_injected").is_some_and(|f| f.mean > 0.0));
+            let shown = |score: &str| {
+                (faults || !score.starts_with("faults_"))
+                    && s.laws.iter().any(|l| s.figure(l, score).is_some())
+            };
             let columns: Vec<_> = COLUMNS.iter().filter(|(score, ..)| shown(score)).collect();
             let wide = s.laws.iter().map(|l| l.name.len()).max().unwrap_or(0).max(10);
             let _ = write!(out, "  {:wide$}", "controller");
