@@ -104,6 +104,7 @@ pub fn hypothesis(model: ModelName, rig: &Rig, shaft_prescribed: bool, needs_cur
             low: if parameter.positive() { low.max(0.02 * quantity.value) } else { low },
             high: quantity.value + reach,
             size: quantity.value.abs(),
+            acts: None,
         });
         start.push(quantity.value);
     }
@@ -125,19 +126,24 @@ pub fn with_effect(
     larger.effects.push(effect);
     for (j, spec) in (effect.parameters)(scale).into_iter().enumerate() {
         let at = start.map_or(spec.start, |s| s[j]).clamp(spec.low, spec.high);
-        if spec.low == spec.high {
-            larger.fixed.push((slot, j, spec.low));
+        if spec.held || spec.low == spec.high {
+            larger.fixed.push((slot, j, at));
             continue;
         }
         larger.free.push(Free {
             target: Target::Effect(slot, j),
             name: spec.name,
             unit: spec.unit,
-            // A shape is known to a factor of a few before the data speak.
-            prior: spec.shape.then_some((at, shape_sigma(at, spec.low, spec.high))),
+            // A shape is known to a factor of a few before the data speak; a knot where nothing
+            // happens is not known after it, and stays near nothing.
+            prior: match spec.acts {
+                Some(_) => Some((0.0, 0.3 * spec.high)),
+                None => spec.shape.then_some((at, shape_sigma(at, spec.low, spec.high))),
+            },
             low: spec.low,
             high: spec.high,
             size: spec.start.abs().max(1e-6 * (spec.high - spec.low)),
+            acts: spec.acts,
         });
         larger.start.push(at);
     }

@@ -531,7 +531,7 @@ fn prune(search: &Search, effect: &'static Descriptor, fit: &Fit) -> (&'static D
 
 /// Share of the error above the noise that the changes take away on rows left out of their fit.
 fn held(problem: &Problem, found: &Found) -> f64 {
-    let rows = held_out_rows(problem, &[&found.fit]);
+    let rows = held_out_rows(problem, &[&found.fit], None);
     let mut training = problem.clone();
     for (mask, rows) in training.masked.iter_mut().zip(&rows) {
         mask.iter_mut().zip(rows).for_each(|(m, h)| *m |= *h);

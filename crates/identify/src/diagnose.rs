@@ -12,7 +12,7 @@ use crate::data::{DataError, Driving, Prepared, Series, available, scale};
 use crate::errors;
 use crate::experiment;
 use crate::fit::{Fit, Problem, Stack, Target};
-use crate::heldout::held_out_rows;
+use crate::heldout::{held_out_rows, longest_block_s};
 use crate::judge::{self, Outcome};
 use crate::library::is_term;
 use crate::locate::{locate, since_edge};
@@ -22,6 +22,10 @@ use crate::report::{
 };
 use crate::search::Search;
 use crate::words;
+
+/// A rival stands beside the leader if it removes at least this share of what the leader removes on
+/// held-out data.
+const RIVAL_SHARE: f64 = 0.6;
 
 /// How to diagnose.
 #[derive(Clone, Debug)]
@@ -194,7 +198,9 @@ fn write(
     thin: Option<String>,
 ) -> Diagnosis {
     let mut problem = search.problem.clone();
-    let held = held_out_rows(&problem, &[&outcome.last]);
+    let rivals = outcome.places.iter().flat_map(|p| p.rivals.iter().map(|r| &r.0.0));
+    let longest_s = longest_block_s(outcome.last.hypothesis.effects.iter().chain(rivals), &search.scale);
+    let held = held_out_rows(&problem, &[&outcome.last], longest_s);
     let plain =
         |fit: &Fit, problem: &Problem| problem.residual(&problem.respond(&fit.hypothesis, &fit.values));
     let baseline_full = plain(&outcome.baseline, &problem);
@@ -240,16 +246,34 @@ fn write(
 
     let all = members(&search.problem, &last_train);
     let total_gain: f64 = outcome.places.iter().map(|p| p.gain).sum();
+    let single = outcome.places.len() == 1;
     let mut findings = Vec::new();
     let mut mismatch = Vec::new();
     let mut alternatives = Vec::new();
     let mut empirical_term = None;
-    for (i, place) in outcome.places.iter().enumerate() {
+    for (i, place) in outcome.places.iter_mut().enumerate() {
         let rest: Vec<Member> = all.iter().filter(|m| m.0.id != place.chosen.id).cloned().collect();
         let without =
             if rest.is_empty() { residual_baseline.clone() } else { plain(&with(&rest), &search.problem) };
         let held_here = score(&without, &residual_last);
-        let full_without = if outcome.places.len() == 1 { &baseline_full } else { &without };
+        // A rival must pass the held-out test too.
+        let mut rival_fits = Vec::new();
+        for ((rival, values), distance) in std::mem::take(&mut place.rivals) {
+            let mut swapped = all.clone();
+            if let Some(slot) = swapped.iter().position(|m| m.0.id == place.chosen.id) {
+                swapped[slot] = (rival, values.clone());
+            }
+            let fit = with(&swapped);
+            let held_rival = score(&without, &plain(&fit, &search.problem));
+            if held_rival.excess_error_removed > RIVAL_SHARE * held_here.excess_error_removed {
+                place.rivals.push(((rival, values), distance));
+                rival_fits.push((fit, held_rival));
+            } else {
+                place.aside.insert(0, (rival, distance));
+            }
+        }
+        let place = &*place;
+        let full_without = if single { &baseline_full } else { &without };
         let located = locate(&search.problem, full_without, &last_full, &speed);
         let odds = words::odds(place);
         let (regime, spans) =
@@ -284,13 +308,9 @@ fn write(
             same.clone(),
             &located,
         ));
-        for (k, ((rival, values), distance)) in place.rivals.iter().enumerate() {
-            let mut swapped = all.clone();
-            if let Some(slot) = swapped.iter().position(|m| m.0.id == place.chosen.id) {
-                swapped[slot] = (rival, values.clone());
-            }
-            let fit = with(&swapped);
-            let held_rival = score(&without, &plain(&fit, &search.problem));
+        for (k, (((rival, _), distance), (fit, held_rival))) in
+            place.rivals.iter().zip(rival_fits).enumerate()
+        {
             let others: Vec<String> = std::iter::once(place.chosen.id.to_string())
                 .chain(same.iter().filter(|s| *s != rival.id).cloned())
                 .collect();
@@ -317,6 +337,13 @@ fn write(
         && let Some((channel, size)) = outcome.excess
     {
         mismatch.push(bare_mismatch(search, &outcome.baseline, &baseline_full, channel, size, &speed));
+    }
+    if findings.len() > 1 {
+        let everything = score(&residual_baseline, &residual_last).excess_error_removed;
+        notes.push(format!(
+            "everything found together removes {:.0} % of the error above the noise on held-out data",
+            100.0 * everything
+        ));
     }
     findings.sort_by(|a, b| b.probability.total_cmp(&a.probability));
     let verdict = verdict(&outcome, &findings, thin.is_some());

@@ -4,7 +4,7 @@
 //! (sigma = half the stated tolerance), bounds by freezing. The derivative is by differences of
 //! simulations: the plant is smooth in its parameters by construction.
 
-use kort_thruster::effects::Descriptor;
+use kort_thruster::effects::{Descriptor, Stretch};
 use kort_thruster::models::ModelName;
 use kort_thruster::parameters::{Parameter, Parameters};
 use kort_thruster::plant::{Plant, simulate};
@@ -15,6 +15,7 @@ use std::sync::Arc;
 
 use crate::data::{Prepared, Response};
 use crate::noise::Whitener;
+use crate::together::{groups, last_acting};
 
 /// A fit ends when a step lowers the sum of whitened squares by less than this: far below what
 /// any decision turns on.
@@ -46,6 +47,8 @@ pub struct Free {
     pub high: f64,
     /// A typical size, for the step of differences.
     pub size: f64,
+    /// When it acts, if only for a while.
+    pub acts: Option<Stretch>,
 }
 
 /// A baseline model with effects added to it.
@@ -199,22 +202,56 @@ impl<'a> Problem<'a> {
         DVector::from_vec(joined)
     }
 
-    /// Derivative of the response to one free parameter, by a one-sided difference.
-    fn column(&self, hypothesis: &Hypothesis, values: &[f64], at: &Stack, k: usize) -> Stack {
-        let free = &hypothesis.free[k];
-        let mut step = 1e-4 * free.size.max(values[k].abs());
-        if values[k] + step > free.high {
-            step = -step;
-        }
+    /// Derivatives of the response to free parameters that do not meet in time, by one-sided
+    /// differences of one simulation.
+    fn columns(
+        &self,
+        hypothesis: &Hypothesis,
+        values: &[f64],
+        at: &Stack,
+        group: &[(usize, Stretch)],
+    ) -> Vec<Stack> {
         let mut moved = values.to_vec();
-        moved[k] += step;
-        let mut response = self.respond(hypothesis, &moved);
-        for (channels, base) in response.iter_mut().zip(at) {
-            for (samples, base) in channels.iter_mut().zip(base) {
-                samples.iter_mut().zip(base).for_each(|(s, b)| *s = (*s - b) / step);
+        let steps: Vec<f64> = group
+            .iter()
+            .map(|(k, _)| {
+                let free = &hypothesis.free[*k];
+                let step = 1e-4 * free.size.max(values[*k].abs());
+                let step = if values[*k] + step > free.high { -step } else { step };
+                moved[*k] += step;
+                step
+            })
+            .collect();
+        let change = difference(self.respond(hypothesis, &moved), at);
+        self.shares(&change, group)
+            .into_iter()
+            .zip(steps)
+            .map(|(mut stack, step)| {
+                stack.iter_mut().flatten().flatten().for_each(|v| *v /= step);
+                stack
+            })
+            .collect()
+    }
+
+    /// Splits the change that a group made together: each sample to the member that acted last.
+    pub fn shares(&self, change: &Stack, group: &[(usize, Stretch)]) -> Vec<Stack> {
+        if group.len() == 1 {
+            return vec![change.clone()];
+        }
+        let mut shares: Vec<Stack> =
+            vec![
+                change.iter().map(|r| r.iter().map(|c| vec![0.0; c.len()]).collect()).collect();
+                group.len()
+            ];
+        for (r, recording) in self.recordings.iter().enumerate() {
+            for (c, channel) in recording.channels.iter().enumerate() {
+                for (i, row) in channel.rows.iter().enumerate() {
+                    let owner = last_acting(group, recording.time_s[*row]);
+                    shares[owner][r][c][i] = change[r][c][i];
+                }
             }
         }
-        response
+        shares
     }
 
     /// Computes the columns that are missing.
@@ -225,11 +262,25 @@ impl<'a> Problem<'a> {
         at: &Stack,
         columns: &mut [Option<Arc<Stack>>],
     ) {
-        columns.par_iter_mut().enumerate().for_each(|(k, column)| {
-            if column.is_none() {
-                *column = Some(Arc::new(self.column(hypothesis, values, at, k)));
-            }
-        });
+        let always = Stretch { from_s: 0.0, length_s: 0.0, period_s: 0.0 };
+        let missing = |k: &usize| columns[*k].is_none();
+        let (some, all): (Vec<usize>, Vec<usize>) =
+            (0..columns.len()).filter(missing).partition(|k| hypothesis.free[*k].acts.is_some());
+        let tasks: Vec<Vec<(usize, Stretch)>> = all
+            .into_iter()
+            .map(|k| vec![(k, always)])
+            .chain(groups(some.iter().filter_map(|k| Some((*k, hypothesis.free[*k].acts?))).collect()))
+            .collect();
+        let done: Vec<(usize, Stack)> = tasks
+            .par_iter()
+            .flat_map_iter(|group| {
+                let stacks = self.columns(hypothesis, values, at, group);
+                group.iter().map(|(k, _)| *k).zip(stacks).collect::<Vec<_>>()
+            })
+            .collect();
+        for (k, stack) in done {
+            columns[k] = Some(Arc::new(stack));
+        }
     }
 
     /// The whitened derivative, one column a free parameter.
@@ -248,6 +299,7 @@ impl<'a> Problem<'a> {
         let mut response = self.respond(hypothesis, &values);
         let mut residual = self.whiten(&self.residual(&response));
         let mut cost = residual.norm_squared() + penalty(free, &values);
+        let iterations = if cost.is_finite() { iterations } else { 0 };
         let mut damping = 1e-4;
         let mut columns = known.to_vec();
         columns.resize(n, None);
@@ -384,6 +436,16 @@ impl<'a> Problem<'a> {
             _ => 0.0,
         }
     }
+}
+
+/// One response less another.
+pub fn difference(mut response: Stack, base: &Stack) -> Stack {
+    for (channels, base) in response.iter_mut().zip(base) {
+        for (samples, base) in channels.iter_mut().zip(base) {
+            samples.iter_mut().zip(base).for_each(|(v, b)| *v -= b);
+        }
+    }
+    response
 }
 
 /// Sum of squares of the priors' residuals.

@@ -4,6 +4,7 @@
 //! turn, to first order from one fit (the parameters move by what the block contributed). What
 //! the report claims is done in full: a fit on the training blocks alone, scored on the others.
 
+use kort_thruster::effects::{Descriptor, Scale};
 use nalgebra::{DMatrix, DVector};
 
 use crate::fit::{Fit, Problem};
@@ -15,12 +16,25 @@ const FOLDS: usize = 5;
 /// Blocks of the split into training and held-out data.
 const SPLIT_BLOCKS: usize = 12;
 
+/// Share of the distance of two knots that may be left out at a time: what changes freely with
+/// time can be judged between its knots only.
+const OF_KNOTS: f64 = 0.4;
+
+/// Longest block that may be left out, s, if one of the effects changes freely with time.
+pub fn longest_block_s<'a>(
+    effects: impl Iterator<Item = &'a &'static Descriptor>,
+    scale: &Scale,
+) -> Option<f64> {
+    let stretches = effects.flat_map(|e| (e.parameters)(scale)).filter_map(|s| s.acts);
+    stretches.map(|s| OF_KNOTS * 0.5 * s.length_s).min_by(f64::total_cmp)
+}
+
 /// Block of every joined sample, numbered over all recordings.
-pub fn blocks(problem: &Problem) -> (Vec<usize>, usize) {
+fn blocks(problem: &Problem, block_s: f64) -> (Vec<usize>, usize) {
     let mut of = Vec::new();
     let mut offset = 0;
     for recording in &problem.recordings {
-        let count = ((recording.duration_s() / BLOCK_S).round() as usize).max(4);
+        let count = ((recording.duration_s() / block_s).round() as usize).max(4);
         let width = recording.duration_s() / count as f64 * (1.0 + 1e-9);
         for channel in &recording.channels {
             of.extend(
@@ -35,9 +49,15 @@ pub fn blocks(problem: &Problem) -> (Vec<usize>, usize) {
     (of, offset)
 }
 
-/// Sum of squares of each block when its fold is left out of the fit, to first order.
-pub fn left_out(problem: &Problem, fit: &mut Fit) -> Vec<f64> {
-    let (block, count) = blocks(problem);
+/// Sums of squares by block for two fits, each when the block's fold is left out of it, to first
+/// order.
+pub fn left_out(problem: &Problem, before: &mut Fit, after: &mut Fit, scale: &Scale) -> (Vec<f64>, Vec<f64>) {
+    let block_s = longest_block_s(after.hypothesis.effects.iter(), scale).unwrap_or(BLOCK_S);
+    (left_out_of(problem, before, block_s), left_out_of(problem, after, block_s))
+}
+
+fn left_out_of(problem: &Problem, fit: &mut Fit, block_s: f64) -> Vec<f64> {
+    let (block, count) = blocks(problem, block_s);
     let n = fit.values.len();
     let size = DVector::from_iterator(n, fit.hypothesis.free.iter().map(|f| f.size));
     let mut j = problem.jacobian(fit);
@@ -82,18 +102,19 @@ pub fn paired(before: &[f64], after: &[f64]) -> (f64, f64) {
     (mean * n, (var * n).sqrt())
 }
 
-/// Rows that the reported held-out score leaves out of the fit: every third of twelve blocks. Where
-/// a fit has something change in mid-run, the blocks are cut there too, and the middle ones of each
-/// stretch are left out: every level is then both fitted and judged, and the rows about the change
-/// tell when it came.
-pub fn held_out_rows(problem: &Problem, fits: &[&Fit]) -> Vec<Vec<bool>> {
+/// Rows that the reported held-out score leaves out of the fit: every third of twelve blocks, or
+/// of ones no longer than `longest_s`. Where a fit has something change in mid-run, the blocks are
+/// cut there too, and the middle ones of each stretch are left out: every level is then both fitted
+/// and judged, and the rows about the change tell when it came.
+pub fn held_out_rows(problem: &Problem, fits: &[&Fit], longest_s: Option<f64>) -> Vec<Vec<bool>> {
+    let longest_s = longest_s.unwrap_or(f64::INFINITY);
     let mut changes: Vec<f64> = fits.iter().flat_map(|f| crate::changes::instants(f)).collect();
     changes.sort_by(f64::total_cmp);
     problem
         .recordings
         .iter()
         .map(|r| {
-            let width = r.duration_s() / SPLIT_BLOCKS as f64 * (1.0 + 1e-9);
+            let width = (r.duration_s() / SPLIT_BLOCKS as f64 * (1.0 + 1e-9)).min(longest_s);
             if !changes.is_empty() {
                 return between(&changes, &r.time_s, width);
             }

@@ -146,7 +146,7 @@ pub fn identify(
     let std = projector.std_errors();
     let full = problem.residual(&problem.respond(&best.hypothesis, &best.values));
     let floor = errors::noise_floor(problem, &full);
-    let held = held_out_rows(problem, &[]);
+    let held = held_out_rows(problem, &[], None);
     let mut training = problem.clone();
     for (mask, held) in training.masked.iter_mut().zip(&held) {
         mask.iter_mut().zip(held).for_each(|(m, h)| *m |= *h);
@@ -205,6 +205,7 @@ fn open_friction(hypothesis: &mut Hypothesis, rig: &Rig, wanted: bool, typical: 
             low: -reach,
             high: reach,
             size: 0.02 * reach,
+            acts: None,
         });
         hypothesis.start.push(Parameters::quantity(rig, p).map_or(0.0, |q| q.value));
     }

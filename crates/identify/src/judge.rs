@@ -1,5 +1,7 @@
 //! From rounds of the search to findings: who is believed, who is a rival, who is set aside.
 
+use std::collections::BTreeMap;
+
 use kort_thruster::effects::Descriptor;
 
 use crate::baseline::{Member, members, recompose};
@@ -42,6 +44,15 @@ pub struct Outcome {
 /// Margin within which two explanations cannot be told apart.
 pub fn margin(gain: f64) -> f64 {
     rules::MARGIN.max(rules::MARGIN_SHARE * gain)
+}
+
+/// Distance within which an effect cannot be told from the one chosen: wider for effects that the
+/// catalogue knows to be confused.
+pub fn near(place: &Place, other: &Descriptor) -> f64 {
+    let chosen = place.chosen;
+    let mates = other.confused_with.contains(&chosen.id) || chosen.confused_with.contains(&other.id);
+    let limit = margin(place.gain);
+    if mates { limit.max(rules::MATES_SHARE * place.gain) } else { limit }
 }
 
 /// Runs the search to its end. `progress` is told what is going on.
@@ -93,6 +104,7 @@ fn names(
     known: Vec<Vec<Candidate>>,
     progress: &(dyn Fn(&str) + Sync),
 ) -> Outcome {
+    let alone = known.is_empty();
     let mut rounds = known;
     let mut so_far: f64 = rounds.iter().map(|r| r[0].screened).sum();
     let mut term: Option<Candidate> = None;
@@ -110,7 +122,7 @@ fn names(
             let weighty = gain > rules::SHARE_OF_FIRST * so_far || round.size > rules::CLEAR_SIZE;
             gain > rules::BELIEVE && weighty && gain > rules::LEAST_OF_TERM * others
         });
-        let holds = round.left_out.0 > rules::HOLDS * round.gain && round.size > rules::LEAST_SIZE;
+        let holds = round.holds;
         if rounds.is_empty() && holds {
             term = best_term;
         }
@@ -160,18 +172,29 @@ fn names(
         }
     }
     progress("weighing rivals");
-    prune(search, &mut current, &mut rounds, so_far);
-    let mut places = settle(search, &mut current, &rounds);
+    // A rival that takes a place may make another find needless.
+    let mut places = Vec::new();
+    for _ in 0..rules::MOST_FOUND {
+        prune(search, &mut current, &mut rounds, so_far);
+        let before: Vec<&str> = current.hypothesis.effects.iter().map(|e| e.id).collect();
+        places = settle(search, &mut current, &rounds);
+        if rounds.len() < 2 || current.hypothesis.effects.iter().map(|e| e.id).eq(before) {
+            break;
+        }
+    }
     let baseline = plain(search, &current);
+    if alone && leaves_too_much(search, &baseline, &current, &places) {
+        progress("the names leave too much: looking for a term without a name");
+        return nameless(search, &baseline, places);
+    }
     unnamed(search, &baseline, &mut current, &mut places, term);
     let excess = Some(excess(&search.problem, &current)).filter(|e| e.1 > rules::REAL_EXCESS);
     Outcome { baseline, last: current, places, doubt, excess, elsewhere: None }
 }
 
-/// The channel with most error above its noise: root mean square over full scale.
-fn excess(problem: &Problem, fit: &Fit) -> (&'static str, f64) {
+/// Error above the noise on every channel: mean square over full scale squared.
+fn excesses(problem: &Problem, fit: &Fit, floor: &BTreeMap<&'static str, f64>) -> Vec<(&'static str, f64)> {
     let residual = problem.residual(&problem.respond(&fit.hypothesis, &fit.values));
-    let floor = errors::noise_floor(problem, &residual);
     let full = errors::full_scales(problem);
     errors::sums(problem, &residual, |r, row| !problem.masked[r][row])
         .into_iter()
@@ -179,10 +202,39 @@ fn excess(problem: &Problem, fit: &Fit) -> (&'static str, f64) {
             // The floor is itself an estimate: only what stands clear of its doubt counts.
             let n = n.max(1) as f64;
             let doubt = 4.0 * floor[name] * (3.0 / n).sqrt();
-            (name, (sum / n - floor[name] - doubt).max(0.0).sqrt() / full[name])
+            (name, (sum / n - floor[name] - doubt).max(0.0) / full[name].powi(2))
         })
+        .collect()
+}
+
+fn floor(problem: &Problem, fit: &Fit) -> BTreeMap<&'static str, f64> {
+    errors::noise_floor(problem, &problem.residual(&problem.respond(&fit.hypothesis, &fit.values)))
+}
+
+/// The channel with most error above its noise: root mean square over full scale.
+fn excess(problem: &Problem, fit: &Fit) -> (&'static str, f64) {
+    excesses(problem, fit, &floor(problem, fit))
+        .into_iter()
+        .map(|(name, square)| (name, square.sqrt()))
         .max_by(|a, b| a.1.total_cmp(&b.1))
         .unwrap_or(("", 0.0))
+}
+
+/// Whether the names found leave so much of the error that the physics is not among them.
+fn leaves_too_much(search: &Search, baseline: &Fit, current: &Fit, places: &[Place]) -> bool {
+    let floor = floor(&search.problem, current);
+    let before = excesses(&search.problem, baseline, &floor);
+    let after = excesses(&search.problem, current, &floor);
+    let sum = |list: &[(&'static str, f64)]| list.iter().map(|e| e.1).sum::<f64>();
+    let real = after.iter().any(|e| e.1.sqrt() > rules::REAL_EXCESS);
+    let may_leave = if places.len() > 1 {
+        rules::SEVERAL_MAY_LEAVE
+    } else if places.iter().any(|p| search.free_in_time(p.chosen)) {
+        rules::KNOTS_MAY_LEAVE
+    } else {
+        rules::MAY_LEAVE
+    };
+    real && sum(&after) > may_leave * sum(&before)
 }
 
 /// The best term of the whole library on the baseline, under the noise it leaves.
@@ -199,6 +251,25 @@ fn switched(search: &mut Search, current: &mut Fit) -> Option<Candidate> {
     }
     (search.problem.recordings, search.problem.whiteners) = saved;
     None
+}
+
+/// The outcome where no name explains enough: from the baseline anew, the best term without a name.
+fn nameless(search: &mut Search, baseline: &Fit, names: Vec<Place>) -> Outcome {
+    let mut start = baseline.hypothesis.clone();
+    start.start.clone_from(&baseline.values);
+    let mut current = search.baseline(&start);
+    let term = switched(search, &mut current);
+    let aside = |gain: f64| names.iter().map(|p| (p.chosen, (gain - p.gain).max(0.0))).collect();
+    let (last, places) = match term {
+        Some(term) => {
+            let gain = criterion(&current) - term.criterion;
+            let place = Place { chosen: term.effect, rivals: Vec::new(), aside: aside(gain), gain };
+            (term.fit, vec![place])
+        }
+        None => (current.clone(), Vec::new()),
+    };
+    let excess = Some(excess(&search.problem, &last)).filter(|e| e.1 > rules::REAL_EXCESS);
+    Outcome { baseline: current, last, places, doubt: None, excess, elsewhere: None }
 }
 
 /// Lets terms without a name judge what the names explain. One term alone that does better than
@@ -338,14 +409,12 @@ fn settle(search: &Search, current: &mut Fit, rounds: &[Vec<Candidate>]) -> Vec<
         let (hypothesis, columns) = recompose(current, &rest, &search.scale);
         let without = search.problem.fit(&hypothesis, &columns, 6);
         let gain = criterion(&without) - criterion(current);
-        let limit = margin(gain);
-        let near = |other: &Descriptor| {
-            let mates = other.confused_with.contains(&chosen.id) || chosen.confused_with.contains(&other.id);
-            if mates { limit.max(rules::MATES_SHARE * gain) } else { limit }
-        };
+        let mut place = Place { chosen, rivals: Vec::new(), aside: Vec::new(), gain };
         let (rivals, aside): (Vec<_>, Vec<_>) =
-            tried.into_iter().partition(|t| t.1 < near(t.0.0) && !is_term(t.0.0) && !is_term(chosen));
-        places.push(Place { chosen, rivals, aside: aside.into_iter().map(|t| (t.0.0, t.1)).collect(), gain });
+            tried.into_iter().partition(|t| t.1 < near(&place, t.0.0) && !is_term(t.0.0) && !is_term(chosen));
+        place.rivals = rivals;
+        place.aside = aside.into_iter().map(|t| (t.0.0, t.1)).collect();
+        places.push(place);
     }
     places
 }

@@ -20,4 +20,5 @@ pub mod refuse;
 pub mod report;
 pub mod screen;
 pub mod search;
+mod together;
 pub mod words;

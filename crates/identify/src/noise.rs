@@ -29,6 +29,10 @@ struct Shape {
 /// Frequencies per smoothing band grow by this ratio.
 const BAND_RATIO: f64 = 1.4;
 const FEWEST_IN_BAND: usize = 4;
+/// Mean of the logarithm of noise power lies this much below the logarithm of its mean. The mean
+/// of logarithms is used because a misfit that stands out of its band (an offset, a line) must not
+/// pass for noise.
+const EULER: f64 = 0.577;
 
 impl Whitener {
     /// A whitener that only scales by one level.
@@ -131,7 +135,7 @@ fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
 }
 
-/// Mean power in bands that widen with frequency, joined by straight lines in the logarithms.
+/// Power in bands that widen with frequency, joined by straight lines in the logarithms.
 fn smoothed(power: &[f64]) -> Vec<f64> {
     let n = power.len();
     let mut knots: Vec<(f64, f64)> = Vec::new();
@@ -139,8 +143,8 @@ fn smoothed(power: &[f64]) -> Vec<f64> {
     while from < n {
         let to = ((from as f64 * BAND_RATIO) as usize).max(from + FEWEST_IN_BAND).min(n);
         let to = if n - to < FEWEST_IN_BAND { n } else { to };
-        let mean = power[from..to].iter().sum::<f64>() / (to - from) as f64;
-        knots.push(((0.5 * (from + to) as f64).ln(), mean.max(1e-12).ln()));
+        let mean = power[from..to].iter().map(|p| p.max(1e-12).ln()).sum::<f64>() / (to - from) as f64;
+        knots.push(((0.5 * (from + to) as f64).ln(), mean + EULER));
         from = to;
     }
     let mut k = 0;

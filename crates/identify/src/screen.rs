@@ -4,14 +4,15 @@
 //! everything a re-fit could do. A screen only, never the judge: what scores well is simulated
 //! and fitted.
 
-use kort_thruster::effects::{Descriptor, Scale};
+use kort_thruster::effects::{Descriptor, Scale, Stretch};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::sync::Arc;
 
 use crate::baseline::with_effect;
-use crate::fit::{Fit, Problem, Stack, Target};
+use crate::fit::{Fit, Problem, Stack, Target, difference};
+use crate::together::groups;
 
 /// An effect's first-order promise.
 #[derive(Clone)]
@@ -163,24 +164,24 @@ fn respond_to(
     // Place of each of the effect's values among the free parameters (fixed ones have none).
     let slot = hypothesis.effects.len() - 1;
     let place = |j: usize| hypothesis.free.iter().position(|f| f.target == Target::Effect(slot, j));
-    strengths
-        .iter()
-        .map(|s| {
-            let mut values = hypothesis.start.clone();
-            for other in strengths.iter().filter(|o| *o != s) {
-                if let Some(k) = place(*other) {
-                    values[k] = 0.0_f64.clamp(specs[*other].low, specs[*other].high);
-                }
+    let always = Stretch { from_s: 0.0, length_s: 0.0, period_s: 0.0 };
+    let (some, all): (Vec<usize>, Vec<usize>) =
+        (0..strengths.len()).partition(|k| specs[strengths[*k]].acts.is_some());
+    let together = groups(some.iter().filter_map(|k| Some((*k, specs[strengths[*k]].acts?))).collect());
+    let mut responses: Vec<Stack> = vec![Stack::new(); strengths.len()];
+    for group in all.into_iter().map(|k| vec![(k, always)]).chain(together) {
+        let mut values = hypothesis.start.clone();
+        for (_, j) in strengths.iter().enumerate().filter(|(k, _)| group.iter().all(|m| m.0 != *k)) {
+            if let Some(free) = place(*j) {
+                values[free] = 0.0_f64.clamp(specs[*j].low, specs[*j].high);
             }
-            let mut response = problem.respond(&hypothesis, &values);
-            for (channels, base) in response.iter_mut().zip(base) {
-                for (samples, base) in channels.iter_mut().zip(base) {
-                    samples.iter_mut().zip(base).for_each(|(v, b)| *v -= b);
-                }
-            }
-            response
-        })
-        .collect()
+        }
+        let change = difference(problem.respond(&hypothesis, &values), base);
+        for ((k, _), share) in group.iter().zip(problem.shares(&change, &group)) {
+            responses[*k] = share;
+        }
+    }
+    responses
 }
 
 fn score(

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use crate::baseline::with_effect;
 use crate::changes;
 use crate::data::{Series, possible_drivers};
-use crate::fit::{Fit, Problem};
+use crate::fit::{Fit, Problem, difference};
 use crate::heldout;
 use crate::library::{self, is_term};
 use crate::screen::{Known, Screened, screen};
@@ -27,10 +27,14 @@ pub mod rules {
     pub const SHARE_OF_FIRST: f64 = 0.02;
     /// Least size: root mean square of its response over full scale, on some channel.
     pub const LEAST_SIZE: f64 = 0.0012;
+    /// ... of something that changes freely with time: light turbulence of the inflow is no finding.
+    pub const LEAST_SIZE_KNOTS: f64 = 0.006;
     /// An effect this large counts whatever its share.
     pub const CLEAR_SIZE: f64 = 0.004;
     /// Share of the gain that must hold on left-out blocks.
     pub const HOLDS: f64 = 0.4;
+    /// ... and for something that changes freely with time, whose knots follow it coarsely only.
+    pub const HOLDS_KNOTS: f64 = 0.2;
     /// Rivals closer than this cannot be told apart.
     pub const MARGIN: f64 = 12.0;
     /// ... or closer than this share of what the effect gains.
@@ -51,6 +55,13 @@ pub mod rules {
     /// Changes in mid-run must leave less than this share of the squared error above the noise that
     /// names leave.
     pub const CHANGE_LEAVES: f64 = 0.6;
+    /// Share of the baseline's error above the noise that a name may leave, while what it leaves is
+    /// real: more, and the physics is not in the catalogue.
+    pub const MAY_LEAVE: f64 = 0.10;
+    /// ... several names together.
+    pub const SEVERAL_MAY_LEAVE: f64 = 0.05;
+    /// ... something that changes freely with time, which its knots follow coarsely.
+    pub const KNOTS_MAY_LEAVE: f64 = 0.5;
     /// A name must explain at least this share of what the best term explains to be followed.
     pub const LEAST_OF_TERM: f64 = 0.35;
     /// Most effects found in one recording.
@@ -85,17 +96,18 @@ pub struct Round {
     pub candidates: Vec<Candidate>,
     /// Fall of the criterion by the best.
     pub gain: f64,
-    /// Fall of the left-out sum of squares by the best, and its standard error.
-    pub left_out: (f64, f64),
+    /// The best's gain holds on left-out blocks.
+    pub holds: bool,
     /// Root mean square of the best's response over full scale, largest channel.
     pub size: f64,
 }
 
-/// Criterion of a fit.
+/// Criterion of a fit; infinite where the simulation broke down.
 pub fn criterion(fit: &Fit) -> f64 {
     let of_effects =
         fit.hypothesis.free.iter().filter(|f| matches!(f.target, crate::fit::Target::Effect(..))).count();
-    fit.chi2 + fit.penalty + rules::PER_PARAMETER * of_effects as f64
+    let all = fit.chi2 + fit.penalty + rules::PER_PARAMETER * of_effects as f64;
+    if all.is_finite() { all } else { f64::INFINITY }
 }
 
 /// What a search works on.
@@ -230,12 +242,19 @@ impl<'a> Search<'a> {
         }
         // A leader whose gain does not hold on left-out blocks (many parameters, little physics) or
         // that is too small to matter gives way to the next.
-        let without = heldout::left_out(&self.problem, &mut before);
-        let mut left_out = (0.0, 0.0);
+        let mut holds = false;
         while let Some(leader) = candidates.first_mut() {
             let gain = criterion(&before) - leader.criterion;
-            left_out = heldout::paired(&without, &heldout::left_out(&self.problem, &mut leader.fit));
-            if left_out.0 > rules::HOLDS * gain || candidates.len() == 1 {
+            let (without, with) = heldout::left_out(&self.problem, &mut before, &mut leader.fit, &self.scale);
+            let left_out = heldout::paired(&without, &with);
+            let free = self.free_in_time(leader.effect);
+            let (share, least) = if free {
+                (rules::HOLDS_KNOTS, rules::LEAST_SIZE_KNOTS)
+            } else {
+                (rules::HOLDS, rules::LEAST_SIZE)
+            };
+            holds = left_out.0 > gain * share && self.size(&before, &leader.fit) > least;
+            if holds || candidates.len() == 1 {
                 break;
             }
             candidates.remove(0);
@@ -243,11 +262,16 @@ impl<'a> Search<'a> {
         let best = &candidates[0];
         Some(Round {
             gain: criterion(&before) - best.criterion,
-            left_out,
+            holds,
             size: self.size(&before, &best.fit),
             before,
             candidates,
         })
+    }
+
+    /// Whether an effect changes freely with time, in knots.
+    pub fn free_in_time(&self, effect: &Descriptor) -> bool {
+        (effect.parameters)(&self.scale).iter().any(|p| p.acts.is_some())
     }
 
     /// The best term without a name on top of a fit, if any promises something.
@@ -285,8 +309,13 @@ impl<'a> Search<'a> {
                     with_effect(&current.hypothesis, &current.values, s.effect, &self.scale, Some(start))
                 };
                 // Limits and thresholds do not scale: start where the screen stood, if that is better.
-                let (scaled, plain) = (at(&s.start), at(&s.origin));
-                let hypothesis = if self.cost(&plain) < self.cost(&scaled) { plain } else { scaled };
+                // A promise far out may break the simulation: then a part of the way.
+                let part = weaken(s.effect, &self.scale, &s.start);
+                let hypothesis = [at(&s.start), at(&s.origin), at(&part)]
+                    .into_iter()
+                    .map(|h| (self.cost(&h), h))
+                    .min_by(|a, b| a.0.total_cmp(&b.0))
+                    .map_or_else(|| at(&s.start), |best| best.1);
                 let mut fit = self.problem.fit(&hypothesis, &current.columns, 4);
                 if TIMING.contains(&s.effect.id) {
                     fit = self.with_own_edges(&fit);
@@ -315,7 +344,8 @@ impl<'a> Search<'a> {
     /// Misfit of a hypothesis where it starts.
     fn cost(&self, hypothesis: &crate::fit::Hypothesis) -> f64 {
         let residual = self.problem.residual(&self.problem.respond(hypothesis, &hypothesis.start));
-        self.problem.whiten(&residual).norm_squared()
+        let cost = self.problem.whiten(&residual).norm_squared();
+        if cost.is_finite() { cost } else { f64::INFINITY }
     }
 
     /// Like [`Search::again`], with the command's edges where this hypothesis wants them: a lag or
@@ -333,15 +363,19 @@ impl<'a> Search<'a> {
 
     /// Largest root mean square difference of two fits' responses over full scale.
     pub fn size(&self, a: &Fit, b: &Fit) -> f64 {
-        let mut x = self.problem.respond(&a.hypothesis, &a.values);
         let y = self.problem.respond(&b.hypothesis, &b.values);
-        for (channels, other) in x.iter_mut().zip(&y) {
-            for (samples, other) in channels.iter_mut().zip(other) {
-                samples.iter_mut().zip(other).for_each(|(p, q)| *p -= q);
-            }
-        }
+        let x = difference(self.problem.respond(&a.hypothesis, &a.values), &y);
         self.problem.size(&x)
     }
+}
+
+/// The same values with a quarter of the strengths.
+fn weaken(effect: &Descriptor, scale: &Scale, values: &[f64]) -> Vec<f64> {
+    (effect.parameters)(scale)
+        .iter()
+        .zip(values)
+        .map(|(spec, v)| if spec.shape { *v } else { (0.25 * v).clamp(spec.low, spec.high) })
+        .collect()
 }
 
 fn sort(candidates: &mut [Candidate]) {
@@ -359,7 +393,9 @@ fn choose(screened: &[Screened], least: f64) -> Vec<Screened> {
         if s.gain < least {
             break;
         }
-        if s.size < rules::LEAST_SIZE {
+        // Something free in time bends to anything a little, and is costly to fit.
+        let costly = s.directions > 12 && s.gain - rules::PER_PARAMETER * (s.directions as f64) < 0.1 * top;
+        if s.size < rules::LEAST_SIZE || costly {
             continue;
         }
         let starts: Vec<&Screened> = chosen.iter().filter(|c| c.effect.id == s.effect.id).collect();

@@ -5,23 +5,23 @@ use kort_thruster::effects::{Descriptor, Path};
 use crate::changes;
 use crate::data::Series;
 use crate::fit::Problem;
-use crate::judge::{Outcome, Place, margin};
+use crate::judge::{Outcome, Place, margin, near};
+use crate::library::is_term;
 use crate::locate;
 use crate::report::{
     Alternative, Baseline, EmpiricalTerm, Finding, HeldOut, Mismatch, NextExperiment, Verdict,
 };
 
 /// How sure a lone name is when nothing comes near it; measured on tuning seeds.
-const SURE: f64 = 0.93;
+const SURE: f64 = 0.96;
 
 /// Probabilities of the chosen effect and its rivals. A distance in the criterion counts less
 /// than its size in log-likelihood says, because the true form differs a little from ours.
 pub fn odds(place: &Place) -> Vec<f64> {
-    let softness = 0.5 * margin(place.gain);
-    let weight = |distance: f64| (-distance.max(0.0) / softness).exp();
+    let weight = |other: &Descriptor, distance: f64| (-distance.max(0.0) / (0.5 * near(place, other))).exp();
     let mut weights = vec![1.0];
-    weights.extend(place.rivals.iter().map(|r| weight(r.1)));
-    let aside: f64 = place.aside.iter().map(|a| weight(a.1)).sum();
+    weights.extend(place.rivals.iter().map(|r| weight(r.0.0, r.1)));
+    let aside: f64 = place.aside.iter().filter(|a| !is_term(a.0)).map(|a| weight(a.0, a.1)).sum();
     let total: f64 = weights.iter().sum::<f64>() + aside;
     weights.into_iter().map(|w| SURE * w / total).collect()
 }

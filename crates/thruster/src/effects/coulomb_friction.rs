@@ -1,6 +1,6 @@
 //! Dry friction of bearings and seals, with a Stribeck rise near standstill.
 
-use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, free_shaft, one_start};
+use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, free_shaft};
 use crate::plant::{Balance, Local};
 
 /// Catalogue entry.
@@ -16,7 +16,10 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     separated_by: "a slow ramp through zero in both directions; a coast-down",
     reference: "Armstrong-Helouvry, Dupont, Canudas de Wit 1994 (Automatica 30:1083)",
     parameters,
-    starts: one_start,
+    starts: |scale| {
+        let (torque, speed) = (scale.torque_n_m, scale.shaft_speed_rad_s);
+        vec![vec![0.02 * torque, 0.7, 0.015 * speed], vec![0.02 * torque, 0.7, 0.08 * speed]]
+    },
     needs: free_shaft,
     build: |values, context| {
         Box::new(CoulombFriction {

@@ -12,13 +12,14 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
                flow (standardised; 0 where none is recorded)",
     signature: "thrust is low in proportion at small axial flow and less so at full thrust, alike in both directions and \
                 for flow from both sides",
-    confused_with: &["ambient_axial_flow", "thrust_deduction_interaction", "duct_loss"],
+    confused_with: &["ambient_axial_flow", "thrust_deduction_interaction", "duct_loss", "blade_stall"],
     separated_by: "a yaw sweep in towed runs; the transverse flow recorded",
     reference: "T (1 - c (vt/vp)^2), here bounded where vp is small; kort's form",
     parameters,
     starts: |scale| {
         let full = scale.flow_m_s;
-        vec![vec![0.1, 0.1 * full, 0.1 * full], vec![0.1, 0.5 * full, 0.5 * full]]
+        let start = |loss, share: f64| vec![loss, share * full, share * full];
+        vec![start(0.1, 0.1), start(0.1, 0.5), start(0.5, 0.15), start(0.5, 0.3)]
     },
     needs: wet,
     build: |values, _| {

@@ -82,22 +82,35 @@ pub struct Spec {
     pub shape: bool,
     /// Not to be fitted: a whole number or a grid. The starts try its values, a fit holds them.
     pub held: bool,
+    /// For a strength that acts only for a while: when.
+    pub acts: Option<Stretch>,
+}
+
+/// A stretch of time that comes again after a period.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stretch {
+    /// Its beginning, s.
+    pub from_s: f64,
+    /// Its length, s.
+    pub length_s: f64,
+    /// Time to its next beginning, s.
+    pub period_s: f64,
 }
 
 impl Spec {
     /// A strength: the effect vanishes at zero.
     pub const fn strength(name: &'static str, unit: &'static str, start: f64, low: f64, high: f64) -> Self {
-        Self { name, unit, start, low, high, shape: false, held: false }
+        Self { name, unit, start, low, high, shape: false, held: false, acts: None }
     }
 
     /// A shape: where, how fast, how sharp.
     pub const fn shape(name: &'static str, unit: &'static str, start: f64, low: f64, high: f64) -> Self {
-        Self { name, unit, start, low, high, shape: true, held: false }
+        Self { name, unit, start, low, high, shape: true, held: false, acts: None }
     }
 
     /// A shape that a fit holds at its start.
     pub const fn held(name: &'static str, unit: &'static str, start: f64, low: f64, high: f64) -> Self {
-        Self { name, unit, start, low, high, shape: true, held: true }
+        Self { name, unit, start, low, high, shape: true, held: true, acts: None }
     }
 }
 
@@ -288,6 +301,7 @@ pub fn angle_recorded(_: &Rig, available: &Available) -> Result<(), &'static str
     }
 }
 
+mod knots;
 mod memory;
 
 macro_rules! catalogue {

@@ -5,10 +5,6 @@ use crate::plant::{Balance, Drive, Foil, Local, Tick};
 
 /// Width of the onset, as a share of the onset speed.
 const WIDTH: f64 = 0.04;
-/// How much lower the speed of recovery lies, as a share of the onset speed.
-const HYSTERESIS: f64 = 0.15;
-/// Torque loss over thrust loss: a ventilated blade keeps more of its drag.
-const DRAG_SHARE: f64 = 0.85;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -16,16 +12,29 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     path: Path::Blade,
     what: "near the surface the propeller draws air above some speed: thrust and torque collapse, the shaft races, and the \
            blades recover only at a lower speed",
-    equation: "CL (1 - k e), CD (1 - 0.85 k e), tv e' = s[(|Om|/on - 1 + 0.15 e)/0.04] - e, s logistic; k [1], tv [s], \
-               on [rad/s], in proportion to the root of depth where depth is recorded",
+    equation: "CL (1 - k e), CD (1 - q k e), t e' = s[(|Om|/on - 1 + h e)/0.04] - e, t = tv while air comes in, tr while it \
+               goes, s logistic; k, q, h [1], tv, tr [s], on [rad/s], in proportion to the root of depth where depth is recorded",
     signature: "an abrupt loss of thrust and torque together at high speed, a rise of shaft speed, recovery with hysteresis",
     confused_with: &["cavitation", "air_ingestion", "blade_stall"],
     separated_by: "depth changed at the same speed; the recovery on the way down",
     reference: "Minsaas, Faltinsen, Persson 1983; Smogeli 2006 (thesis, NTNU); kort's form",
     parameters,
-    starts: |scale| [0.5, 0.65, 0.95].iter().map(|share| vec![0.05, share * scale.shaft_speed_rad_s, 0.3]).collect(),
+    starts: |scale| {
+        let start = |share, recovery| vec![0.05, share * scale.shaft_speed_rad_s, 0.1, recovery, 0.2, 0.9];
+        vec![start(0.5, 0.3), start(0.65, 0.3), start(0.65, 2.0), start(0.95, 0.3)]
+    },
     needs: wet,
-    build: |values, _| Box::new(Ventilation { loss: values[0], onset_rad_s: values[1], lag_s: values[2], first_depth_m: None }),
+    build: |values, _| {
+        Box::new(Ventilation {
+            loss: values[0],
+            onset_rad_s: values[1],
+            lag_s: values[2],
+            recovery_lag_s: values[3],
+            hysteresis: values[4],
+            drag_share: values[5],
+            first_depth_m: None,
+        })
+    },
 };
 
 fn parameters(scale: &Scale) -> Vec<Spec> {
@@ -33,7 +42,10 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
     vec![
         Spec::strength("thrust_loss", "1", 0.05, 0.0, 0.95),
         Spec::shape("onset_speed_rad_s", "rad/s", 0.8 * full, 0.2 * full, 1.3 * full),
-        Spec::shape("lag_s", "s", 0.3, 0.02, 20.0),
+        Spec::shape("lag_s", "s", 0.1, 0.02, 20.0),
+        Spec::shape("recovery_lag_s", "s", 0.3, 0.02, 60.0),
+        Spec::shape("hysteresis", "1", 0.2, 0.0, 0.7),
+        Spec::shape("drag_loss_over_lift_loss", "1", 0.9, 0.2, 1.3),
     ]
 }
 
@@ -41,6 +53,9 @@ struct Ventilation {
     loss: f64,
     onset_rad_s: f64,
     lag_s: f64,
+    recovery_lag_s: f64,
+    hysteresis: f64,
+    drag_share: f64,
     first_depth_m: Option<f64>,
 }
 
@@ -59,7 +74,7 @@ impl Effect for Ventilation {
 
     fn foil(&self, _: &Local, own: &[f64], foil: &mut Foil) {
         foil.lift *= 1.0 - self.loss * own[0];
-        foil.drag *= 1.0 - DRAG_SHARE * self.loss * own[0];
+        foil.drag *= 1.0 - self.drag_share * self.loss * own[0];
     }
 
     fn balance(&self, at: &Local, own: &[f64], _: &mut Balance, rates: &mut [f64]) {
@@ -67,7 +82,10 @@ impl Effect for Ventilation {
             (Some(now), Some(first)) if first > 0.0 => (now / first).clamp(0.05, 20.0).sqrt(),
             _ => 1.0,
         };
-        let past = at.shaft_speed_rad_s.abs() / (self.onset_rad_s * deeper) - 1.0 + HYSTERESIS * own[0];
-        rates[0] = (super::logistic(past / WIDTH) - own[0]) / self.lag_s;
+        let past = at.shaft_speed_rad_s.abs() / (self.onset_rad_s * deeper) - 1.0 + self.hysteresis * own[0];
+        let wanted = super::logistic(past / WIDTH);
+        // One lag passes into the other smoothly, as the integrator wants it.
+        let coming = super::logistic((wanted - own[0]) / 0.05);
+        rates[0] = (wanted - own[0]) * (coming / self.lag_s + (1.0 - coming) / self.recovery_lag_s);
     }
 }

@@ -13,7 +13,7 @@ pub struct Claim {
     pub effect: String,
     /// Stated probability.
     pub probability: f64,
-    /// The effect is hidden in the case.
+    /// Just this effect is hidden in the case: of two ids of the same physics one is wrong.
     pub right: bool,
 }
 
@@ -79,7 +79,7 @@ pub fn open(answer: &Answer, report: &Value) -> Scored {
             .map(|(finding, name)| Claim {
                 effect: (*name).to_owned(),
                 probability: finding["probability"].as_f64().unwrap_or(0.0),
-                right: right(name),
+                right: answer.effects.iter().any(|effect| effect.effect == *name),
             })
             .collect(),
         first_right,
