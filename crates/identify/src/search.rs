@@ -394,7 +394,7 @@ fn choose(screened: &[Screened], least: f64) -> Vec<Screened> {
             break;
         }
         // Something free in time bends to anything a little, and is costly to fit.
-        let costly = s.directions > 12 && s.gain - rules::PER_PARAMETER * (s.directions as f64) < 0.1 * top;
+        let costly = s.directions > 12 && s.gain < 0.2 * top;
         if s.size < rules::LEAST_SIZE || costly {
             continue;
         }
