@@ -70,7 +70,7 @@ pub fn run(
     let mut current = search.baseline(start);
     let offered = available(series, &search.problem.recordings);
     search.try_columns(series, &mut current, &offered);
-    let named = names(search, current, Vec::new(), progress);
+    let (named, poor) = names(search, current, Vec::new(), progress);
     let left = excess(&search.problem, &named.last).1;
     if left < rules::REAL_EXCESS {
         return named;
@@ -89,22 +89,26 @@ pub fn run(
                 screened: gain,
             };
             let rival = found.rival;
-            let outcome = names(search, change.fit.clone(), vec![vec![change]], progress);
+            let (outcome, _) = names(search, change.fit.clone(), vec![vec![change]], progress);
             return Outcome { elsewhere: rival, ..outcome };
         }
     }
     (search.problem.recordings, search.problem.whiteners) = saved;
+    if poor {
+        progress("the names leave too much: looking for a term without a name");
+        return nameless(search, &named.baseline, named.places);
+    }
     named
 }
 
-/// Looks for names on top of what is known, round by round, and lets terms judge them.
+/// Looks for names on top of what is known, round by round, and lets terms judge them. True beside
+/// an outcome whose names leave too much.
 fn names(
     search: &mut Search,
     mut current: Fit,
     known: Vec<Vec<Candidate>>,
     progress: &(dyn Fn(&str) + Sync),
-) -> Outcome {
-    let alone = known.is_empty();
+) -> (Outcome, bool) {
     let mut rounds = known;
     let mut so_far: f64 = rounds.iter().map(|r| r[0].screened).sum();
     let mut term: Option<Candidate> = None;
@@ -161,14 +165,10 @@ fn names(
         }
         if term.is_none() {
             let excess = Some(excess).filter(|e| e.1 > rules::REAL_EXCESS);
-            return Outcome {
-                baseline: current.clone(),
-                last: current,
-                places: Vec::new(),
-                doubt,
-                excess,
-                elsewhere: None,
-            };
+            let places = Vec::new();
+            let outcome =
+                Outcome { baseline: current.clone(), last: current, places, doubt, excess, elsewhere: None };
+            return (outcome, false);
         }
     }
     progress("weighing rivals");
@@ -183,13 +183,10 @@ fn names(
         }
     }
     let baseline = plain(search, &current);
-    if alone && leaves_too_much(search, &baseline, &current, &places) {
-        progress("the names leave too much: looking for a term without a name");
-        return nameless(search, &baseline, places);
-    }
+    let poor = !places.is_empty() && leaves_too_much(search, &baseline, &current, &places);
     unnamed(search, &baseline, &mut current, &mut places, term);
     let excess = Some(excess(&search.problem, &current)).filter(|e| e.1 > rules::REAL_EXCESS);
-    Outcome { baseline, last: current, places, doubt, excess, elsewhere: None }
+    (Outcome { baseline, last: current, places, doubt, excess, elsewhere: None }, poor)
 }
 
 /// Error above the noise on every channel: mean square over full scale squared.
@@ -220,19 +217,18 @@ fn excess(problem: &Problem, fit: &Fit) -> (&'static str, f64) {
         .unwrap_or(("", 0.0))
 }
 
-/// Whether the names found leave so much of the error that the physics is not among them.
+/// Whether the names found leave so much of the error that the physics is not among them. What
+/// changes freely with time is followed by its knots coarsely only, and may leave what it leaves.
 fn leaves_too_much(search: &Search, baseline: &Fit, current: &Fit, places: &[Place]) -> bool {
     let floor = floor(&search.problem, current);
     let before = excesses(&search.problem, baseline, &floor);
     let after = excesses(&search.problem, current, &floor);
     let sum = |list: &[(&'static str, f64)]| list.iter().map(|e| e.1).sum::<f64>();
     let real = after.iter().any(|e| e.1.sqrt() > rules::REAL_EXCESS);
-    let may_leave = if places.len() > 1 {
-        rules::SEVERAL_MAY_LEAVE
-    } else if places.iter().any(|p| search.free_in_time(p.chosen)) {
-        rules::KNOTS_MAY_LEAVE
-    } else {
-        rules::MAY_LEAVE
+    let may_leave = match places {
+        [only] if search.free_in_time(only.chosen) => return false,
+        [_] => rules::MAY_LEAVE,
+        _ => rules::SEVERAL_MAY_LEAVE,
     };
     real && sum(&after) > may_leave * sum(&before)
 }

@@ -75,6 +75,16 @@ impl Whitener {
         out
     }
 
+    /// Twice the logarithm of the size of the noise, summed over the samples: what a whitener learned
+    /// from a fit's own residual says of how little that fit leaves.
+    pub fn log_size(&self) -> f64 {
+        let level: f64 = self.level.iter().map(|l| l.ln()).sum();
+        let colour = self.shape.as_ref().map_or(0.0, |s| {
+            s.gain.iter().map(|g| g.ln()).sum::<f64>() / s.gain.len() as f64 * self.level.len() as f64
+        });
+        2.0 * (level - colour)
+    }
+
     /// Level at each sample, in the channel's unit.
     pub fn level(&self) -> &[f64] {
         &self.level

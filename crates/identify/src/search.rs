@@ -60,8 +60,6 @@ pub mod rules {
     pub const MAY_LEAVE: f64 = 0.10;
     /// ... several names together.
     pub const SEVERAL_MAY_LEAVE: f64 = 0.05;
-    /// ... something that changes freely with time, which its knots follow coarsely.
-    pub const KNOTS_MAY_LEAVE: f64 = 0.5;
     /// A name must explain at least this share of what the best term explains to be followed.
     pub const LEAST_OF_TERM: f64 = 0.35;
     /// Most effects found in one recording.
@@ -73,6 +71,9 @@ pub mod rules {
 /// Effects that shift signals in time, and so depend on where the edges of the command lie.
 const TIMING: [&str; 5] =
     ["transport_delay", "amplifier_lag", "clock_skew", "encoder_filter_lag", "thrust_sensor_lag"];
+
+/// Candidates that are compared each under its own noise before one leads.
+const OWN_NOISE: usize = 4;
 
 /// An effect fitted on top of what was found before.
 #[derive(Clone)]
@@ -212,6 +213,7 @@ impl<'a> Search<'a> {
         if candidates.first().is_none_or(|c| base - c.criterion < 0.3 * rules::BELIEVE) {
             return None;
         }
+        self.lead_by_own_noise(&mut candidates, base);
         // Under the noise of the best so far the rivals part more sharply; that may change the best.
         let mut before = current.clone();
         for _ in 0..2 {
@@ -267,6 +269,25 @@ impl<'a> Search<'a> {
             before,
             candidates,
         })
+    }
+
+    /// Puts that of the best candidates first which leaves least when each learns its own noise: under
+    /// the noise of a model that misses something, a poor name may look as good as the right one.
+    fn lead_by_own_noise(&self, candidates: &mut Vec<Candidate>, base: f64) {
+        let worth = base - candidates[0].criterion;
+        let near = candidates.iter().take(OWN_NOISE).take_while(|c| base - c.criterion > 0.5 * worth).count();
+        let left: Vec<f64> = candidates[..near]
+            .par_iter()
+            .map(|c| {
+                let mut own = self.problem.clone();
+                own.learn_noise(&c.fit.hypothesis, &c.fit.values);
+                let size: f64 = own.whiteners.iter().flatten().map(crate::noise::Whitener::log_size).sum();
+                size + c.fit.penalty + rules::PER_PARAMETER * c.fit.hypothesis.free.len() as f64
+            })
+            .collect();
+        let best = (0..near).min_by(|a, b| left[*a].total_cmp(&left[*b])).unwrap_or(0);
+        let leader = candidates.remove(best);
+        candidates.insert(0, leader);
     }
 
     /// Whether an effect changes freely with time, in knots.
