@@ -72,7 +72,9 @@ pub fn run(
     search.try_columns(series, &mut current, &offered);
     let (named, poor) = names(search, current, Vec::new(), progress);
     let left = excess(&search.problem, &named.last).1;
-    if left < rules::REAL_EXCESS {
+    // One switch found as a term is looked at again where several changes are weighed by path.
+    let switched = named.places.iter().any(|p| p.chosen.id.ends_with("_switched"));
+    if left < rules::REAL_EXCESS && !switched {
         return named;
     }
     // Much is left: did something change in mid-run? Slow noise learned without it hides it.
@@ -80,7 +82,8 @@ pub fn run(
     let saved = (search.problem.recordings.clone(), search.problem.whiteners.clone());
     if let Some(found) = changes::find(search, &named.baseline, &offered) {
         let now = excess(&search.problem, &found.fit).1;
-        if now * now < rules::CHANGE_LEAVES * left * left {
+        let may_leave = if switched { 1.1 } else { rules::CHANGE_LEAVES };
+        if now * now < may_leave * left * left {
             let gain = criterion(&found.before) - criterion(&found.fit);
             let change = Candidate {
                 effect: found.effect,
