@@ -271,8 +271,9 @@ fn starts_are_visible_and_small() {
             let specs = (effect.parameters)(&bench.scale);
             let response = bench.respond(&[(effect, &starting(&specs))]).rows;
             let change = bench.difference(&response, &bench.base);
-            failures
-                .unless((0.001..0.3).contains(&change), || format!("{} {}: {change}", bench.name, effect.id));
+            failures.unless((0.0005..0.3).contains(&change), || {
+                format!("{} {}: {change}", bench.name, effect.id)
+            });
         }
     }
 }
