@@ -36,6 +36,8 @@ pub struct Controller {
     /// As adapted.
     model: ControlModel,
     observer: Observer,
+    /// What the observer said last; `None` before the first tick.
+    estimate: Option<Estimate>,
     estimator: Estimator,
     law: Law,
     /// Serves speed references whatever the law.
@@ -75,6 +77,7 @@ impl Controller {
             nominal,
             model: nominal,
             observer: Observer::new(config.observer, &nominal, &config.observers),
+            estimate: None,
             estimator: Estimator::new(config.estimator, &nominal, &config.adaptation),
             law: Law::new(config.law, &nominal, &config.laws),
             speed_law: Law::new(servo.law, &nominal, &config.laws),
@@ -112,7 +115,8 @@ impl Controller {
     }
 
     /// Changes law, options, observer or estimator while running. The command goes on from where it
-    /// is; observer and estimator keep what they know unless their own part changed.
+    /// is; the estimator keeps what it knows unless its own part changed, and another observer
+    /// goes on from where the last one was.
     pub fn configure(&mut self, config: &ControllerConfig) {
         let old = std::mem::replace(&mut self.config, *config);
         let nominal = design_model(&self.stated, config);
@@ -125,7 +129,11 @@ impl Controller {
         self.model = nominal;
         self.adapted.apply(&nominal, &mut self.model);
         if config.observer != old.observer || config.observers != old.observers || model_changed {
-            self.observer = Observer::new(config.observer, &self.model, &config.observers);
+            let (kind, options) = (config.observer, &config.observers);
+            self.observer = match &self.estimate {
+                Some(last) => Observer::after(kind, &self.model, options, last),
+                None => Observer::new(kind, &self.model, options),
+            };
         }
         self.law = Law::new(config.law, &self.model, &config.laws);
         self.speed_law = Law::new(LawKind::VelocityServo, &self.model, &config.laws);
@@ -146,6 +154,7 @@ impl Controller {
             current_a,
             dt_s: dt,
         });
+        self.estimate = Some(estimate);
         self.adapt(&measured, &estimate, current_a, dt);
 
         let mut limits = LimitSet::default();

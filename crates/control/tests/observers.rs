@@ -3,7 +3,8 @@
 mod common;
 
 use common::{Loop, rigs};
-use kort_control::{ControllerConfig, ObserverKind, Reference};
+use kort_control::{ControllerConfig, EstimatorKind, LawKind, ObserverKind, Reference};
+use kort_thruster::rig::Rig;
 
 fn config(observer: ObserverKind) -> ControllerConfig {
     ControllerConfig { observer, ..Default::default() }
@@ -93,5 +94,33 @@ fn a_filter_comes_back_after_a_sensor_fault() {
             observer.name(),
             out.estimate
         );
+    }
+}
+
+/// Another observer, or adaptation that is switched on, goes on from where the thruster is.
+#[test]
+fn a_change_of_observer_or_estimator_under_way_hardly_moves_the_thrust() {
+    let rig = Rig::from_toml(common::STAND).unwrap();
+    for from in ObserverKind::ALL {
+        for to in ObserverKind::ALL {
+            for estimator in EstimatorKind::ALL {
+                let law = LawKind::Model2Inversion;
+                let mut l = Loop::new(&rig, &ControllerConfig { law, ..config(from) }, 0.004);
+                let asked = 0.6 * l.controller.model().thrust_max_n;
+                l.run(Reference::Thrust(asked), 3.0);
+                l.controller.configure(&ControllerConfig { law, estimator, ..config(to) });
+                for tick in 0..250 {
+                    l.tick(Reference::Thrust(asked));
+                    let off = (l.thrust() - asked).abs();
+                    assert!(
+                        off < 0.05 * asked,
+                        "{} to {} with {}: {off} N off {asked} N after {tick} ticks",
+                        from.name(),
+                        to.name(),
+                        estimator.name()
+                    );
+                }
+            }
+        }
     }
 }

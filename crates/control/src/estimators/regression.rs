@@ -65,6 +65,7 @@ pub struct Regression {
     every_s: f64,
     since_s: f64,
     suspect_s: f64,
+    started: bool,
     flow_m_s: f64,
     filtered_speed_rad_s: f64,
     filtered_flow_m_s: f64,
@@ -85,6 +86,7 @@ impl Regression {
             every_s: (10.0 * model.period_s).max(0.01),
             since_s: 0.0,
             suspect_s: 0.0,
+            started: false,
             flow_m_s: 0.0,
             filtered_speed_rad_s: 0.0,
             filtered_flow_m_s: 0.0,
@@ -101,6 +103,11 @@ impl Regression {
         let (model, dt) = (input.nominal, input.dt_s);
         let Some(speed) = input.measured.shaft_speed_rad_s else { return Some(Err(Freeze::NotMeasured)) };
         let thrust = input.measured.thrust_n;
+        // Shaft and water may move already: a filter that starts at rest would see that as acceleration.
+        if !std::mem::replace(&mut self.started, true) {
+            self.flow_m_s = input.measured.flow_m_s.unwrap_or(input.estimate.flow_m_s.value);
+            (self.filtered_speed_rad_s, self.filtered_flow_m_s) = (speed, self.flow_m_s);
+        }
         self.advance_flow(input);
         self.filter(model, input, speed, thrust);
         // Filters remember a suspect tick for a while, so that it must not be learnt from later.

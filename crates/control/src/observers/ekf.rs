@@ -198,6 +198,13 @@ impl Belief {
         }
     }
 
+    /// Goes on from another observer's belief, at the prior's doubt.
+    pub(super) fn start_in(&mut self, water: &Water) {
+        put_back(&mut self.x, water);
+        self.x[FILTERED] = water.speed_rad_s;
+        self.started = true;
+    }
+
     /// Forgets what it believed: the next measured speed starts it again, at the prior's doubt.
     fn restart(&mut self) {
         self.p = Matrix::from_diagonal(&self.noise.prior);
@@ -346,6 +353,10 @@ impl Ekf {
     /// At rest, with the prior covariance.
     pub fn new(model: &ControlModel, options: &ObserverOptions) -> Self {
         Self { belief: Belief::new(model, options), options: *options }
+    }
+
+    pub(super) fn start_in(&mut self, water: &Water) {
+        self.belief.start_in(water);
     }
 
     /// Predict with the motor's torque, correct with what is measured.

@@ -39,6 +39,13 @@ impl Luenberger {
         }
     }
 
+    /// This observer has no load state: a load found by another is left to its corrections.
+    pub(super) fn start_in(&mut self, water: Water) {
+        self.water = Water { load_n_m: 0.0, ..water };
+        self.filtered_rad_s = water.speed_rad_s;
+        self.started = true;
+    }
+
     /// One step.
     pub fn tick(&mut self, input: &ObserverInput) -> Estimate {
         let (model, dt) = (input.model, input.dt_s);
@@ -47,6 +54,7 @@ impl Luenberger {
         {
             self.started = true;
             (self.water.speed_rad_s, self.filtered_rad_s) = (speed, speed);
+            self.water.flow_m_s = model.map.flow_m * speed;
         }
         let before = self.water.speed_rad_s;
         self.water = self.water.step(model, model.torque_constant_nm_a * input.current_a, dt);

@@ -123,6 +123,31 @@ impl Observer {
         }
     }
 
+    /// An observer that goes on from what another one believed: a change under way is no step.
+    pub fn after(
+        kind: ObserverKind,
+        model: &ControlModel,
+        options: &ObserverOptions,
+        last: &Estimate,
+    ) -> Self {
+        let mut observer = Self::new(kind, model, options);
+        let water = Water {
+            speed_rad_s: last.shaft_speed_rad_s.value,
+            flow_m_s: last.flow_m_s.value,
+            swirl_m_s: if model.swirl.is_some() { last.swirl_m_s.value } else { 0.0 },
+            ambient_m_s: last.ambient_m_s.value,
+            load_n_m: last.load_torque_n_m.value,
+        }
+        .boxed(model);
+        match &mut observer {
+            Self::OpenLoop(o) => o.start_in(water),
+            Self::Luenberger(o) => o.start_in(water),
+            Self::Ekf(o) => o.start_in(&water),
+            Self::Ukf(o) => o.start_in(&water),
+        }
+        observer
+    }
+
     /// One step.
     pub fn tick(&mut self, input: &ObserverInput) -> Estimate {
         match self {

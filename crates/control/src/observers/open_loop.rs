@@ -17,6 +17,10 @@ pub struct OpenLoop {
 }
 
 impl OpenLoop {
+    pub(super) fn start_in(&mut self, water: Water) {
+        self.water = water;
+    }
+
     /// One step.
     pub fn tick(&mut self, input: &ObserverInput) -> Estimate {
         let model = input.model;

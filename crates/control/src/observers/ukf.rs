@@ -11,7 +11,7 @@
 //! away from standstill.
 
 use super::ekf::{Belief, FILTERED, FLOW, Matrix, N, SPEED, SWIRL, Vector};
-use super::{ObserverInput, ObserverOptions};
+use super::{ObserverInput, ObserverOptions, Water};
 use crate::model::ControlModel;
 use crate::signals::Estimate;
 
@@ -30,6 +30,10 @@ impl Ukf {
     /// At rest, with the prior covariance.
     pub fn new(model: &ControlModel, options: &ObserverOptions) -> Self {
         Self { belief: Belief::new(model, options), options: *options }
+    }
+
+    pub(super) fn start_in(&mut self, water: &Water) {
+        self.belief.start_in(water);
     }
 
     /// Predict with the motor's torque, correct with what is measured.
