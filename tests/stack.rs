@@ -222,6 +222,28 @@ fn a_second_supervisor_is_told_who_runs_here() {
 }
 
 #[test]
+fn what_stands_in_the_way_of_a_start_is_said_once() {
+    let site = Site::new();
+    let taken = std::net::TcpListener::bind(("127.0.0.1", site.port)).unwrap();
+    let up = run(&mut site.command("up"));
+    let words = String::from_utf8_lossy(&up.stderr);
+    assert_eq!(up.status.code(), Some(1), "{words}");
+    assert_eq!(words.matches("error: gateway.bind").count(), 1, "{words}");
+    assert!(words.contains(&site.port.to_string()) && words.contains("hint:"), "{words}");
+    assert!(up.stdout.is_empty(), "no console is promised");
+    drop(taken);
+    let root = site.folder.path().join("x".repeat(150));
+    let up = run(std::process::Command::new(common::KORT)
+        .args(["up", "--config"])
+        .arg(site.config())
+        .arg("--root")
+        .arg(&root));
+    let words = String::from_utf8_lossy(&up.stderr);
+    assert_eq!(up.status.code(), Some(1), "{words}");
+    assert!(words.contains("at most 100 bytes") && !words.contains("panicked"), "{words}");
+}
+
+#[test]
 fn a_wrong_configuration_is_refused_with_the_nearest_key() {
     let site = Site::new();
     let text = std::fs::read_to_string(site.config()).unwrap();
@@ -236,6 +258,10 @@ fn a_wrong_configuration_is_refused_with_the_nearest_key() {
             vec!["thrusters.t1.limits", "did you mean `full_drive_s`?"],
         ),
         (text.replace("velocity_servo", "velocity"), vec!["velocity", "known are static_map"]),
+        (
+            text.replace("full_drive_s = 0.005", "temperature_c = nan"),
+            vec!["thrusters.t1.limits.temperature_c", "NaN", "hint:"],
+        ),
     ] {
         std::fs::write(site.config(), wrong).unwrap();
         // Each process refuses what it reads; the first three are read by the servo.

@@ -164,7 +164,7 @@ impl Config {
     /// As [`Self::load`].
     pub fn parse(text: &str, file: Option<&Path>) -> Result<Self, ConfigError> {
         let name = file.map_or_else(|| "built-in configuration".into(), |f| f.display().to_string());
-        let fail = |message: String| ConfigError { file: name.clone(), message };
+        let fail = |message: String| ConfigError { file: name.clone(), message: hinted(message) };
         let mut config: Self = toml::from_str(text).map_err(|e| fail(with_hint(&e.to_string())))?;
         config.file = file.map(Path::to_path_buf);
         if config.thrusters.is_empty() {
@@ -197,10 +197,10 @@ impl Config {
             let ratio = t.servo.rate_hz / t.controller.rate_hz;
             if (ratio - ratio.round()).abs() > 1e-6 {
                 return Err(fail(format!(
-                    "`thrusters.{id}.controller.rate_hz` = {} does not divide servo.rate_hz = {}\nhint: {}",
+                    "`thrusters.{id}.controller.rate_hz` = {} does not divide servo.rate_hz = {}\nhint: {} does",
                     t.controller.rate_hz,
                     t.servo.rate_hz,
-                    t.servo.rate_hz / ratio.round().max(1.0)
+                    t.servo.rate_hz / ratio.ceil()
                 )));
             }
         }
@@ -257,10 +257,14 @@ impl Config {
                 known.ok_or_else(|| {
                     let names: Vec<_> = built_in.iter().map(|(name, _)| *name).collect();
                     self.error(format!(
-                        "`{key}` = {}: {} cannot be read: {e}\nhint: a path relative to this file; built in are {}",
+                        "`{key}` = {}: {} cannot be read: {e}\nhint: a path relative to this file{}",
                         path.display(),
                         full.display(),
-                        names.join(", ")
+                        if names.is_empty() {
+                            String::new()
+                        } else {
+                            format!("; built in are {}", names.join(", "))
+                        }
                     ))
                 })
             }
@@ -271,8 +275,16 @@ impl Config {
     pub fn error(&self, message: String) -> ConfigError {
         let file =
             self.file.as_ref().map_or_else(|| "built-in configuration".into(), |f| f.display().to_string());
-        ConfigError { file, message }
+        ConfigError { file, message: hinted(message) }
     }
+}
+
+/// A message that says no way out points at the file that explains every key.
+fn hinted(message: String) -> String {
+    if message.contains("hint:") {
+        return message;
+    }
+    format!("{}\nhint: {DEFAULT_PATH} of the repository explains every key", message.trim_end())
 }
 
 /// Adds the nearest known key to serde's "unknown field `x`, expected one of `a`, `b`".

@@ -35,6 +35,9 @@ pub enum UpError {
     /// Shared memory.
     #[error(transparent)]
     Transport(#[from] TransportError),
+    /// The gateway could not start.
+    #[error(transparent)]
+    Gateway(#[from] kort_gateway::GatewayError),
     /// The system refuses.
     #[error("{what}: {error}")]
     System {
@@ -74,6 +77,7 @@ pub fn run(config: &Config, deployment: &Deployment) -> Result<(), UpError> {
     }
     let thrusters: Vec<&str> = config.thrusters.keys().map(String::as_str).collect();
     let mut owner = deployment.own()?;
+    kort_gateway::check(&gateway)?;
     owner.create(&thrusters)?;
     let program = std::env::current_exe().map_err(system("this program's own path"))?;
     let mut roles: Vec<Role> = thrusters
@@ -137,7 +141,10 @@ pub fn run(config: &Config, deployment: &Deployment) -> Result<(), UpError> {
             break Err(e);
         }
     };
-    go_to_zero(&owner, &thrusters);
+    // A servo that never came up has nothing to set to zero.
+    if roles.iter().any(|role| role.name == "servo" && role.child.is_some()) {
+        go_to_zero(&owner, &thrusters);
+    }
     // The gateway first: nobody commands any more; the servo last.
     roles.iter_mut().rev().for_each(Role::end);
     info!("stopped");
@@ -250,7 +257,9 @@ impl Role {
         self.failed_starts = if killed || self.is_up() { 0 } else { self.failed_starts + 1 };
         // Exit code 2: wrong input, and no restart makes it right.
         self.refused = status.code() == Some(2) && !self.is_up();
-        warn!(thruster = self.thruster, "{} ended ({status})", self.name);
+        let full = status.signal() == Some(Signal::BUS.as_raw());
+        let hint = if full { "\nhint: /dev/shm is full (df /dev/shm)" } else { "" };
+        warn!(thruster = self.thruster, "{} ended ({status}){hint}", self.name);
         self.child = None;
         true
     }

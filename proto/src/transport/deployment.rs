@@ -19,6 +19,13 @@ use thiserror::Error;
 use super::clock::monotonic_ns;
 use super::ports::{Services, create_services};
 
+/// Longest root: iceoryx2 appends up to 130 bytes and panics beyond 255.
+const ROOT_BYTES_MAX: usize = 100;
+/// What the services of one thruster and its peers take in `/dev/shm`, with as much again to spare, KiB.
+const NEEDED_KIB: u64 = 8192;
+/// Files they are.
+const NEEDED_FILES: u64 = 200;
+
 /// Why shared memory cannot be used.
 #[derive(Debug, Error)]
 pub enum TransportError {
@@ -42,7 +49,7 @@ pub enum TransportError {
         error: std::io::Error,
     },
     /// A path that shared memory cannot take.
-    #[error("{}: not usable as the root of shared memory\nhint: an absolute path of at most 100 bytes without odd characters", root.display())]
+    #[error("{}: not usable as the root of shared memory\nhint: a path of at most {ROOT_BYTES_MAX} bytes without odd characters", root.display())]
     Path {
         /// The root folder.
         root: PathBuf,
@@ -53,8 +60,22 @@ pub enum TransportError {
         /// The root folder.
         root: PathBuf,
     },
+    /// No room for the samples: writing them would end in SIGBUS.
+    #[error(
+        "/dev/shm: {free_kib} KiB and {free_files} files are free; {needed_kib} KiB and {NEEDED_FILES} files are needed\nhint: delete what is left over there, or make it larger (a container: shm_size)"
+    )]
+    Room {
+        /// Free space, KiB.
+        free_kib: u64,
+        /// Files that may still be made.
+        free_files: u64,
+        /// Needed space, KiB.
+        needed_kib: u64,
+    },
     /// iceoryx2 said no.
-    #[error("shared memory, {what}: {error}")]
+    #[error(
+        "shared memory, {what}: {error}\nhint: see that /dev/shm has room and belongs to this user (df /dev/shm; ls -l /dev/shm)"
+    )]
     Iceoryx {
         /// What was tried.
         what: String,
@@ -165,6 +186,9 @@ impl Deployment {
 
     fn config(&self, generation: u64) -> Result<Config, TransportError> {
         let path_error = || TransportError::Path { root: self.root.clone() };
+        if self.root.as_os_str().len() > ROOT_BYTES_MAX {
+            return Err(path_error());
+        }
         let mut config = Config::default();
         let folder = self.root.join(format!("{generation:x}"));
         let root =
@@ -215,6 +239,7 @@ impl Owner {
     /// # Errors
     /// [`TransportError`] if iceoryx2 or the file system refuses.
     pub fn create(&mut self, thrusters: &[&str]) -> Result<u64, TransportError> {
+        room_for(thrusters.len() as u64)?;
         let generation = monotonic_ns();
         let node = self.deployment.node("owner", generation)?;
         self.services = thrusters
@@ -256,6 +281,19 @@ impl Owner {
             }
         }
     }
+}
+
+/// Has `/dev/shm` room for this many thrusters? Where that cannot be said, it has.
+fn room_for(thrusters: u64) -> Result<(), TransportError> {
+    let Ok(shm) = rustix::fs::statvfs("/dev/shm") else { return Ok(()) };
+    let free_kib = shm.f_bavail.saturating_mul(shm.f_frsize) / 1024;
+    // A file system that counts no files says zero of zero.
+    let free_files = if shm.f_files == 0 { u64::MAX } else { shm.f_favail };
+    let needed_kib = NEEDED_KIB * thrusters;
+    if free_kib < needed_kib || free_files < NEEDED_FILES {
+        return Err(TransportError::Room { free_kib, free_files, needed_kib });
+    }
+    Ok(())
 }
 
 impl Drop for Owner {

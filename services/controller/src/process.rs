@@ -77,11 +77,16 @@ pub fn run(config: &Config, deployment: &Deployment, id: &str) -> Result<(), Con
             warn!("{missing}");
         }
     }
+    let mut told = false;
     // Outer loop: a new owner of the shared memory begins a new generation; start afresh in it.
     while !stop.load(Ordering::Relaxed) {
-        if deployment.wait_for_generation(Duration::from_secs(1)).is_err() {
+        if let Err(nothing) = deployment.wait_for_generation(Duration::from_secs(1)) {
+            if !std::mem::replace(&mut told, true) {
+                warn!(thruster = id, "waiting: {nothing}");
+            }
             continue;
         }
+        told = false;
         let mut ports = ControllerPorts::open(deployment, id)?;
         let tick = Tick::new(&rig, &law, period_ns, monotonic_ns())
             .map_err(|error| ControllerError::Model { file: file.clone(), error })?;

@@ -26,7 +26,8 @@ class StripChart {
     pen.clearRect(0, 0, width, height);
     pen.font = "12px system-ui, 'DejaVu Sans', sans-serif";
 
-    const box = { left: 52, right: width - 8, top: 40, bottom: height - 20 };
+    const legend = this.places(pen, width);
+    const box = { left: 52, right: width - 8, top: legend[legend.length - 1].top + 13, bottom: height - 20 };
     const start_s = end_s - span_s;
     const shown = this.points.map((list) => list.slice(firstAfter(list, start_s)));
     const [low, high] = range(shown, this.curves[0].atLeast || 1);
@@ -74,14 +75,26 @@ class StripChart {
     const at = this.hover !== null && this.hover >= box.left && this.hover <= box.right
       ? start_s + (this.hover - box.left) / (box.right - box.left) * span_s : null;
     if (at !== null) { pen.strokeStyle = color("--quiet"); line(pen, this.hover, box.top, this.hover, box.bottom); }
-    let left = 4; pen.textAlign = "left";
+    pen.textAlign = "left";
     this.curves.forEach((curve, i) => {
+      const { left, top } = legend[i];
       const value = at === null ? last(shown[i]) : near(shown[i], at);
       const text = `${curve.name} ${value === null ? "–" : value.toFixed(2)}`;
       pen.strokeStyle = color(curve.color); pen.lineWidth = 2; pen.setLineDash(curve.dash || []);
-      line(pen, left, 27, left + 16, 27); pen.setLineDash([]);
-      pen.fillStyle = color("--ink"); pen.fillText(text, left + 21, 31);
-      left += 21 + Math.max(pen.measureText(text).width, pen.measureText(`${curve.name} -000.00`).width) + 14;
+      line(pen, left, top, left + 16, top); pen.setLineDash([]);
+      pen.fillStyle = color("--ink"); pen.fillText(text, left + 21, top + 4);
+    });
+  }
+
+  // Where each curve's entry of the legend stands: a new row where the last one is full.
+  places(pen, width) {
+    let left = 4, top = 27;
+    return this.curves.map((curve) => {
+      const wide = 21 + pen.measureText(`${curve.name} -000.00`).width;
+      if (left > 4 && left + wide > width) { left = 4; top += 16; }
+      const place = { left, top };
+      left += wide + 14;
+      return place;
     });
   }
 }

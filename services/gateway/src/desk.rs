@@ -114,9 +114,14 @@ impl Desk {
 
 /// Refuses what is not a number or beyond the thruster's range.
 pub fn check_range(setpoint: Setpoint, range: SetpointRange) -> Result<(), Problem> {
-    let (field, value, bound, unit) = match setpoint {
-        Setpoint::ThrustN(value) => ("thrust_n", value, range.thrust_n, "N"),
-        Setpoint::SpeedRadS(value) => ("speed_rad_s", value, range.speed_rad_s, "rad/s"),
+    let (field, value, bound, unit, source) = match setpoint {
+        Setpoint::ThrustN(value) => {
+            ("thrust_n", value, range.thrust_n, "N", "what the rig gives in bollard pull at full drive")
+        }
+        Setpoint::SpeedRadS(value) => {
+            let source = "what the rig reaches at full drive, or limits.speed_rad_s of the configuration";
+            ("speed_rad_s", value, range.speed_rad_s, "rad/s", source)
+        }
     };
     if value.is_finite() && value.abs() <= bound {
         return Ok(());
@@ -125,9 +130,7 @@ pub fn check_range(setpoint: Setpoint, range: SetpointRange) -> Result<(), Probl
         Kind::OutOfRange,
         format!("{field} = {value} is outside {:?} to {bound:?} {unit}", -bound),
     )
-    .hint(format!(
-        "the limit is limits.{field} of the configuration; GET /v1/thrusters shows it as range.{field}"
-    )))
+    .hint(format!("the bound is {source}; GET /v1/thrusters shows it as range.{field}")))
 }
 
 #[cfg(test)]

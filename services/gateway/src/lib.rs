@@ -53,9 +53,7 @@ const BODY_BYTES_MAX: usize = 16 * 1024;
 #[derive(Debug, Error)]
 pub enum GatewayError {
     /// The address cannot be listened on.
-    #[error(
-        "gateway.bind = {bind}: {error}\nhint: another program uses it; choose another port with gateway.bind in kort.toml"
-    )]
+    #[error("gateway.bind = {bind}: {error}\nhint: {}", bind_hint(error))]
     Bind {
         /// The address.
         bind: SocketAddr,
@@ -76,6 +74,18 @@ pub enum GatewayError {
     /// The system refuses something else.
     #[error("gateway: {0}")]
     System(#[from] std::io::Error),
+}
+
+fn bind_hint(error: &std::io::Error) -> &'static str {
+    match error.kind() {
+        std::io::ErrorKind::AddrInUse => {
+            "another program uses it; choose another port with gateway.bind in kort.toml"
+        }
+        std::io::ErrorKind::PermissionDenied => {
+            "ports below 1024 need a right; choose another with gateway.bind in kort.toml"
+        }
+        _ => "choose an address of this machine with gateway.bind in kort.toml",
+    }
 }
 
 /// Everything the routes share.
@@ -143,6 +153,16 @@ fn at_once(stream: &mut TcpStream) {
     if let Err(error) = stream.set_nodelay(true) {
         tracing::debug!(%error, "a connection keeps its delay");
     }
+}
+
+/// Could a gateway start with this configuration? Says so before anything else is started.
+///
+/// # Errors
+/// If the address is taken or the folder of the recordings cannot be made.
+pub fn check(settings: &Settings) -> Result<(), GatewayError> {
+    let (bind, folder) = (settings.bind, settings.recordings.clone());
+    std::net::TcpListener::bind(bind).map_err(|error| GatewayError::Bind { bind, error })?;
+    std::fs::create_dir_all(&folder).map_err(|error| GatewayError::Recordings { folder, error })
 }
 
 /// Serves until SIGINT or SIGTERM; then disarms every thruster, closes a running recording and returns.

@@ -7,7 +7,8 @@ use std::time::Duration;
 use kort_control::model::ControlModel;
 use kort_proto::config::{Config, ConfigError};
 use kort_thruster::rig::Rig;
-use serde::Deserialize;
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer};
 
 use crate::view::SetpointRange;
 
@@ -16,6 +17,7 @@ use crate::view::SetpointRange;
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
     /// Address of the console, the REST API and the WebSocket.
+    #[serde(deserialize_with = "address")]
     pub bind: SocketAddr,
     /// Folder of the recordings, relative to the working directory; created if it is not there.
     pub recordings: PathBuf,
@@ -28,6 +30,15 @@ impl Default for Settings {
             recordings: PathBuf::from("kort-state/recordings"),
         }
     }
+}
+
+fn address<'de, D: Deserializer<'de>>(deserializer: D) -> Result<SocketAddr, D::Error> {
+    let text = String::deserialize(deserializer)?;
+    text.parse().map_err(|_| {
+        D::Error::custom(format!(
+            "{text:?} is no address; allowed is IP:PORT\nhint: \"127.0.0.1:8080\", or \"0.0.0.0:8080\" for every interface"
+        ))
+    })
 }
 
 impl Settings {

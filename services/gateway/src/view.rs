@@ -49,13 +49,37 @@ pub struct ThrusterState {
 
 /// What is commanded: exactly one of the two.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
+#[serde(rename_all = "snake_case", try_from = "SetpointKeys")]
 #[schema(example = json!({"thrust_n": 25.0}))]
 pub enum Setpoint {
     /// Thrust, N; positive pushes ahead.
     ThrustN(f64),
     /// Shaft speed, rad/s; positive turns ahead.
     SpeedRadS(f64),
+}
+
+/// A setpoint as written. serde takes an object with no key or two for a broken enum, which would be
+/// reported as broken JSON.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, expecting = "an object with thrust_n or speed_rad_s")]
+struct SetpointKeys {
+    thrust_n: Option<f64>,
+    speed_rad_s: Option<f64>,
+}
+
+impl TryFrom<SetpointKeys> for Setpoint {
+    type Error = &'static str;
+
+    fn try_from(keys: SetpointKeys) -> Result<Self, Self::Error> {
+        match keys {
+            SetpointKeys { thrust_n: Some(value), speed_rad_s: None } => Ok(Self::ThrustN(value)),
+            SetpointKeys { thrust_n: None, speed_rad_s: Some(value) } => Ok(Self::SpeedRadS(value)),
+            SetpointKeys { thrust_n: None, speed_rad_s: None } => {
+                Err("no setpoint; allowed is a number as thrust_n or as speed_rad_s")
+            }
+            _ => Err("two setpoints; allowed is one of thrust_n and speed_rad_s"),
+        }
+    }
 }
 
 /// Largest magnitude of each kind of setpoint.

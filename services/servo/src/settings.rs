@@ -21,6 +21,35 @@ struct LimitKeys {
     temperature_c: Option<f64>,
 }
 
+impl LimitKeys {
+    fn check(&self) -> Result<(), (&'static str, f64)> {
+        first_odd([
+            ("limits.current_a", self.current_a),
+            ("limits.trip_current_a", self.trip_current_a),
+            ("limits.continuous_current_a", self.continuous_current_a),
+            ("limits.thermal_time_constant_s", self.thermal_time_constant_s),
+            ("limits.speed_rad_s", self.speed_rad_s),
+            ("limits.trip_speed_rad_s", self.trip_speed_rad_s),
+            ("limits.full_drive_s", self.full_drive_s),
+            ("limits.supply_low_v", self.supply_low_v),
+            ("limits.supply_high_v", self.supply_high_v),
+            ("limits.temperature_c", self.temperature_c),
+        ])
+    }
+}
+
+impl CheckKeys {
+    fn check(&self) -> Result<(), (&'static str, f64)> {
+        first_odd([("checks.frozen_s", self.frozen_s), ("checks.spike_rad_s", self.spike_rad_s)])
+    }
+}
+
+/// The first key that was given something that is not finite.
+fn first_odd<const N: usize>(keys: [(&'static str, Option<f64>); N]) -> Result<(), (&'static str, f64)> {
+    let odd = keys.into_iter().find_map(|(key, value)| Some((key, value.filter(|v| !v.is_finite())?)));
+    odd.map_or(Ok(()), Err)
+}
+
 /// Section `checks` as written.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -82,12 +111,18 @@ impl Settings {
         let section = |part: &str| format!("thrusters.{id}.{part}");
         let keys: LimitKeys = config.section(&section("limits"), &thruster.limits)?;
         let checks: CheckKeys = config.section(&section("checks"), &thruster.checks)?;
+        // A limit that is not a number never trips: it would be switched off without a word.
+        keys.check().and_then(|()| checks.check()).map_err(|(key, value)| {
+            config.error(format!(
+                "`thrusters.{id}.{key}` = {value}; allowed is a finite number\nhint: leave the key out for the usual value"
+            ))
+        })?;
         let positive = |key: &str, value: f64| {
             if value > 0.0 {
                 return Ok(value);
             }
             Err(config.error(format!(
-                "`thrusters.{id}.{key}` = {value} is not above zero\nhint: leave it out to take the rig's"
+                "`thrusters.{id}.{key}` = {value} is not above zero\nhint: leave the key out for the usual value"
             )))
         };
         let need = |key: &str, value: Option<f64>, instead: &str| {
@@ -159,6 +194,18 @@ impl Settings {
             return Err(config.error(format!(
                 "`thrusters.{id}.limits.trip_current_a` = {} is below current_a = {current_a}\nhint: 1.25 times current_a",
                 limits.trip_current_a
+            )));
+        }
+        if limits.trip_speed_rad_s < speed_rad_s {
+            return Err(config.error(format!(
+                "`thrusters.{id}.limits.trip_speed_rad_s` = {} is below speed_rad_s = {speed_rad_s}\nhint: 1.15 times speed_rad_s",
+                limits.trip_speed_rad_s
+            )));
+        }
+        let (low, high) = limits.supply_v;
+        if low >= high {
+            return Err(config.error(format!(
+                "`thrusters.{id}.limits.supply_low_v` = {low} is not below supply_high_v = {high}\nhint: the band around the supply's nominal voltage"
             )));
         }
         // 3.5 of the controller's periods, so that zero torque is reached within five.

@@ -216,6 +216,9 @@ impl Table {
     }
 }
 
+/// Size of a chunk before compression, bytes: what a kill without a flush may cost, some 700 rows.
+const CHUNK_BYTES: u64 = 128 * 1024;
+
 /// Writes rows as JSON messages of one channel.
 pub(super) struct Rows<W: Write + Seek> {
     writer: mcap::Writer<W>,
@@ -231,6 +234,7 @@ impl<W: Write + Seek> Rows<W> {
             .library(concat!("kort ", env!("CARGO_PKG_VERSION")))
             .compression(Some(mcap::Compression::Zstd))
             .compression_threads(0)
+            .chunk_size(Some(CHUNK_BYTES))
             .create(output)
             .map_err(io::Error::other)?;
         let schema = schema(columns).to_string();

@@ -130,6 +130,8 @@ fn a_torn_mcap_opens_up_to_its_last_complete_chunk() {
     assert!(torn.rows() > 50_000 && torn.rows() < 150_000, "{}", torn.rows());
     assert!(torn.losses[0].contains("cut off"), "{:?}", torn.losses);
     assert!(torn.time_s[..] == whole.time_s[..torn.rows()]);
+    let early = decode("rec", &bytes[..bytes.len() / 10], None).unwrap();
+    assert!(early.rows() > 10_000, "{}", early.rows());
     // Only the index at the end missing: every message is there, and the file still says so.
     let data_only = decode("rec", &bytes[..bytes.len() - 20], None).unwrap();
     assert_eq!(data_only.rows(), whole.rows());

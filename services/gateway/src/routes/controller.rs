@@ -52,7 +52,7 @@ pub struct LawParameter {
 
 /// A law to switch to, parameters to change, or both.
 #[derive(Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "an object")]
 #[schema(example = json!({"controller": "velocity_servo"}))]
 pub struct ControllerRequest {
     /// Law to switch to; left out keeps the present one.

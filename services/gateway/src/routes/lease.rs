@@ -22,7 +22,7 @@ pub fn routes() -> OpenApiRouter<Arc<App>> {
 
 /// Who wants command, and for how long.
 #[derive(Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "an object with holder")]
 #[schema(example = json!({"holder": "bench", "ttl_ms": 10000}))]
 struct LeaseRequest {
     /// Name shown to everybody else who asks: 1 to 64 characters, no control characters.
@@ -31,19 +31,19 @@ struct LeaseRequest {
     /// Life of the lease without a command, ms.
     #[serde(default = "ttl_default_ms", deserialize_with = "whole_number")]
     #[schema(minimum = 1, maximum = 60000, default = 500)]
-    ttl_ms: u64,
+    ttl_ms: i64,
 }
 
-fn ttl_default_ms() -> u64 {
-    TTL_DEFAULT_MS
+fn ttl_default_ms() -> i64 {
+    TTL_DEFAULT_MS as i64
 }
 
 /// JSON knows one kind of number: 500.0 is as whole as 500.
-fn whole_number<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u64, D::Error> {
+fn whole_number<'de, D: Deserializer<'de>>(deserializer: D) -> Result<i64, D::Error> {
     let value = f64::deserialize(deserializer)?;
-    // The range is checked later, with words of its own; what is negative or huge ends up outside of it.
+    // The range is checked later, with words of its own; what is negative or huge is outside of it.
     if value.fract() == 0.0 {
-        Ok(if value < 0.0 { 0 } else { value as u64 })
+        Ok(value as i64)
     } else {
         Err(D::Error::custom(format!("ttl_ms = {value} is not a whole number of milliseconds")))
     }
@@ -91,14 +91,14 @@ async fn take(
         )
         .hint("a short name that others recognise, for example \"bench\""));
     }
-    if !(1..=TTL_MAX_MS).contains(&request.ttl_ms) {
+    let Some(ttl_ms) = u64::try_from(request.ttl_ms).ok().filter(|ms| (1..=TTL_MAX_MS).contains(ms)) else {
         return Err(Problem::new(
             Kind::OutOfRange,
             format!("ttl_ms = {} is outside 1 to {TTL_MAX_MS}", request.ttl_ms),
         )
         .hint("a lease is renewed by every accepted command; it need not be long"));
-    }
-    let (lease, now) = thruster.take_lease(&request.holder, request.ttl_ms)?;
+    };
+    let (lease, now) = thruster.take_lease(&request.holder, ttl_ms)?;
     Ok((StatusCode::CREATED, axum::Json(LeaseGrant::of(&lease, now))))
 }
 

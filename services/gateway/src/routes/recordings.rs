@@ -26,7 +26,7 @@ pub fn routes() -> OpenApiRouter<Arc<App>> {
 
 /// What to record. Every field may be left out, and so may the whole body.
 #[derive(Default, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "an object")]
 #[schema(example = json!({"thruster": "t1", "name": "step-100-n", "rate_hz": 100}))]
 struct RecordingRequest {
     /// Thruster to record; the first of the configuration if left out.

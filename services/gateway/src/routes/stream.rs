@@ -22,6 +22,8 @@ use crate::view::{Setpoint, ThrusterState};
 
 const HZ_MAX: f64 = 500.0;
 const MESSAGE_BYTES_MAX: usize = 4096;
+/// A message up to this size is still read, so that it can be answered; a longer one ends the connection.
+const MESSAGE_BYTES_READ: usize = 1 << 20;
 
 pub fn routes() -> OpenApiRouter<Arc<App>> {
     OpenApiRouter::new().routes(routes!(stream))
@@ -44,7 +46,7 @@ fn hz_default() -> f64 {
 
 /// What a client may send.
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "an object with setpoint and lease_id")]
 struct Incoming {
     setpoint: Setpoint,
     lease_id: String,
@@ -77,7 +79,7 @@ async fn stream(
     }
     match upgrade {
         Ok(upgrade) => Ok(upgrade
-            .max_message_size(MESSAGE_BYTES_MAX)
+            .max_message_size(MESSAGE_BYTES_READ)
             .on_upgrade(move |socket| serve(app, thruster, socket, Duration::from_secs_f64(1.0 / hz)))
             .into_response()),
         Err(Rejection::InvalidConnectionHeader(_) | Rejection::InvalidUpgradeHeader(_)) => {
@@ -118,6 +120,13 @@ async fn serve(app: Arc<App>, thruster: Arc<Thruster>, mut socket: WebSocket, pe
 }
 
 fn command(thruster: &Thruster, body: &str) -> Result<(), Problem> {
+    if body.len() > MESSAGE_BYTES_MAX {
+        return Err(Problem::new(
+            Kind::BodyTooLarge,
+            format!("the message has {} bytes; allowed are {MESSAGE_BYTES_MAX}", body.len()),
+        )
+        .hint("no command needs that much"));
+    }
     let incoming: Incoming = serde_json::from_str(body).map_err(|error| {
         let kind = if error.is_data() { Kind::InvalidField } else { Kind::MalformedJson };
         Problem::new(kind, error.to_string())

@@ -98,7 +98,7 @@ fn text(parts: &[Part]) -> String {
                 shown(&row.ours),
                 if change.is_empty() { String::new() } else { format!(" ({change})") }
             );
-            if row.verdict == Verdict::Disagrees {
+            if row.verdict != Verdict::Agrees {
                 let _ = writeln!(out, "{:17}{}", "", row.note);
             }
         }
