@@ -137,6 +137,89 @@ fn a_log_is_replayed_and_adaptation_is_held_to_the_truth() {
     assert!(text(&run.stderr).contains("settle_s"), "{}", text(&run.stderr));
 }
 
+/// What a scenario may say is checked before anything runs: the file, the key, what is allowed.
+#[test]
+fn mistakes_in_a_scenario_are_named() {
+    let folder = tempfile::tempdir().expect("folder");
+    let fault = "[[sensor_fault]]\nchannel = \"thrust_n\"\nat_s = 3\nfor_s = 1\n";
+    let effect = "[[effect]]\nid = \"coulomb_friction\"\n";
+    for (more, words) in [
+        ("[ambeint]\nmean_m_s = 0.1\n".to_owned(), ["ambeint", "ambient"]),
+        (
+            format!("{effect}values = {{ coulomb_torqe_n_m = 0.1 }}\n"),
+            ["coulomb_torqe_n_m", "coulomb_torque_n_m"],
+        ),
+        (format!("{effect}values = {{ coulomb_torque_n_m = -7 }}\n"), ["-7", "outside"]),
+        ("[[supply_sag]]\nat_s = 1\nfor_s = 1\nto = 1.8\n".to_owned(), ["supply_sag.to", "0 to 1"]),
+        (format!("{fault}lie = \"bias\"\n"), ["sensor_fault.size", "missing"]),
+        (format!("{fault}lie = \"stuck\"\nsize = 2\n"), ["sensor_fault.size", "leave it out"]),
+        (format!("{fault}lie = \"fibs\"\n"), ["fibs", "dropout"]),
+        (
+            "[[process_fault]]\nkind = \"controller_frozen\"\nat_s = 90\nfor_s = 1\n".to_owned(),
+            ["process_fault.at_s", "0 to 12"],
+        ),
+        (
+            "[[truth.change]]\nat_s = -1\nfactors = { lift_max = 0.7 }\n".to_owned(),
+            ["truth.change.at_s", "0 to 12"],
+        ),
+        ("[truth]\nfactors = { lift = 0.7 }\n".to_owned(), ["lift", "lift_max"]),
+        (
+            "[[reference]]\nkind = \"replay\"\nfile = \"none.csv\"\n".to_owned(),
+            ["none.csv", "no such recording"],
+        ),
+    ] {
+        let file = scenario(folder.path(), &more);
+        let run = kort(&["soak", file.to_str().expect("utf-8")]);
+        let said = text(&run.stderr);
+        assert_eq!(run.status.code(), Some(2), "{more}{said}");
+        assert!(words.iter().all(|w| said.contains(w)) && said.contains("hint:"), "{more}{said}");
+    }
+    // A page that cannot be written is said before the hours are driven, not after.
+    let file = scenario(folder.path(), "");
+    let run = kort(&["soak", file.to_str().expect("utf-8"), "--html", "/no/such/folder/soak.html"]);
+    assert!(!run.status.success() && run.stdout.is_empty() && text(&run.stderr).contains("/no/such/folder"));
+}
+
+/// Someone's own thruster, by a path of their own: every law gives thrust, within its limits.
+#[test]
+fn a_thruster_of_ones_own_is_driven_by_every_law() {
+    let folder = tempfile::tempdir().expect("folder");
+    std::fs::write(
+        folder.path().join("mine.toml"),
+        "[rig]\nname = \"mine\"\n\
+         [propeller]\nradius_m = 0.06\nduct_length_m = 0.05\npitch_rad = 0.4\nlift_max = 1.0\ndrag_max = 1.1\n\
+         [flow]\ndensity_kg_m3 = 1025\nflux_coefficient = 2.0\nadded_mass_coefficient = 1.5\n\
+         [motor]\ninertia_kg_m2 = 4e-4\ntorque_constant_nm_a = 0.12\nwinding_resistance_ohm = 0.3\n\
+         [amplifier]\nkind = \"current\"\ntime_constant_s = 0.003\ncurrent_limit_a = 15\nsupply_v = 24\n",
+    )
+    .expect("rig");
+    let file = scenario(folder.path(), "");
+    let words = std::fs::read_to_string(&file).expect("scenario");
+    let (before, rest) = words.split_once("rig = ").expect("a rig");
+    let (_, after) = rest.split_once('\n').expect("a line");
+    std::fs::write(&file, format!("{before}rig = \"mine.toml\"\n{after}")).expect("scenario");
+    let laws = "static_map,velocity_servo,model1_inversion,model2_inversion,model3_inversion,\
+                rotational_flow_inversion,torque_control,power_control,combined_anti_spin,thrust_pi,\
+                trimmed_model2_inversion,look_ahead,adaptive_model2_inversion,gradient_model2_inversion,\
+                ukf_model2_inversion,luenberger_model2_inversion";
+    let run = kort(&["soak", file.to_str().expect("utf-8"), "--json", "--seeds", "1", "--controllers", laws]);
+    assert!(run.status.success(), "{}", text(&run.stderr));
+    let report: Value = serde_json::from_slice(&run.stdout).expect("JSON");
+    let scenario = &report["scenarios"][0];
+    let most = scenario["thrust_max_n"].as_f64().expect("thrust");
+    let laws = scenario["laws"].as_array().expect("laws");
+    assert_eq!(laws.len(), 16);
+    for law in laws {
+        let of = |score: &str| law["scores"][score]["mean"].as_f64().unwrap_or(f64::NAN);
+        assert!(of("thrust_rms_n") < 0.2 * most, "{law}");
+        assert_eq!(of("limits_broken"), 0.0, "{law}");
+        // No propeller beats the ideal one, and copper is part of the energy.
+        assert!(of("energy_over_ideal") > 1.0, "{law}");
+        let copper = of("copper_loss_per_impulse_j_n_s");
+        assert!(copper > 0.0 && copper < of("energy_per_impulse_j_n_s"), "{law}");
+    }
+}
+
 #[test]
 fn wrong_input_is_named() {
     let folder = tempfile::tempdir().expect("folder");

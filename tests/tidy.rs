@@ -49,7 +49,6 @@ const LONG: &[(&str, usize)] = &[
     ("crates/thruster/src/rig.rs", 600),
     ("crates/thruster/src/scenario/excitation.rs", 640),
     ("proto/src/messages.rs", 540),
-    ("services/lab/src/soak/scenario.rs", 560),
     ("tests/gateway.rs", 560),
 ];
 

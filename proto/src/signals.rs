@@ -49,6 +49,22 @@ macro_rules! table {
         impl $part {
             /// Nothing measured.
             pub const UNKNOWN: Self = Self { $($name: f64::NAN,)* };
+
+            /// How many there are.
+            pub const COUNT: usize = [$(stringify!($name)),*].len();
+
+            /// All values, in the order of the table.
+            #[inline]
+            pub fn values(&self) -> [f64; Self::COUNT] {
+                [$(self.$name),*]
+            }
+
+            /// From all values, in the order of the table.
+            #[inline]
+            pub fn from_values(values: [f64; Self::COUNT]) -> Self {
+                let [$($name),*] = values;
+                Self { $($name),* }
+            }
         }
 
         impl Default for $part {
@@ -112,6 +128,9 @@ mod tests {
             let read: Vec<_> =
                 SIGNALS.iter().filter(|r| !(r.get)(&signals).is_nan()).map(|r| r.name).collect();
             assert_eq!(read, [row.name]);
+            let place = SIGNALS.iter().position(|r| r.name == row.name).unwrap();
+            assert_eq!(signals.values()[place], 1.5);
+            assert_eq!((row.get)(&Signals::from_values(signals.values())), 1.5);
         }
     }
 

@@ -308,17 +308,19 @@ impl ControlModel {
     /// Thrust and torque with their slopes, from differentiating the singularity-free form.
     pub fn slopes(&self, inflow: Inflow) -> Slopes {
         let (ut, vp) = (inflow.tangential_m_s, inflow.axial_m_s);
-        let v = (ut * ut + vp * vp).sqrt();
-        if v < 1e-9 {
+        let v2 = ut * ut + vp * vp;
+        if v2 < 1e-18 {
             return Slopes::default();
         }
+        // One division: every slope of every tick passes here.
+        let by_v = 1.0 / v2.sqrt();
         let (s, c) = self.pitch;
         let (cl, cd) = (self.blade.lift_max, self.blade.drag_max);
         let wn = ut * s - vp * c;
         let wc = ut * c + vp * s;
-        let g = wn / v;
-        let v3 = v * v * v;
-        let (g_ut, g_vp) = ((s * v * v - wn * ut) / v3, (-c * v * v - wn * vp) / v3);
+        let g = wn * by_v;
+        let by_v3 = by_v * by_v * by_v;
+        let (g_ut, g_vp) = ((s * v2 - wn * ut) * by_v3, (-c * v2 - wn * vp) * by_v3);
         let t = cl * wc * ut - cd * wn * vp;
         let q = cl * wc * vp + cd * wn * ut;
         let (t_ut, t_vp) = (cl * (c * ut + wc) - cd * s * vp, cl * s * ut - cd * (wn - c * vp));

@@ -42,6 +42,25 @@ fn estimates_converge_on_the_truth() {
     }
 }
 
+/// With a flow meter the flux coefficient is found too, and is not laid on lift and drag.
+#[test]
+fn a_flow_meter_tells_the_flux_coefficient() {
+    let rig = &rigs()[0];
+    for estimator in ADAPTIVE {
+        for factor in [0.75, 1.3] {
+            let mut config = config(estimator);
+            config.adaptation.adapt_flux = true;
+            let mut l = Loop::with_truth(rig, &config, 0.001, &[(Parameter::FluxCoefficient, factor)]);
+            l.flow_meter = true;
+            excite(&mut l, 90.0);
+            let found = l.controller.adapted().ratio;
+            for (ratio, expected) in found.iter().zip([1.0, 1.0, factor]) {
+                assert!((ratio / expected - 1.0).abs() < 0.06, "{} {factor}: {found:?}", estimator.name());
+            }
+        }
+    }
+}
+
 #[test]
 fn adaptation_freezes_without_excitation_or_sensor() {
     let rig = &rigs()[0];

@@ -11,7 +11,7 @@ use kort_proto::messages::{
     Command, ControllerState, DriveKind, Fresh, Freshness, LAWS, Outcome, Parameter, Process,
     REQUEST_LIFE_NS, Reply, Request, RequestKind, Setpoint, SetpointKind, Telemetry,
 };
-use kort_proto::signals::{Estimates, SIGNALS, Signals};
+use kort_proto::signals::{Estimates, Signals};
 use kort_proto::text::Text;
 use kort_thruster::rig::{AmplifierKind, Rig};
 
@@ -45,7 +45,7 @@ pub struct Tick {
     drive_max: f64,
     measured: Signals,
     /// When each of them was last read.
-    read_ns: [u64; SIGNALS.len()],
+    read_ns: [u64; Signals::COUNT],
     last_ns: u64,
     latched: u64,
     limits: u64,
@@ -97,7 +97,7 @@ impl Tick {
             armed_at_ns: 0,
             drive_max: 0.0,
             measured: Signals::UNKNOWN,
-            read_ns: [0; SIGNALS.len()],
+            read_ns: [0; Signals::COUNT],
             last_ns: started_ns,
             latched: 0,
             limits: 0,
@@ -124,15 +124,18 @@ impl Tick {
         self.armed_at_ns = telemetry.armed_at_ns;
         self.drive_max = if telemetry.drive_max.is_finite() { telemetry.drive_max.max(0.0) } else { 0.0 };
         // A slow sensor shows a value only on some ticks: keep the newest of each.
-        for (row, read_ns) in SIGNALS.iter().zip(&mut self.read_ns) {
-            let value = (row.get)(&telemetry.signals);
+        let mut held = self.measured.values();
+        for ((value, held), read_ns) in
+            telemetry.signals.values().into_iter().zip(&mut held).zip(&mut self.read_ns)
+        {
             if value.is_finite() {
                 *read_ns = now_ns;
-                (row.set)(&mut self.measured, value);
+                *held = value;
             } else if now_ns.saturating_sub(*read_ns) > READING_LIFE_NS {
-                (row.set)(&mut self.measured, f64::NAN);
+                *held = f64::NAN;
             }
         }
+        self.measured = Signals::from_values(held);
         // A needed sensor that is gone must not look alive.
         if !telemetry.signals.shaft_speed_rad_s.is_finite() {
             self.measured.shaft_speed_rad_s = f64::NAN;

@@ -76,6 +76,7 @@ impl Desk {
     /// Gives command up: at rest.
     pub fn give(&mut self, id: Option<&str>, now: Instant) -> Result<(), Problem> {
         self.lease.give(&self.thruster, id, now)?;
+        self.version += 1;
         self.rest();
         Ok(())
     }
@@ -154,6 +155,16 @@ mod tests {
         let next = desk.take("other", 500, t0 + Duration::from_millis(600)).unwrap();
         assert_ne!(next.id, lease.id);
         assert_eq!(desk.setpoint(), None, "a new holder starts at rest");
+    }
+
+    /// The state is rendered once a version: nothing may change without a new one.
+    #[test]
+    fn a_lease_given_up_at_rest_shows_at_once() {
+        let (mut desk, t0) = (Desk::new("t1"), Instant::now());
+        let lease = desk.take("bench", 500, t0).unwrap();
+        let before = desk.version();
+        desk.give(Some(&lease.id), t0).unwrap();
+        assert_ne!(desk.version(), before);
     }
 
     #[test]

@@ -91,6 +91,15 @@ pub fn write_text(path: &Path, text: &str) -> Result<(), Failure> {
     std::fs::write(path, text).map_err(|e| Failure::unwritten(path, e))
 }
 
+/// Whether a file can be written, asked before a long run: what is there already stays.
+///
+/// # Errors
+/// Names the file.
+pub fn check_writable(path: &Path) -> Result<(), Failure> {
+    let opened = std::fs::OpenOptions::new().append(true).create(true).open(path);
+    opened.map(drop).map_err(|e| Failure::unwritten(path, e))
+}
+
 /// Prints to stdout; a closed pipe (`kort … | head`) ends the output quietly.
 pub fn print(text: &str) {
     use std::io::Write;

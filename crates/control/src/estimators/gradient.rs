@@ -33,7 +33,7 @@ impl Gradient {
     /// One step.
     pub fn tick(&mut self, input: &EstimatorInput) -> Option<Adapted> {
         self.elapsed_s += input.dt_s;
-        let outcome = self.regression.tick(input)?;
+        let outcome = self.regression.tick(input, self.adapted.ratio[2])?;
         let dt = std::mem::take(&mut self.elapsed_s);
         match outcome {
             Err(why) => self.adapted.frozen = Some(why),

@@ -8,7 +8,9 @@
 //! ```
 //! Both sides pass `lam/(s + lam)`, so that no derivative is taken: `F[x'] = lam (x - F[x])`. The
 //! flow comes from the momentum balance under the *measured* thrust, pulled by the flow meter
-//! where there is one: it does not depend on the coefficients that are being learnt.
+//! where there is one: it does not depend on lift and drag, which are being learnt. Where the flux
+//! coefficient is learnt too, the balance runs on its newest value: what is left between balance and
+//! meter, `m` times the pull, is then that coefficient's error (an adaptive observer).
 //!
 //! Assumes: inertia, torque constant, friction and added mass known; still water unless the ambient
 //! flow is measured. Needs measured: shaft speed, current, thrust; a flow meter helps in ambient flow.
@@ -99,7 +101,8 @@ impl Regression {
     }
 
     /// Advances the filters; every hundredth of a second gives the equations or why there are none.
-    pub fn tick(&mut self, input: &EstimatorInput) -> Option<Result<[Equation; 3], Freeze>> {
+    /// `flux_ratio` is the flux coefficient as learnt so far over the stated one.
+    pub fn tick(&mut self, input: &EstimatorInput, flux_ratio: f64) -> Option<Result<[Equation; 3], Freeze>> {
         let (model, dt) = (input.nominal, input.dt_s);
         let Some(speed) = input.measured.shaft_speed_rad_s else { return Some(Err(Freeze::NotMeasured)) };
         let thrust = input.measured.thrust_n;
@@ -108,7 +111,7 @@ impl Regression {
             self.flow_m_s = input.measured.flow_m_s.unwrap_or(input.estimate.flow_m_s.value);
             (self.filtered_speed_rad_s, self.filtered_flow_m_s) = (speed, self.flow_m_s);
         }
-        self.advance_flow(input);
+        self.advance_flow(input, flux_ratio);
         self.filter(model, input, speed, thrust);
         // Filters remember a suspect tick for a while, so that it must not be learnt from later.
         self.suspect_s = if input.suspect { 2.0 / self.lambda_rad_s } else { (self.suspect_s - dt).max(0.0) };
@@ -127,15 +130,15 @@ impl Regression {
         })
     }
 
-    fn advance_flow(&mut self, input: &EstimatorInput) {
+    fn advance_flow(&mut self, input: &EstimatorInput, flux_ratio: f64) {
         let (model, dt) = (input.nominal, input.dt_s);
         let Some(thrust) = input.measured.thrust_n else {
             self.flow_m_s = input.estimate.flow_m_s.value;
             return;
         };
         let ambient = input.measured.ambient_m_s.unwrap_or(0.0);
-        let rate = model.flow_acceleration(thrust, self.flow_m_s, ambient);
-        let flux = model.flux_coefficient * model.blade.density_kg_m3 * model.blade.area_m2();
+        let flux = flux_ratio * model.flux_coefficient * model.blade.density_kg_m3 * model.blade.area_m2();
+        let rate = (thrust - flux * (self.flow_m_s - ambient) * self.flow_m_s.abs()) / model.added_mass_kg;
         let decay = 2.0 * flux * self.flow_m_s.abs() / model.added_mass_kg;
         let pull = input.measured.flow_m_s.map_or(0.0, |f| 3.0 * (f - self.flow_m_s));
         self.flow_m_s += dt * (rate + pull) / (1.0 + dt * decay);

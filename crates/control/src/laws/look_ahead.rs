@@ -9,7 +9,7 @@
 //!
 //! Assumes: as `model2_inversion`. Needs measured: shaft speed; the rest sharpens the observer.
 //!
-//! Fails: as `model2_inversion` for errors of `v^` and blades; costs some microseconds a tick, fixed
+//! Fails: as `model2_inversion` for errors of `v^` and blades; costs a microsecond or two a tick, fixed
 //! in number of model evaluations, whatever the state.
 
 use serde::{Deserialize, Serialize};
@@ -24,8 +24,6 @@ use crate::observers::LoadTorque;
 const STEPS: usize = 14;
 /// Steps under the first current.
 const FIRST: usize = 3;
-/// Thrust errors along the horizon, and the speed error at its end.
-const RESIDUALS: usize = STEPS + 1;
 /// Weight of the speed error at the end. Near standstill thrust hardly depends on the current (it
 /// is quadratic in speed) and alone would let the shaft hunt.
 const END_WEIGHT: f64 = 0.5;
@@ -77,6 +75,26 @@ struct Start {
     aim_rad_s: f64,
 }
 
+/// The least-squares problem of one tick, in currents as shares of the limit.
+#[derive(Clone, Copy, Debug, Default)]
+struct Normal {
+    h11: f64,
+    h12: f64,
+    h22: f64,
+    g1: f64,
+    g2: f64,
+}
+
+impl Normal {
+    fn add(&mut self, error: f64, [j1, j2]: [f64; 2]) {
+        self.h11 += j1 * j1;
+        self.h12 += j1 * j2;
+        self.h22 += j2 * j2;
+        self.g1 += j1 * error;
+        self.g2 += j2 * error;
+    }
+}
+
 impl LookAhead {
     /// At rest.
     pub fn new(model: &ControlModel, servo: &ServoOptions, options: &LookAheadOptions) -> Self {
@@ -97,68 +115,68 @@ impl LookAhead {
         }
     }
 
-    /// Predicted errors under two currents, as shares of the largest thrust and speed.
-    fn predict(
-        &self,
-        model: &ControlModel,
-        start: &Start,
-        moves: [f64; 2],
-        thrust_n: f64,
-    ) -> [f64; RESIDUALS] {
+    /// Predicted errors under the two currents and how they depend on them, in one run: the
+    /// sensitivities of shaft and flow to each current are carried along with the states.
+    fn predict(&self, model: &ControlModel, start: &Start, thrust_n: f64) -> Normal {
         let h = self.step_s;
+        let (lever, inertia, mass) = (model.blade.lever_m(), model.inertia_kg_m2, model.added_mass_kg);
+        let flux = model.flux_coefficient * model.blade.density_kg_m3 * model.blade.area_m2();
+        let kt = model.torque_constant_nm_a;
         let (mut speed, mut flow, mut current) = (start.speed_rad_s, start.flow_m_s, start.drive_a);
+        // By the first and by the second current.
+        let (mut d_speed, mut d_flow, mut d_current) = ([0.0; 2], [0.0; 2], [0.0; 2]);
         let follow = h / (model.amplifier_lag_s + model.period_s + h);
-        let inverse_scale = 1.0 / model.thrust_max_n;
-        let mut errors = [0.0; RESIDUALS];
-        for (k, error) in errors[..STEPS].iter_mut().enumerate() {
-            current += (moves[usize::from(k >= FIRST)] - current) * follow;
-            let s = model.slopes(model.blade.inflow(speed, flow, start.swirl_m_s));
-            let torque = model.torque_constant_nm_a * current
-                - s.torque_n_m
-                - model.friction_n_m(speed)
-                - start.unexplained_n_m;
+        let (scale, limit) = (1.0 / model.thrust_max_n, model.current_limit_a);
+        let mut normal = Normal::default();
+        let mut s = model.slopes(model.blade.inflow(speed, flow, start.swirl_m_s));
+        for k in 0..STEPS {
+            let active = usize::from(k >= FIRST);
+            current += (self.moves[active] - current) * follow;
+            let torque = kt * current - s.torque_n_m - model.friction_n_m(speed) - start.unexplained_n_m;
             // Linearly implicit in the shaft's and the flow's own damping: no step is too long.
-            let damping = model.blade.lever_m() * s.torque_by_tangential.max(0.0) / model.inertia_kg_m2;
-            speed += h * torque / model.inertia_kg_m2 / (1.0 + h * damping);
+            let damping = lever * s.torque_by_tangential.max(0.0) / inertia;
+            let (by_torque, by_rate) =
+                (h / inertia / (1.0 + h * damping), h / (1.0 - h * s.thrust_by_axial.min(0.0) / mass));
             let rate = model.flow_acceleration(s.thrust_n, flow, start.ambient_m_s);
-            let decay = -s.thrust_by_axial.min(0.0) / model.added_mass_kg;
-            flow += h * rate / (1.0 + h * decay);
-            *error = (model.load(speed, flow, start.swirl_m_s).thrust_n - thrust_n) * inverse_scale;
+            let outflow = flux * (flow.abs() + (flow - start.ambient_m_s) * flow.signum());
+            for j in 0..2 {
+                d_current[j] += (f64::from(u8::from(j == active)) - d_current[j]) * follow;
+                let d_torque = kt * d_current[j]
+                    - (lever * s.torque_by_tangential + model.viscous_friction_nm_s) * d_speed[j]
+                    - s.torque_by_axial * d_flow[j];
+                let d_thrust = lever * s.thrust_by_tangential * d_speed[j] + s.thrust_by_axial * d_flow[j];
+                d_flow[j] += by_rate * (d_thrust - outflow * d_flow[j]) / mass;
+                d_speed[j] += by_torque * d_torque;
+            }
+            speed += by_torque * torque;
+            flow += by_rate * rate;
+            s = model.slopes(model.blade.inflow(speed, flow, start.swirl_m_s));
+            let slope = |j: usize| {
+                limit * scale * (lever * s.thrust_by_tangential * d_speed[j] + s.thrust_by_axial * d_flow[j])
+            };
+            normal.add((s.thrust_n - thrust_n) * scale, [slope(0), slope(1)]);
         }
-        errors[STEPS] = END_WEIGHT * (speed - start.aim_rad_s) / model.speed_max_rad_s;
-        errors
+        let weight = END_WEIGHT / model.speed_max_rad_s;
+        normal.add(weight * (speed - start.aim_rad_s), d_speed.map(|d| limit * weight * d));
+        normal
     }
 
     /// One Gauss-Newton step on the two currents.
     fn improve(&mut self, model: &ControlModel, start: &Start, thrust_n: f64) {
         let limit = model.current_limit_a;
-        let delta = 1e-3 * limit;
-        let base = self.predict(model, start, self.moves, thrust_n);
-        let one = self.predict(model, start, [self.moves[0] + delta, self.moves[1]], thrust_n);
-        let two = self.predict(model, start, [self.moves[0], self.moves[1] + delta], thrust_n);
-        let (mut h11, mut h12, mut h22, mut g1, mut g2) = (0.0, 0.0, 0.0, 0.0, 0.0);
-        let scale = limit / delta;
-        for k in 0..RESIDUALS {
-            let (j1, j2) = ((one[k] - base[k]) * scale, (two[k] - base[k]) * scale);
-            h11 += j1 * j1;
-            h12 += j1 * j2;
-            h22 += j2 * j2;
-            g1 += j1 * base[k];
-            g2 += j2 * base[k];
-        }
+        let Normal { mut h11, h12, mut h22, mut g1, g2 } = self.predict(model, start, thrust_n);
         let r = self.effort;
         h11 += r;
         h22 += 0.1 * r;
         g1 += r * (self.moves[0] - self.last_a) / limit;
         let det = h11 * h22 - h12 * h12;
         if det > 0.0 && det.is_finite() {
-            let d1 = -(g1 * h22 - g2 * h12) / det * limit;
-            let d2 = -(g2 * h11 - g1 * h12) / det * limit;
             let reach = (model.current_rate_a_s * self.step_s * FIRST as f64).min(2.0 * limit);
-            self.moves[0] =
-                (self.moves[0] + d1).clamp(self.last_a - reach, self.last_a + reach).clamp(-limit, limit);
-            // The second move answers for the first one's clamp.
-            self.moves[1] = (self.moves[1] + d2).clamp(-limit, limit);
+            let (before, wanted) = (self.moves[0], self.moves[0] - (g1 * h22 - g2 * h12) / det * limit);
+            self.moves[0] = wanted.clamp(self.last_a - reach, self.last_a + reach).clamp(-limit, limit);
+            // The second is the best beside what its limits leave of the first.
+            let first = (self.moves[0] - before) / limit;
+            self.moves[1] = (self.moves[1] - (g2 + h12 * first) / h22 * limit).clamp(-limit, limit);
         }
     }
 

@@ -196,14 +196,28 @@ impl Water {
         }
     }
 
-    /// One period by midpoint steps short enough for the thruster; never more than sixteen.
+    /// One period with the motor's torque held.
     fn step(&self, model: &ControlModel, motor_n_m: f64, dt_s: f64) -> Self {
+        self.midpoint(model, dt_s, |now| now.rates(model, motor_n_m))
+    }
+
+    /// One period with the shaft held at its speed.
+    fn step_at_speed(&self, model: &ControlModel, dt_s: f64) -> Self {
+        self.midpoint(model, dt_s, |now| {
+            let [_, flow, swirl, decay] = now.rates(model, 0.0);
+            [0.0, flow, swirl, decay]
+        })
+    }
+
+    /// Midpoint steps short enough for the thruster; never more than sixteen.
+    #[inline]
+    fn midpoint(&self, model: &ControlModel, dt_s: f64, rates: impl Fn(&Self) -> Rates) -> Self {
         let parts = (dt_s / model.step_max_s).ceil().clamp(1.0, 16.0);
         let h = dt_s / parts;
         let mut now = *self;
         for _ in 0..parts as u32 {
-            let middle = now.moved(now.rates(model, motor_n_m), 0.5 * h);
-            now = now.moved(middle.rates(model, motor_n_m), h);
+            let middle = now.moved(rates(&now), 0.5 * h);
+            now = now.moved(rates(&middle), h);
         }
         now.boxed(model)
     }

@@ -25,13 +25,8 @@ impl OpenLoop {
     pub fn tick(&mut self, input: &ObserverInput) -> Estimate {
         let model = input.model;
         self.water = match input.measured.shaft_speed_rad_s {
-            // The measured speed drives the water, under the load that keeps it where it is.
-            Some(speed) => {
-                let driven = Water { speed_rad_s: speed, ..self.water };
-                let load = model.load(speed, driven.flow_m_s, driven.swirl_m_s);
-                let stepped = driven.step(model, load.torque_n_m, input.dt_s);
-                Water { speed_rad_s: speed, ..stepped }
-            }
+            // The measured speed drives the water.
+            Some(speed) => Water { speed_rad_s: speed, ..self.water }.step_at_speed(model, input.dt_s),
             // The model's own speed is for when there is none.
             None => self.water.step(model, model.torque_constant_nm_a * input.current_a, input.dt_s),
         };

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args as ClapArgs;
 
-use crate::failure::{Failure, Outcome, print, print_json, write_text};
+use crate::failure::{Failure, Outcome, check_writable, print, print_json, write_text};
 use crate::soak::{self, Metrics, SoakError, Watch};
 
 /// Run several controllers on the same plant, faults and references, and compare them
@@ -60,6 +60,9 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         .map(|path| soak::load(path, controllers, args.seeds))
         .collect::<Result<Vec<_>, SoakError>>()
         .map_err(Failure::input)?;
+    if let Some(file) = &args.html {
+        check_writable(file)?;
+    }
     let metrics = args.metrics_addr.map(Metrics::serve).transpose().map_err(Failure::input)?;
     if let Some(metrics) = &metrics {
         eprintln!("metrics on http://{}/metrics", metrics.address);

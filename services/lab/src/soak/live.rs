@@ -105,14 +105,7 @@ fn drive(
     random.set_stream(1);
     let mut player = Player::new(&l.scenario.references, &l.replayed, random);
     let dt = 1.0 / RATE_HZ;
-    let resistance = l.rig.motor.winding_resistance_ohm.map(|r| r.value);
-    let mut tally = Tally::new(
-        dt,
-        l.thrust_max_n,
-        l.rig.motor.torque_constant_nm_a.value,
-        resistance,
-        l.scenario.settle_s,
-    );
+    let mut tally = Tally::new(dt, &l.rig, l.thrust_max_n, l.scenario.settle_s);
     let mut stream = service.stream()?;
     let (mut first, mut done_s, mut trips, mut was_armed) = (None, 0.0, 0, true);
     let mut reference_n = 0.0;
@@ -139,6 +132,7 @@ fn drive(
                 shaft_speed_rad_s: number("measured", "shaft_speed_rad_s").unwrap_or(0.0),
                 current_a: number("measured", "current_a").unwrap_or(0.0),
                 flow_m_s: number("measured", "flow_m_s").unwrap_or(0.0),
+                ambient_m_s: number("measured", "ambient_m_s").unwrap_or(0.0),
                 flow_estimate_m_s: number("estimated", "flow_m_s").unwrap_or(0.0),
                 saturated: state["limits"].as_array().is_some_and(|l| !l.is_empty()),
                 broken: false,
@@ -303,6 +297,10 @@ impl Service {
 impl Drop for Service {
     /// Zero, disarmed, lease given up; what fails now is overtaken by the lease's end.
     fn drop(&mut self) {
+        // Anyone may disarm: without the lease the thruster is in other hands, and is let be.
+        if self.lease.is_empty() {
+            return;
+        }
         let _ = self.post("disarm", "disarm", &json!({}), "");
         let _ = self.agent.delete(format!("{}/lease", self.thruster)).header("Lease-Id", &self.lease).call();
     }

@@ -1,6 +1,8 @@
 //! `kort soak`: several controllers on the same plant, faults and references, on virtual time.
 
 mod chain;
+mod check;
+mod disc;
 mod live;
 mod metrics;
 mod page;
@@ -87,6 +89,7 @@ pub enum SoakError {
 pub struct Loaded {
     scenario: Scenario,
     rig: Rig,
+    effects: Vec<truth::Hooked>,
     replayed: Vec<Option<Replayed>>,
     thrust_max_n: f64,
     controllers: Vec<(String, ControllerConfig)>,
@@ -109,6 +112,8 @@ pub fn load(path: &Path, controllers: Option<&[String]>, seeds: Option<u32>) -> 
     let period_s = 1.0 / scenario.control_rate_hz;
     let model = ControlModel::from_rig(&rig, period_s)
         .map_err(|source| SoakError::Model { file: path.display().to_string(), source })?;
+    let effects = truth::effects(&scenario, &rig, &model)
+        .map_err(|message| ScenarioError { file: path.display().to_string(), message })?;
     let folder = path.parent().unwrap_or(Path::new("."));
     let names = controllers.map_or_else(|| scenario.controllers.clone(), <[String]>::to_vec);
     let controllers = names
@@ -121,7 +126,7 @@ pub fn load(path: &Path, controllers: Option<&[String]>, seeds: Option<u32>) -> 
         .map(|s| replay(s, folder, model.thrust_max_n))
         .collect::<Result<_, _>>()?;
     let seeds = seeds.unwrap_or(scenario.seeds);
-    Ok(Loaded { scenario, rig, replayed, thrust_max_n: model.thrust_max_n, controllers, seeds })
+    Ok(Loaded { scenario, rig, effects, replayed, thrust_max_n: model.thrust_max_n, controllers, seeds })
 }
 
 /// A controller by name: a path, a file beside the scenario or under `config/`, or a bare law.
@@ -200,6 +205,7 @@ pub fn soak(loaded: &[Loaded], seed: u64, jobs: usize, watch: &Watch) -> Result<
                 let prepared = Prepared {
                     scenario: &l.scenario,
                     rig: &l.rig,
+                    effects: &l.effects,
                     replayed: &l.replayed,
                     thrust_max_n: l.thrust_max_n,
                 };

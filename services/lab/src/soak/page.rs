@@ -28,7 +28,7 @@ fn scenario(s: &ScenarioResult) -> Markup {
         p { (s.what) }
         (note("", html! { (s.verdict) }))
         (scores(s))
-        p class="soft" { "* no other law is better in both thrust error and energy. Largest steady thrust " (number(s.thrust_max_n)) " N." }
+        p class="soft" { "* no other law is better in both thrust error and energy per useful newton-second. Largest steady thrust " (number(s.thrust_max_n)) " N." }
         (pareto(s))
         h3 { "Worst windows" }
         @for l in shown(s) { (window(l)) }
@@ -54,7 +54,9 @@ const TABLES: [(&str, &[(&str, &str)]); 4] = [
         "Energy and wear",
         &[
             ("energy_j", "energy [J]"),
+            ("useful_impulse_n_s", "useful [N s]"),
             ("energy_per_impulse_j_n_s", "J per N s"),
+            ("energy_over_ideal", "over the ideal"),
             ("copper_loss_per_impulse_j_n_s", "I²R J per N s"),
             ("saturation_share", "at a limit"),
             ("current_travel_a_s", "wear [A/s]"),
@@ -119,11 +121,11 @@ fn cell(score: Score) -> String {
 }
 
 fn pareto(s: &ScenarioResult) -> Markup {
-    let words = "Thrust error against energy: nearer the lower left corner is better; the dashed line joins \
+    let words = "Thrust error against energy per useful newton-second: nearer the lower left corner is better; the dashed line joins \
                  the laws (*) that no other betters in both";
-    let mut chart = Chart::new(words, "thrust error [N RMS]", "energy [kJ]");
+    let mut chart = Chart::new(words, "thrust error [N RMS]", "energy [J/(N s)]");
     chart.height = 420;
-    let place = |l: &LawResult| (l.mean("thrust_rms_n"), 1e-3 * l.mean("energy_j"));
+    let place = |l: &LawResult| (l.mean("thrust_rms_n"), l.mean("energy_per_impulse_j_n_s"));
     let finite = |(x, y): &(f64, f64)| x.is_finite() && y.is_finite();
     for l in &s.laws {
         let at = place(l);

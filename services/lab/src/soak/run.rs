@@ -24,6 +24,8 @@ pub struct Prepared<'a> {
     pub scenario: &'a Scenario,
     /// The rig as stated.
     pub rig: &'a Rig,
+    /// The effects at work.
+    pub effects: &'a [truth::Hooked],
     /// Recordings to replay, by segment.
     pub replayed: &'a [Option<Replayed>],
     /// Largest steady thrust that a share of 1 stands for, N.
@@ -106,7 +108,7 @@ impl<'a> Bench<'a> {
         Ok(Self {
             prepared,
             dt,
-            plant: truth::plant(prepared, &parameters, &chain, dt),
+            plant: truth::plant(prepared, &parameters, dt),
             truth: parameters,
             knows,
             chain,
@@ -135,13 +137,7 @@ impl<'a> Bench<'a> {
             rig.amplifier.supply_v,
             stream(self.seed, 2),
         );
-        let mut tally = Tally::new(
-            self.dt,
-            scale,
-            rig.motor.torque_constant_nm_a.value,
-            rig.motor.winding_resistance_ohm.map(|r| r.value),
-            scenario.settle_s,
-        );
+        let mut tally = Tally::new(self.dt, rig, scale, scenario.settle_s);
         let ticks = (scenario.duration_s / self.dt).round() as u64;
         let (mut sea_from, mut sea_to) = (Now::default(), sea.at(0.0));
         let mut sea_time = -STEP_S;
@@ -203,6 +199,7 @@ impl<'a> Bench<'a> {
             shaft_speed_rad_s: truth.shaft_speed_rad_s,
             current_a: truth.current_a,
             flow_m_s: truth.axial_m_s,
+            ambient_m_s: truth.ambient_m_s,
             flow_estimate_m_s: self.chain.output().estimate.flow_m_s.value,
             saturated: self.saturated(),
             broken: self.broken(driven.command, truth.shaft_speed_rad_s),
@@ -270,7 +267,7 @@ impl<'a> Bench<'a> {
     fn change(&mut self, factors: &HashMap<Parameter, f64>) {
         truth::change(&mut self.truth, factors);
         let (at, sensed) = (*self.plant.truth(), *self.plant.sensed());
-        self.plant = truth::plant(self.prepared, &self.truth, &self.chain, self.dt);
+        self.plant = truth::plant(self.prepared, &self.truth, self.dt);
         self.plant.start(at.time_s, at.shaft_speed_rad_s, at.axial_m_s, sensed.current_a, at.shaft_angle_rad);
     }
 
@@ -334,12 +331,13 @@ impl<'a> Bench<'a> {
             if !is_on(fault.at_s, fault.for_s, fault.every_s, time - self.dt) {
                 self.inject(time + fault.for_s);
             }
-            let spike = if self.noise_share() < 0.05 { fault.size * scales[i] } else { 0.0 };
+            let size = fault.size.unwrap_or(0.0);
+            let spike = if self.noise_share() < 0.05 { size * scales[i] } else { 0.0 };
             channels[i] = match fault.lie {
                 Lie::Dropout => None,
                 Lie::Stuck => self.held[i],
-                Lie::Bias => channels[i].map(|x| x + fault.size * scales[i]),
-                Lie::Gain => channels[i].map(|x| x * fault.size),
+                Lie::Bias => channels[i].map(|x| x + size * scales[i]),
+                Lie::Gain => channels[i].map(|x| x * size),
                 Lie::Spikes => channels[i].map(|x| x + spike),
             };
         }
@@ -352,11 +350,16 @@ impl<'a> Bench<'a> {
 
     fn parameter_error(&self) -> f64 {
         let model = self.chain.controller().model();
+        let flux = self.chain.controller().config().adaptation.adapt_flux;
         let pairs = [
-            (model.blade.lift_max, self.truth.get(Parameter::LiftMax)),
-            (model.blade.drag_max, self.truth.get(Parameter::DragMax)),
+            (model.blade.lift_max, Parameter::LiftMax),
+            (model.blade.drag_max, Parameter::DragMax),
+            (model.flux_coefficient, Parameter::FluxCoefficient),
         ];
-        pairs.iter().map(|(found, truth)| (found / truth - 1.0).abs()).fold(0.0, f64::max)
+        pairs[..if flux { 3 } else { 2 }]
+            .iter()
+            .map(|(found, parameter)| (found / self.truth.get(*parameter) - 1.0).abs())
+            .fold(0.0, f64::max)
     }
 }
 

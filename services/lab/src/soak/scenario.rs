@@ -7,7 +7,6 @@
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 
-use kort_thruster::effects;
 use kort_thruster::models::ModelName;
 use kort_thruster::parameters::Parameter;
 use kort_thruster::rig::Rig;
@@ -318,9 +317,8 @@ pub struct SensorFault {
     pub channel: Channel,
     /// How it lies.
     pub lie: Lie,
-    /// Size of the lie.
-    #[serde(default)]
-    pub size: f64,
+    /// Size of the lie, where it has one.
+    pub size: Option<f64>,
     /// When, s.
     pub at_s: f64,
     /// How long, s.
@@ -377,10 +375,7 @@ impl Scenario {
             error(format!("{e}\nhint: scenarios shipped with kort are config/scenarios/soak-*.toml"))
         })?;
         let scenario: Self = toml::from_str(&text).map_err(|e| {
-            error(format!(
-                "{}\nhint: config/scenarios/soak-bollard-dp.toml shows every key",
-                e.to_string().trim_end()
-            ))
+            error(format!("{}\nhint: docs/control.md lists every key", e.to_string().trim_end()))
         })?;
         scenario.check().map_err(&error)?;
         let rig_path = path.parent().unwrap_or(Path::new(".")).join(&scenario.rig);
@@ -390,115 +385,6 @@ impl Scenario {
         })?;
         let rig = Rig::from_toml(&text).map_err(|e| rig_error(e.to_string()))?;
         Ok((scenario, rig))
-    }
-
-    fn check(&self) -> Result<(), String> {
-        let within = |key: &str, value: f64, low: f64, high: f64, hint: &str| {
-            if value >= low && value <= high {
-                Ok(())
-            } else {
-                Err(format!("`{key}` = {value} is outside what is allowed: {low} to {high}\nhint: {hint}"))
-            }
-        };
-        within("duration_s", self.duration_s, 1.0, 31.0 * 86_400.0, "seconds: 3600 for an hour")?;
-        within("settle_s", self.settle_s, 0.0, 0.9 * self.duration_s, "shorter than the run")?;
-        within("control_rate_hz", self.control_rate_hz, 50.0, 10_000.0, "1000 is usual")?;
-        within("seeds", f64::from(self.seeds), 1.0, 1000.0, "4 gives a first interval")?;
-        within("truth.spread", self.truth.spread, 0.0, 0.5, "0.05 for five percent")?;
-        within("noise.thrust", self.noise.thrust, 0.0, 1.0, "share of the largest thrust")?;
-        within("noise.flow", self.noise.flow, 0.0, 2.0, "share of the flow")?;
-        within("noise.current", self.noise.current, 0.0, 1.0, "share of the current limit")?;
-        if self.against_true_parameters
-            && let Some(last) = self.truth.change.iter().map(|c| c.at_s).reduce(f64::max)
-        {
-            let hint = "what is scored must come after the last [[truth.change]], with time to adapt";
-            within("settle_s", self.settle_s, last, 0.9 * self.duration_s, hint)?;
-        }
-        if self.controllers.is_empty() {
-            return Err(
-                "`controllers` is empty\nhint: controllers = [\"velocity_servo\", \"model2_inversion\"]"
-                    .into(),
-            );
-        }
-        if self.references.is_empty() {
-            return Err("there is no [[reference]]\nhint: [[reference]] with kind = \"steps\", levels = [0.5, -0.5], hold_s = 3".into());
-        }
-        for segment in &self.references {
-            segment.check(&within)?;
-        }
-        for (name, factor) in
-            self.truth.factors.iter().chain(self.truth.change.iter().flat_map(|c| &c.factors))
-        {
-            within(
-                &format!("truth factor of {}", name.name()),
-                *factor,
-                0.05,
-                20.0,
-                "a factor: 1.3 for 30 % more",
-            )?;
-        }
-        for spec in &self.effects {
-            effects::find(&spec.id).ok_or_else(|| {
-                let known: Vec<_> = effects::ALL.iter().map(|d| d.id).collect();
-                format!("effect `{}` is not in the catalogue\nhint: known are {}", spec.id, known.join(", "))
-            })?;
-        }
-        let ambient = &self.ambient;
-        within("ambient.mean_m_s", ambient.mean_m_s, -5.0, 5.0, "m/s, positive feeds the propeller ahead")?;
-        within("ambient.wave_std_m_s", ambient.wave_std_m_s, 0.0, 5.0, "m/s")?;
-        if ambient.wave_std_m_s > 0.0 {
-            within("ambient.wave_period_s", ambient.wave_period_s, 0.5, 60.0, "seconds: 8 for a sea")?;
-        }
-        if ambient.wander_std_m_s > 0.0 {
-            within("ambient.wander_time_s", ambient.wander_time_s, 0.1, 1e6, "seconds")?;
-        }
-        if ambient.program.windows(2).any(|w| w[1].0 <= w[0].0) {
-            return Err(
-                "`ambient.program` has times that do not increase\nhint: [[0, 0.0], [10, 0.5], [20, 0.0]]"
-                    .into(),
-            );
-        }
-        Ok(())
-    }
-}
-
-/// Says what is wrong with a value: name, value, least, most, hint.
-type Within = dyn Fn(&str, f64, f64, f64, &str) -> Result<(), String>;
-
-impl Segment {
-    fn check(&self, within: &Within) -> Result<(), String> {
-        let share = "shares of the largest thrust, -1 to 1";
-        match self {
-            Self::Steps { levels, hold_s, ramp_s } => {
-                if levels.is_empty() {
-                    return Err("`levels` of steps is empty\nhint: levels = [0.5, -0.5]".into());
-                }
-                within("hold_s", *hold_s, 0.01, 1e6, "seconds")?;
-                within("ramp_s", *ramp_s, 0.0, *hold_s, "seconds, at most hold_s")?;
-                levels.iter().try_for_each(|l| within("levels", *l, -1.0, 1.0, share))
-            }
-            Self::Sine { amplitude, offset, period_s, for_s } => {
-                within("amplitude", *amplitude, 0.0, 1.0, share)?;
-                within("offset", *offset, -1.0, 1.0, share)?;
-                within("period_s", *period_s, 0.01, 1e6, "seconds")?;
-                within("for_s", *for_s, 0.01, 1e7, "seconds")
-            }
-            Self::Dp { mean, std, time_s, for_s } => {
-                within("mean", *mean, -1.0, 1.0, share)?;
-                within("std", *std, 0.0, 1.0, share)?;
-                within("time_s", *time_s, 0.05, 1e6, "seconds")?;
-                within("for_s", *for_s, 0.1, 1e7, "seconds")
-            }
-            Self::Joystick { amplitude, for_s } => {
-                within("amplitude", *amplitude, 0.0, 1.0, share)?;
-                within("for_s", *for_s, 0.1, 1e7, "seconds")
-            }
-            Self::Replay { peak: Some(peak), .. } => within("peak", *peak, 0.0, 1.0, share),
-            Self::Replay { column, .. } if !column.ends_with("_n") => Err(format!(
-                "`column` = \"{column}\" of a replay is not in newtons and has no `peak`\nhint: peak = 0.8 stretches it to 0.8 of the largest thrust"
-            )),
-            Self::Replay { .. } => Ok(()),
-        }
     }
 }
 

@@ -2,8 +2,11 @@
 
 use std::collections::BTreeMap;
 
+use kort_thruster::rig::Rig;
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
+
+use super::disc::Disc;
 
 /// What one tick shows to the scores.
 #[derive(Clone, Copy, Debug, Default)]
@@ -20,6 +23,8 @@ pub struct Sample {
     pub current_a: f64,
     /// True axial flow, m/s.
     pub flow_m_s: f64,
+    /// Ambient axial flow, m/s.
+    pub ambient_m_s: f64,
     /// Observer's axial flow, m/s.
     pub flow_estimate_m_s: f64,
     /// The command or the thruster was at a limit.
@@ -42,10 +47,18 @@ pub const SCORES: &[(&str, &str)] = &[
         "energy_j",
         "electrical energy: motor torque times speed where it drives, and copper loss where the rig states a winding resistance, J",
     ),
-    ("energy_per_impulse_j_n_s", "energy per newton-second given, J/(N s)"),
+    (
+        "useful_impulse_n_s",
+        "thrust given in the direction asked for, up to what was asked for, over time: what is thrown beyond or against it is of no use, N s",
+    ),
+    ("energy_per_impulse_j_n_s", "energy per useful newton-second, J/(N s)"),
     (
         "copper_loss_per_impulse_j_n_s",
-        "copper loss (I2R) per newton-second given, J/(N s); not known if the rig states no winding resistance",
+        "copper loss (I2R) per useful newton-second, J/(N s); not known if the rig states no winding resistance",
+    ),
+    (
+        "energy_over_ideal",
+        "energy over the least that an ideal actuator disc needs for the useful thrust in the same water (inverse of the figure of merit): power grows with thrust to 1.5, so that this compares laws that give different thrust",
     ),
     ("saturation_share", "share of time at a limit"),
     ("current_travel_a_s", "travel of the motor current per second: wear, A/s"),
@@ -99,6 +112,7 @@ pub struct Tally {
     scale_n: f64,
     resistance_ohm: Option<f64>,
     torque_constant_nm_a: f64,
+    disc: Disc,
     settle_s: f64,
     ticks: u64,
     squares: f64,
@@ -107,6 +121,7 @@ pub struct Tally {
     energy_j: f64,
     copper_j: f64,
     impulse_n_s: f64,
+    ideal_j: f64,
     saturated: u64,
     travel_a: f64,
     last_current_a: f64,
@@ -126,20 +141,15 @@ pub struct Tally {
 }
 
 impl Tally {
-    /// For a thruster with a largest thrust, torque constant and, where it is known, winding resistance.
-    pub fn new(
-        dt_s: f64,
-        scale_n: f64,
-        torque_constant_nm_a: f64,
-        resistance_ohm: Option<f64>,
-        settle_s: f64,
-    ) -> Self {
+    /// For a thruster as its rig states it, with its largest thrust; the start is not scored.
+    pub fn new(dt_s: f64, rig: &Rig, scale_n: f64, settle_s: f64) -> Self {
         let plot_every = (1.0 / (PLOT_HZ * dt_s)).round().max(1.0) as u64;
         Self {
             dt_s,
             scale_n,
-            resistance_ohm,
-            torque_constant_nm_a,
+            resistance_ohm: rig.motor.winding_resistance_ohm.map(|r| r.value),
+            torque_constant_nm_a: rig.motor.torque_constant_nm_a.value,
+            disc: Disc::of(rig),
             settle_s,
             ticks: 0,
             squares: 0.0,
@@ -148,6 +158,7 @@ impl Tally {
             energy_j: 0.0,
             copper_j: 0.0,
             impulse_n_s: 0.0,
+            ideal_j: 0.0,
             saturated: 0,
             travel_a: 0.0,
             last_current_a: 0.0,
@@ -190,7 +201,9 @@ impl Tally {
         let shaft = self.torque_constant_nm_a * s.current_a * s.shaft_speed_rad_s;
         self.energy_j += (copper + shaft.max(0.0)) * dt;
         self.copper_j += copper * dt;
-        self.impulse_n_s += s.thrust_n.abs() * dt;
+        let useful_n = (s.thrust_n * s.reference_n.signum()).clamp(0.0, s.reference_n.abs());
+        self.impulse_n_s += useful_n * dt;
+        self.ideal_j += self.disc.power_w(useful_n, s.ambient_m_s * s.reference_n.signum()) * dt;
         self.travel_a += (s.current_a - self.last_current_a).abs();
         self.last_current_a = s.current_a;
         self.saturated += u64::from(s.saturated);
@@ -299,6 +312,10 @@ impl Tally {
             }
         }
         scores.insert("energy_j", self.energy_j);
+        scores.insert("useful_impulse_n_s", self.impulse_n_s);
+        if self.ideal_j > 0.0 {
+            scores.insert("energy_over_ideal", self.energy_j / self.ideal_j);
+        }
         if self.impulse_n_s > 0.0 {
             scores.insert("energy_per_impulse_j_n_s", self.energy_j / self.impulse_n_s);
             let copper =
@@ -387,13 +404,20 @@ pub fn summarise_ratios(values: &[f64]) -> Score {
 mod tests {
     use super::*;
 
+    fn tally(resistance_ohm: Option<f64>) -> Tally {
+        const RIG: &str = include_str!("../../../../config/thrusters/whitcomb-yoerger-1999.toml");
+        let mut tally = Tally::new(1e-3, &Rig::from_toml(RIG).unwrap(), 100.0, 0.0);
+        tally.resistance_ohm = resistance_ohm;
+        tally
+    }
+
     fn sample(time_s: f64, reference_n: f64, thrust_n: f64) -> Sample {
         Sample { time_s, reference_n, thrust_n, ..Sample::default() }
     }
 
     #[test]
     fn a_first_order_step_is_measured() {
-        let mut tally = Tally::new(1e-3, 100.0, 1.0, Some(1.0), 0.0);
+        let mut tally = tally(Some(1.0));
         tally.tick(&sample(0.0, 0.0, 0.0));
         for k in 0..3000 {
             let t = f64::from(k) * 1e-3;
@@ -407,7 +431,7 @@ mod tests {
 
     #[test]
     fn ninety_five_percent_of_the_time() {
-        let mut tally = Tally::new(1e-3, 100.0, 1.0, Some(1.0), 0.0);
+        let mut tally = tally(Some(1.0));
         for k in 0..10_000 {
             tally.tick(&sample(0.0, 0.0, f64::from(k) * 1e-3));
         }
@@ -425,9 +449,31 @@ mod tests {
 
     #[test]
     fn what_is_not_known_stays_so() {
-        let mut tally = Tally::new(1e-3, 100.0, 1.0, None, 0.0);
+        let mut tally = tally(None);
         tally.tick(&Sample { current_a: 3.0, ..sample(0.0, 10.0, 9.0) });
         assert!(tally.finish(&[]).scores["copper_loss_per_impulse_j_n_s"].is_nan());
+    }
+
+    /// What is thrown beyond the thrust asked for, or against it, is paid for and of no use.
+    #[test]
+    fn only_thrust_that_was_asked_for_is_useful() {
+        let useful = |thrust_n: f64| {
+            let mut tally = tally(None);
+            for _ in 0..1000 {
+                tally.tick(&Sample {
+                    current_a: 2.0,
+                    shaft_speed_rad_s: 10.0,
+                    ..sample(0.0, -50.0, thrust_n)
+                });
+            }
+            tally.finish(&[]).scores
+        };
+        let of = |thrust_n: f64| useful(thrust_n)["useful_impulse_n_s"];
+        assert!((of(-40.0) - 40.0).abs() < 1e-9 && (of(-70.0) - 50.0).abs() < 1e-9);
+        assert_eq!(of(30.0), 0.0);
+        assert!(!useful(30.0).contains_key("energy_per_impulse_j_n_s"));
+        // 40 N on a disc of 0.0531 m2: T^1.5 / sqrt(2 rho A) = 24.57 W; 2.46 N m turn at 10 rad/s.
+        assert!((useful(-40.0)["energy_over_ideal"] - 24.6 / 24.57).abs() < 2e-3);
     }
 
     #[test]

@@ -2,14 +2,15 @@
 
 use std::collections::HashMap;
 
-use kort_thruster::effects::{self, Descriptor, Scale};
+use kort_control::ControlModel;
+use kort_thruster::effects::{self, Context, Descriptor, Scale};
 use kort_thruster::parameters::{Parameter, Parameters};
 use kort_thruster::plant::Plant;
 use kort_thruster::rig::Rig;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::chain::Chain;
 use super::run::{Prepared, stream};
+use super::scenario::{EffectSpec, Scenario};
 
 /// The stated parameters, the scenario's factors, and a spread drawn from the seed.
 pub fn parameters(prepared: &Prepared, seed: u64) -> Parameters {
@@ -59,10 +60,17 @@ pub fn told(rig: &Rig, p: &Parameters) -> Rig {
     rig
 }
 
-/// The plant that parameters and the scenario's effects make.
-pub fn plant(prepared: &Prepared, truth: &Parameters, chain: &Chain, dt: f64) -> Plant {
-    let scenario = prepared.scenario;
-    let model = chain.controller().nominal();
+/// An effect of the catalogue with values for its parameters.
+pub type Hooked = (&'static Descriptor, Vec<f64>);
+
+/// Most continuous states that a plant has for effects.
+const EFFECT_STATES: usize = 8;
+
+/// The scenario's effects; a parameter left out stands where a fit would start.
+///
+/// # Errors
+/// Words that name the effect, its parameter, the value and what is allowed.
+pub fn effects(scenario: &Scenario, rig: &Rig, model: &ControlModel) -> Result<Vec<Hooked>, String> {
     let scale = Scale {
         shaft_speed_rad_s: model.speed_max_rad_s,
         torque_n_m: model.torque_constant_nm_a * model.current_limit_a,
@@ -72,21 +80,48 @@ pub fn plant(prepared: &Prepared, truth: &Parameters, chain: &Chain, dt: f64) ->
         command: model.current_limit_a,
         supply_v: model.supply_v.unwrap_or(0.0),
         inertia_kg_m2: model.inertia_kg_m2,
-        tick_s: dt,
+        tick_s: model.period_s,
         duration_s: scenario.duration_s,
     };
-    let hooked: Vec<(&Descriptor, Vec<f64>)> = scenario
-        .effects
-        .iter()
-        .filter_map(|spec| {
-            let descriptor = effects::find(&spec.id)?;
-            let values = (descriptor.parameters)(&scale)
-                .iter()
-                .map(|p| spec.values.get(p.name).copied().unwrap_or(p.start))
-                .collect();
-            Some((descriptor, values))
-        })
-        .collect();
-    let effects: Vec<(&Descriptor, &[f64])> = hooked.iter().map(|(d, v)| (*d, v.as_slice())).collect();
-    Plant::new(scenario.model, prepared.rig, truth, &effects, dt).with_encoder_quantised(true)
+    let parameters = Parameters::stated(rig);
+    let context = Context { parameters: &parameters, rig, tick_s: model.period_s };
+    let mut states = 0;
+    let mut hooked = Vec::with_capacity(scenario.effects.len());
+    for EffectSpec { id, values } in &scenario.effects {
+        let descriptor = effects::find(id).ok_or_else(|| {
+            let known: Vec<_> = effects::ALL.iter().map(|d| d.id).collect();
+            format!("effect `{id}` is not in the catalogue\nhint: known are {}", known.join(", "))
+        })?;
+        let specs = (descriptor.parameters)(&scale);
+        if let Some(unknown) = values.keys().find(|k| specs.iter().all(|s| s.name != k.as_str())) {
+            let known: Vec<_> = specs.iter().map(|s| s.name).collect();
+            return Err(format!("effect `{id}` has no value `{unknown}`\nhint: it has {}", known.join(", ")));
+        }
+        let mut chosen = Vec::with_capacity(specs.len());
+        for spec in &specs {
+            let value = values.get(spec.name).copied().unwrap_or(spec.start);
+            if values.contains_key(spec.name) && !(value >= spec.low && value <= spec.high) {
+                return Err(format!(
+                    "`{id}.{}` = {value} is outside what is allowed: {} to {} ({})\nhint: {} is small but visible",
+                    spec.name, spec.low, spec.high, spec.unit, spec.start
+                ));
+            }
+            chosen.push(value);
+        }
+        states += (descriptor.build)(&chosen, &context).states();
+        hooked.push((descriptor, chosen));
+    }
+    if states > EFFECT_STATES {
+        return Err(format!(
+            "the effects have {states} states of their own together, at most {EFFECT_STATES} can be simulated\nhint: take an [[effect]] away"
+        ));
+    }
+    Ok(hooked)
+}
+
+/// The plant that parameters and the scenario's effects make.
+pub fn plant(prepared: &Prepared, truth: &Parameters, dt: f64) -> Plant {
+    let effects: Vec<(&Descriptor, &[f64])> =
+        prepared.effects.iter().map(|(d, v)| (*d, v.as_slice())).collect();
+    Plant::new(prepared.scenario.model, prepared.rig, truth, &effects, dt).with_encoder_quantised(true)
 }
