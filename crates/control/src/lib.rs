@@ -14,6 +14,7 @@
 //! what it needs measured and how it fails; each kind is an enum with `ALL`, so that the shared
 //! suites in `tests/` reach every one.
 
+pub mod about;
 pub mod config;
 pub mod controller;
 pub mod estimators;
@@ -23,6 +24,7 @@ pub mod model;
 pub mod observers;
 pub mod signals;
 
+pub use about::About;
 pub use config::{ConfigError, ControllerConfig, TUNABLES, Tunable};
 pub use controller::{Controller, Output};
 pub use estimators::EstimatorKind;

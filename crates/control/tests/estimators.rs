@@ -48,9 +48,8 @@ fn a_flow_meter_tells_the_flux_coefficient() {
     let rig = &rigs()[0];
     for estimator in ADAPTIVE {
         for factor in [0.75, 1.3] {
-            let mut config = config(estimator);
-            config.adaptation.adapt_flux = true;
-            let mut l = Loop::with_truth(rig, &config, 0.001, &[(Parameter::FluxCoefficient, factor)]);
+            let mut l =
+                Loop::with_truth(rig, &config(estimator), 0.001, &[(Parameter::FluxCoefficient, factor)]);
             l.flow_meter = true;
             excite(&mut l, 90.0);
             let found = l.controller.adapted().ratio;

@@ -1,8 +1,9 @@
 //! Estimators: the model's coefficients while the thruster runs.
 //!
 //! Lift, drag and flux coefficient are linear in the equations of thrust, torque and momentum
-//! (docs/control.md D9). [`regression`] builds filtered, normalised equations and says when they carry
-//! information; an estimator turns them into a correction; the corrected model feeds the law.
+//! (docs/control.md D9); the last is learnt where force sensor and flow meter both measure.
+//! [`regression`] builds filtered, normalised equations and says when they carry information; an
+//! estimator turns them into a correction; the corrected model feeds the law.
 
 mod gradient;
 mod regression;
@@ -67,20 +68,11 @@ pub struct AdaptationOptions {
     pub box_factor: f64,
     /// Least eigenvalue of the normalised windowed Gram matrix below which adaptation freezes.
     pub excitation_min: f64,
-    /// Also adapt the flux coefficient where a flow meter measures.
-    pub adapt_flux: bool,
 }
 
 impl Default for AdaptationOptions {
     fn default() -> Self {
-        Self {
-            gain_per_s: 2.0,
-            memory_s: 10.0,
-            dead_zone: 0.004,
-            box_factor: 2.5,
-            excitation_min: 1e-3,
-            adapt_flux: false,
-        }
+        Self { gain_per_s: 2.0, memory_s: 10.0, dead_zone: 0.004, box_factor: 2.5, excitation_min: 1e-3 }
     }
 }
 

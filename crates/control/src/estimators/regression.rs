@@ -8,13 +8,13 @@
 //! ```
 //! Both sides pass `lam/(s + lam)`, so that no derivative is taken: `F[x'] = lam (x - F[x])`. The
 //! flow comes from the momentum balance under the *measured* thrust, pulled by the flow meter
-//! where there is one: it does not depend on lift and drag, which are being learnt. Where the flux
-//! coefficient is learnt too, the balance runs on its newest value: what is left between balance and
-//! meter, `m` times the pull, is then that coefficient's error (an adaptive observer).
+//! where there is one: it does not depend on lift and drag, which are being learnt. With a meter the
+//! flux coefficient is learnt too, and the balance runs on its newest value: what is left between
+//! balance and meter, `m` times the pull, is that coefficient's error (an adaptive observer).
 //!
 //! Assumes: inertia, torque constant, friction and added mass known; still water unless the ambient
 //! flow is measured. Needs measured: shaft speed, current, thrust; a flow meter helps in ambient flow.
-//! Fails: an ambient flow that nothing measures is learnt as lift and drag; so is a force sensor's bias.
+//! Fails: an ambient flow that nothing measures is learnt as lift, drag and flux; so is a force sensor's bias.
 //!
 //! Equations are divided by full thrust and torque, coefficients by their stated values. A
 //! windowed Gram matrix of the equations' own directions (scaled to the level of operation) says
@@ -24,6 +24,9 @@ use serde::{Deserialize, Serialize};
 
 use super::{AdaptationOptions, COEFFICIENTS, EstimatorInput};
 use crate::model::ControlModel;
+
+/// How fast the flow meter pulls the momentum balance, 1/s.
+const METER_PULL_PER_S: f64 = 3.0;
 
 /// Why adaptation stands still.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -38,14 +41,23 @@ pub enum Freeze {
 }
 
 /// One scalar equation `y = phi . ratio`, as a share of full scale.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Equation {
     /// Left side.
     pub y: f64,
     /// Regressor.
     pub phi: [f64; COEFFICIENTS],
+    /// Share of a coefficient's error that shows in the residual: the balance that gives the flow
+    /// follows a wrong flux coefficient, and the meter pulls it back only in part.
+    pub shows: f64,
     /// Whether it may be learnt from.
     pub valid: bool,
+}
+
+impl Default for Equation {
+    fn default() -> Self {
+        Self { y: 0.0, phi: [0.0; COEFFICIENTS], shows: 1.0, valid: false }
+    }
 }
 
 impl Equation {
@@ -75,7 +87,6 @@ pub struct Regression {
     held: [f64; 3],
     gram: [f64; 3],
     excitation_min: f64,
-    flux: bool,
 }
 
 impl Regression {
@@ -96,7 +107,6 @@ impl Regression {
             held: [0.0; 3],
             gram: [0.0; 3],
             excitation_min: options.excitation_min,
-            flux: options.adapt_flux,
         }
     }
 
@@ -140,8 +150,9 @@ impl Regression {
         let flux = flux_ratio * model.flux_coefficient * model.blade.density_kg_m3 * model.blade.area_m2();
         let rate = (thrust - flux * (self.flow_m_s - ambient) * self.flow_m_s.abs()) / model.added_mass_kg;
         let decay = 2.0 * flux * self.flow_m_s.abs() / model.added_mass_kg;
-        let pull = input.measured.flow_m_s.map_or(0.0, |f| 3.0 * (f - self.flow_m_s));
+        let pull = input.measured.flow_m_s.map_or(0.0, |f| METER_PULL_PER_S * (f - self.flow_m_s));
         self.flow_m_s += dt * (rate + pull) / (1.0 + dt * decay);
+        self.equations[2].shows = METER_PULL_PER_S / (METER_PULL_PER_S + decay);
         let bound = 3.0 * model.map.flow_m * model.speed_max_rad_s + 4.0;
         self.flow_m_s = self.flow_m_s.clamp(-bound, bound);
     }
@@ -183,7 +194,7 @@ impl Regression {
                     0.0,
                     density_area * (flow - ambient) * flow.abs() * model.flux_coefficient * thrust_scale,
                 ],
-                self.flux && thrust.is_some() && input.measured.flow_m_s.is_some(),
+                thrust.is_some() && input.measured.flow_m_s.is_some(),
             ),
         ];
         // F[x'] = lam (x - F[x]) comes out filtered.

@@ -60,8 +60,9 @@ impl Rls {
                     self.residual_var += 0.01 * (residual * residual - self.residual_var);
                     // Weight 1 stands for a residual of one percent of full scale.
                     let noise = 1e-2;
-                    let ph = self.p * phi;
-                    let gain = ph / (noise + phi.dot(&ph));
+                    let shown = phi * e.shows;
+                    let ph = self.p * shown;
+                    let gain = ph / (noise + shown.dot(&ph));
                     let theta = theta + gain * beyond(residual, self.options.dead_zone);
                     self.p -= gain * ph.transpose();
                     self.adapted.ratio = theta.into();
@@ -70,7 +71,7 @@ impl Rls {
                 self.adapted.project(self.options.box_factor);
                 for i in 0..3 {
                     let var = self.p[(i, i)] * self.residual_var / 1e-2 * CORRELATED;
-                    let seen = i < 2 || self.options.adapt_flux;
+                    let seen = i < 2 || equations[2].valid;
                     self.adapted.std_error[i] = if seen { var.max(0.0).sqrt() } else { f64::INFINITY };
                 }
             }

@@ -1,7 +1,11 @@
-//! `kort explain`: the catalogue of omitted physics, or one effect in full.
+//! `kort explain`: the catalogue of omitted physics, the control laws, observers and estimators, or one of
+//! them in full.
+
+mod controllers;
 
 use std::fmt::Write;
 
+use kort_control::About;
 use kort_thruster::effects::{self, ALL, Descriptor, Scale};
 use serde::Serialize;
 
@@ -9,17 +13,21 @@ use crate::failure::{Failure, Outcome, print, print_json};
 
 const EXAMPLE: &str = "\
 Example: kort explain rotational_flow
+         kort explain look_ahead
          kort explain --json | jq '.effects[] | select(.path == \"shaft\") | .effect'
          kort explain --markdown > docs/catalogue.md";
 
 /// Width of the text, columns.
 const WIDTH: usize = 96;
 
-/// Look up the physics a model may leave out: what it is, how it shows, what it is confused with
+/// Look up the physics a model may leave out, or a control law, observer or estimator
+///
+/// Of an effect: what it is, how it shows, what it is confused with. Of a law: where it comes from, what
+/// it assumes, what it needs measured, how it fails.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLE)]
 pub struct Args {
-    /// One effect by its name in reports [default: the whole catalogue]
+    /// One effect, law, observer or estimator by its name in reports [default: the whole catalogue]
     effect: Option<String>,
     /// Print one JSON document (kort.explain/1)
     #[arg(long, conflicts_with = "markdown")]
@@ -34,26 +42,40 @@ pub struct Args {
 /// # Errors
 /// The effect is not in the catalogue; the message names the nearest one.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
-    let chosen = match &args.effect {
-        Some(id) => vec![find(id)?],
-        None => ALL.to_vec(),
+    let controller = args.effect.as_deref().map(plain).and_then(|name| About::find(&name));
+    let chosen = match (&args.effect, controller) {
+        (_, Some(_)) => Vec::new(),
+        (Some(id), None) => vec![find(id)?],
+        (None, None) => ALL.to_vec(),
     };
     if args.json {
+        let controllers = match (&args.effect, controller) {
+            (_, Some(about)) => vec![controllers::Entry::of(about)],
+            (Some(_), None) => Vec::new(),
+            (None, None) => controllers::Entry::all(),
+        };
         let effects = chosen.iter().map(|effect| Entry::of(effect)).collect();
-        print_json(&Document { schema: "kort.explain/1", effects })?;
+        print_json(&Document { schema: "kort.explain/1", effects, controllers })?;
+    } else if let Some(about) = controller {
+        print(&controllers::Entry::of(about).in_full());
     } else if args.markdown {
         print(&markdown(&chosen));
     } else if args.effect.is_some() {
         print(&in_full(&Entry::of(chosen[0])));
     } else {
-        print(&table(&chosen));
+        print(&format!("{}\n{}\nOne in full: kort explain NAME\n", table(&chosen), controllers::table()));
     }
     Ok(Outcome::Done)
 }
 
-/// An effect by its identifier; case and hyphens are forgiven.
+/// A name as it is written here: case and hyphens are forgiven.
+fn plain(name: &str) -> String {
+    name.to_lowercase().replace(['-', ' '], "_")
+}
+
+/// An effect by its identifier.
 fn find(id: &str) -> Result<&'static Descriptor, Failure> {
-    let wanted = id.to_lowercase().replace(['-', ' '], "_");
+    let wanted = plain(id);
     effects::find(&wanted).ok_or_else(|| {
         let likeness = |d: &Descriptor| {
             let whole = strsim::jaro_winkler(d.id, &wanted);
@@ -70,7 +92,7 @@ fn find(id: &str) -> Result<&'static Descriptor, Failure> {
         let nearest = ALL.iter().max_by(|a, b| likeness(a).total_cmp(&likeness(b)));
         let hint = match nearest.filter(|d| likeness(d) > 0.7) {
             Some(d) => format!("did you mean `{}`?", d.id),
-            None => "`kort explain` lists the catalogue".into(),
+            None => "`kort explain` lists the catalogue, and the control laws".into(),
         };
         Failure::input(format!(
             "effect: `{id}` is not one of the {} in the catalogue\nhint: {hint}",
@@ -83,6 +105,8 @@ fn find(id: &str) -> Result<&'static Descriptor, Failure> {
 struct Document {
     schema: &'static str,
     effects: Vec<Entry>,
+    /// Laws, observers, estimators.
+    controllers: Vec<controllers::Entry>,
 }
 
 /// An effect as it is printed.
@@ -173,7 +197,7 @@ fn table(effects: &[&Descriptor]) -> String {
             .subsequent_indent(&indent);
         text += &format!("\n{}", textwrap::fill(effect.what, options));
     }
-    text + "\n\nOne in full: kort explain EFFECT\n"
+    text + "\n"
 }
 
 fn in_full(entry: &Entry) -> String {

@@ -19,7 +19,8 @@ pub struct Args {
     /// Scenario files; the shipped ones are config/scenarios/soak-*.toml
     #[arg(required = true, value_name = "SCENARIO")]
     scenarios: Vec<PathBuf>,
-    /// Controllers to compare: files of config/controllers/ without .toml, or laws [default: the scenario's]
+    /// Controllers to compare: files of config/controllers/ without .toml, or laws (`kort explain` lists them)
+    /// [default: the scenario's]
     #[arg(long, value_name = "A,B,…", value_delimiter = ',')]
     controllers: Option<Vec<String>>,
     /// How many seeds [default: the scenario's]

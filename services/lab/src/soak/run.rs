@@ -350,7 +350,9 @@ impl<'a> Bench<'a> {
 
     fn parameter_error(&self) -> f64 {
         let model = self.chain.controller().model();
-        let flux = self.chain.controller().config().adaptation.adapt_flux;
+        // The flux coefficient is learnt where both sensors are fitted.
+        let sensors = &self.prepared.scenario.sensors;
+        let flux = sensors.flow && sensors.thrust;
         let pairs = [
             (model.blade.lift_max, Parameter::LiftMax),
             (model.blade.drag_max, Parameter::DragMax),
