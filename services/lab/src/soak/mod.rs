@@ -262,6 +262,24 @@ pub fn soak(loaded: &[Loaded], seed: u64, jobs: usize, watch: &Watch) -> Result<
 mod tests {
     use super::*;
 
+    /// The example that lists every key is one that runs.
+    #[test]
+    fn the_example_in_the_docs_loads() {
+        let docs = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/control.md");
+        let docs = std::fs::read_to_string(docs).unwrap();
+        let example = docs.split("```toml").nth(1).and_then(|t| t.split("```").next()).unwrap();
+        let rig = concat!(env!("CARGO_MANIFEST_DIR"), "/../../config/thrusters/t200.toml");
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("mine.toml");
+        std::fs::write(&path, example.replace("../thrusters/t200.toml", rig)).unwrap();
+        let named = |name: &str| ControllerConfig::with_law(LawKind::from_name(name).unwrap());
+        let loaded = load(&path, None, None).unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!(loaded.controllers[1].1.law, named("model2_inversion").law);
+        let watch = Watch { metrics: None };
+        let report = soak(&[loaded], 1, 1, &watch).unwrap();
+        assert_eq!(report.virtual_seconds, 480.0);
+    }
+
     #[test]
     fn every_shipped_scenario_loads() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../config/scenarios");
