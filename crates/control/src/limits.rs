@@ -113,6 +113,11 @@ impl Integrator {
         self.state != next
     }
 
+    /// Lets go of what can no longer be checked, as its sensor is gone.
+    pub fn fade(&mut self, time_s: f64, dt_s: f64) {
+        self.state *= 1.0 - (dt_s / time_s.max(dt_s)).min(1.0);
+    }
+
     /// Back-calculation: draws the state towards what makes the output equal to what was applied.
     pub fn follow(&mut self, asked: f64, applied: f64, tracking_time_s: f64, dt_s: f64) {
         if asked != applied {

@@ -131,3 +131,25 @@ fn ambient_flow_is_rejected_by_the_laws_that_can() {
     let e = error(LawKind::Model2Inversion, false);
     assert!(e < 0.6 * plain, "without force sensor {e} of {plain}");
 }
+
+/// A force sensor stands still for a quarter of a second, as the controller takes it, and is then gone,
+/// just as the reference steps: what the law learnt of the dead reading does not stay.
+#[test]
+fn a_force_sensor_that_dies_in_a_step_leaves_no_trim() {
+    let rig = &rigs()[0];
+    for law in [LawKind::TrimmedModel2Inversion, LawKind::ThrustPi] {
+        let mut l = Loop::new(rig, &ControllerConfig { law, ..ControllerConfig::default() }, 0.001);
+        l.run(Reference::Thrust(90.0), 3.0);
+        l.stuck_n = Some(l.thrust());
+        l.run(Reference::Thrust(-50.0), 0.25);
+        l.force_sensor = false;
+        l.run(Reference::Thrust(-50.0), 0.25);
+        let soon = (l.thrust() + 50.0).abs();
+        l.run(Reference::Thrust(-50.0), 4.0);
+        let later = (l.thrust() + 50.0).abs();
+        assert!(later < 3.0, "{}: {soon} N, then {later} N off", law.name());
+        if law == LawKind::TrimmedModel2Inversion {
+            assert!(soon < 20.0, "{}: {soon} N off", law.name());
+        }
+    }
+}

@@ -7,7 +7,7 @@
 //! filter and the drive allow.
 //!
 //! Assumes: a calibrated force sensor without structural resonance inside the bandwidth.
-//! Needs measured: thrust. Without it the integral holds and the law is `static_map`.
+//! Needs measured: thrust. Without it the integral fades and the law becomes `static_map`.
 //!
 //! Fails: sensor bias and gain are thrust errors one to one; near standstill the plant is slow and
 //! so is the loop; ventilation makes it race, as it asks for thrust that is not to be had.
@@ -31,6 +31,9 @@ impl Default for ThrustPiOptions {
         Self { bandwidth_ratio: 1.0 }
     }
 }
+
+/// Time in which the integral fades without its sensor, s.
+const FADE_S: f64 = 1.0;
 
 /// A running PI loop.
 #[derive(Clone, Copy, Debug)]
@@ -72,6 +75,8 @@ impl ThrustPi {
             let authority = 0.5 * model.torque_constant_nm_a * model.current_limit_a;
             self.integral.step(a1 * bandwidth * error, authority, input.dt_s);
             torque += a1 * bandwidth / pole * error;
+        } else {
+            self.integral.fade(FADE_S, input.dt_s);
         }
         self.tracking_time_s = 1.0 / bandwidth;
         self.asked_n_m = torque + self.integral.state;

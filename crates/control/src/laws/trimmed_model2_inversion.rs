@@ -6,7 +6,9 @@
 //! resonance.
 //!
 //! Assumes: as `model2_inversion`; a calibrated force sensor.
-//! Needs measured: shaft speed and thrust. Without thrust the trim holds.
+//! Needs measured: shaft speed and thrust. Without thrust the trim fades and leaves the model alone; a
+//! reading that the observer rejects (a sensor that stands still just before it is declared gone) is
+//! not learnt from.
 //!
 //! Fails: sensor bias and gain are thrust errors one to one, up to the trim's authority.
 
@@ -34,6 +36,9 @@ impl Default for TrimOptions {
     }
 }
 
+/// Time in which the trim fades without its sensor, s.
+const FADE_S: f64 = 1.0;
+
 /// A running trimmed inversion.
 #[derive(Clone, Copy, Debug)]
 pub struct TrimmedModel2Inversion {
@@ -44,6 +49,7 @@ pub struct TrimmedModel2Inversion {
     trim: Integrator,
     asked_n_m: f64,
     limited: bool,
+    gated: u64,
 }
 
 impl TrimmedModel2Inversion {
@@ -58,18 +64,22 @@ impl TrimmedModel2Inversion {
             trim: Integrator::default(),
             asked_n_m: 0.0,
             limited: false,
+            gated: 0,
         }
     }
 
     /// Torque of the inverted model at the trimmed reference.
     pub fn tick(&mut self, input: &LawInput) -> Demand {
         let expected = self.matched.step(input.thrust_n, input.dt_s);
+        let rejected = input.estimate.gated != std::mem::replace(&mut self.gated, input.estimate.gated);
         let mut at_authority = false;
-        if let Some(thrust) = input.measured.thrust_n
-            && !self.limited
-        {
-            let most = self.authority * input.model.thrust_max_n;
-            at_authority = self.trim.step(self.bandwidth_rad_s * (expected - thrust), most, input.dt_s);
+        match input.measured.thrust_n {
+            None => self.trim.fade(FADE_S, input.dt_s),
+            Some(thrust) if !self.limited && !rejected => {
+                let most = self.authority * input.model.thrust_max_n;
+                at_authority = self.trim.step(self.bandwidth_rad_s * (expected - thrust), most, input.dt_s);
+            }
+            Some(_) => {}
         }
         let mut demand = self.inner.tick(&LawInput { thrust_n: input.thrust_n + self.trim.state, ..*input });
         if at_authority {

@@ -89,6 +89,8 @@ pub struct Loop {
     pub time_s: f64,
     pub ambient_m_s: f64,
     pub force_sensor: bool,
+    /// The force sensor stands still at this value.
+    pub stuck_n: Option<f64>,
     pub flow_meter: bool,
 }
 
@@ -111,6 +113,7 @@ impl Loop {
             time_s: 0.0,
             ambient_m_s: 0.0,
             force_sensor: true,
+            stuck_n: None,
             flow_meter: false,
         }
     }
@@ -120,7 +123,7 @@ impl Loop {
         Measurement {
             shaft_speed_rad_s: Some(s.shaft_speed_rad_s),
             current_a: (self.kind != AmplifierKind::Speed).then_some(s.current_a),
-            thrust_n: self.force_sensor.then_some(s.thrust_n),
+            thrust_n: self.force_sensor.then_some(self.stuck_n.unwrap_or(s.thrust_n)),
             flow_m_s: self.flow_meter.then_some(s.flow_m_s),
             ambient_m_s: None,
             supply_v: s.supply_v.is_finite().then_some(s.supply_v),
