@@ -220,6 +220,23 @@ fn a_thruster_of_ones_own_is_driven_by_every_law() {
     }
 }
 
+/// What can be compared is listed by a command, and each tells of itself.
+#[test]
+fn laws_observers_and_estimators_are_explained() {
+    let list = text(&kort(&["explain"]).stdout);
+    for name in ["look_ahead", "combined_anti_spin", "luenberger", "ukf", "gradient"] {
+        assert!(list.lines().any(|l| l.starts_with(name)), "{name}: {list}");
+        let run = kort(&["explain", name]);
+        assert!(run.status.success(), "{}", text(&run.stderr));
+        let words = text(&run.stdout);
+        for part in ["Reference:", "Assumes:", "Needs measured:", "Fails:"] {
+            assert!(words.contains(part), "{name}: {words}");
+        }
+    }
+    let all: Value = serde_json::from_slice(&kort(&["explain", "--json"]).stdout).expect("JSON");
+    assert_eq!(all["controllers"].as_array().map(Vec::len), Some(18));
+}
+
 #[test]
 fn wrong_input_is_named() {
     let folder = tempfile::tempdir().expect("folder");

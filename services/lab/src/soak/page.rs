@@ -36,7 +36,7 @@ fn scenario(s: &ScenarioResult) -> Markup {
 }
 
 /// Tables of the scores: heading, and what stands in it.
-const TABLES: [(&str, &[(&str, &str)]); 4] = [
+const TABLES: [(&str, &[(&str, &str)]); 5] = [
     (
         "Thrust",
         &[
@@ -51,19 +51,25 @@ const TABLES: [(&str, &[(&str, &str)]); 4] = [
         &[("rise_time_s", "rise [s]"), ("settle_time_s", "settle [s]"), ("overshoot_pct", "overshoot [%]")],
     ),
     (
-        "Energy and wear",
+        "Energy",
         &[
             ("energy_j", "energy [J]"),
             ("useful_impulse_n_s", "useful [N s]"),
             ("energy_per_impulse_j_n_s", "J per N s"),
             ("energy_over_ideal", "over the ideal"),
             ("copper_loss_per_impulse_j_n_s", "I²R J per N s"),
-            ("saturation_share", "at a limit"),
-            ("current_travel_a_s", "wear [A/s]"),
         ],
     ),
     (
-        "Estimates, faults, limits",
+        "Limits and wear",
+        &[
+            ("saturation_share", "at a limit"),
+            ("current_travel_a_s", "wear [A/s]"),
+            ("limits_broken", "limits broken"),
+        ],
+    ),
+    (
+        "Estimates and faults",
         &[
             ("flow_rms_m_s", "flow error [m/s]"),
             ("parameter_error", "parameter error"),
@@ -71,7 +77,6 @@ const TABLES: [(&str, &[(&str, &str)]); 4] = [
             ("faults_injected", "faults"),
             ("faults_survived", "survived"),
             ("trips", "trips"),
-            ("limits_broken", "limits broken"),
         ],
     ),
 ];
