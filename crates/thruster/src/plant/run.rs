@@ -37,26 +37,11 @@ pub fn simulate(plant: &mut Plant, stimulus: &Stimulus) -> Response {
         while let Some((_, part)) =
             next.next_if(|(at, part)| *at == i && *part > 0.0 || *at == i + 1 && *part == 0.0)
         {
-            rows.push(if *part == 0.0 { after } else { between(&before, &after, *part) });
+            rows.push(if *part == 0.0 { after } else { before.between(&after, *part) });
         }
         before = after;
     }
     // Instants past the last tick see the last state.
     rows.resize(stimulus.logs.len(), before);
     Response { rows }
-}
-
-fn between(a: &Sensed, b: &Sensed, part: f64) -> Sensed {
-    let mix = |x: f64, y: f64| x + (y - x) * part;
-    Sensed {
-        current_a: mix(a.current_a, b.current_a),
-        shaft_angle_rad: mix(a.shaft_angle_rad, b.shaft_angle_rad),
-        shaft_speed_rad_s: mix(a.shaft_speed_rad_s, b.shaft_speed_rad_s),
-        thrust_n: mix(a.thrust_n, b.thrust_n),
-        torque_n_m: mix(a.torque_n_m, b.torque_n_m),
-        flow_m_s: mix(a.flow_m_s, b.flow_m_s),
-        true_speed_rad_s: mix(a.true_speed_rad_s, b.true_speed_rad_s),
-        true_thrust_n: mix(a.true_thrust_n, b.true_thrust_n),
-        supply_v: mix(a.supply_v, b.supply_v),
-    }
 }

@@ -204,3 +204,21 @@ pub struct Sensed {
     /// Supply, V.
     pub supply_v: f64,
 }
+
+impl Sensed {
+    /// What the sensors show between this instant and a later one, `part` of the way.
+    pub fn between(&self, later: &Self, part: f64) -> Self {
+        let mix = |a: f64, b: f64| a + (b - a) * part;
+        Self {
+            current_a: mix(self.current_a, later.current_a),
+            shaft_angle_rad: mix(self.shaft_angle_rad, later.shaft_angle_rad),
+            shaft_speed_rad_s: mix(self.shaft_speed_rad_s, later.shaft_speed_rad_s),
+            thrust_n: mix(self.thrust_n, later.thrust_n),
+            torque_n_m: mix(self.torque_n_m, later.torque_n_m),
+            flow_m_s: mix(self.flow_m_s, later.flow_m_s),
+            true_speed_rad_s: mix(self.true_speed_rad_s, later.true_speed_rad_s),
+            true_thrust_n: mix(self.true_thrust_n, later.true_thrust_n),
+            supply_v: mix(self.supply_v, later.supply_v),
+        }
+    }
+}

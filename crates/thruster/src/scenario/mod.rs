@@ -9,7 +9,7 @@ mod run;
 
 pub use excitation::{Excitation, NoReplays, Replayed, Replays, Segment};
 pub use measuring::Measuring;
-pub use run::Run;
+pub use run::{Run, scale};
 
 use std::collections::BTreeMap;
 

@@ -159,7 +159,7 @@ impl Run {
             *self.plant.sensed()
         } else {
             self.step();
-            between(&self.before, self.plant.sensed(), part)
+            self.before.between(self.plant.sensed(), part)
         };
         let read = self.measuring.read(time_s, &sensed);
         values.clear();
@@ -217,19 +217,6 @@ impl Run {
     }
 }
 
-fn between(a: &Sensed, b: &Sensed, part: f64) -> Sensed {
-    let mix = |x: f64, y: f64| x + (y - x) * part;
-    Sensed {
-        current_a: mix(a.current_a, b.current_a),
-        shaft_angle_rad: mix(a.shaft_angle_rad, b.shaft_angle_rad),
-        shaft_speed_rad_s: mix(a.shaft_speed_rad_s, b.shaft_speed_rad_s),
-        thrust_n: mix(a.thrust_n, b.thrust_n),
-        torque_n_m: mix(a.torque_n_m, b.torque_n_m),
-        flow_m_s: mix(a.flow_m_s, b.flow_m_s),
-        ..*b
-    }
-}
-
 fn columns(scenario: &Scenario, rig: &Rig) -> Vec<&'static str> {
     let wet = rig.propeller.is_some();
     let axial = wet && scenario.model != ModelName::Model0;
@@ -259,8 +246,8 @@ fn columns(scenario: &Scenario, rig: &Rig) -> Vec<&'static str> {
     .collect()
 }
 
-/// Sizes in use: from the largest command through the steady map.
-fn scale(rig: &Rig, p: &Parameters, peak: f64, tick_s: f64, duration_s: f64) -> Scale {
+/// Sizes in use: from the largest drive command `peak` (A, V or rad/s) through the steady map.
+pub fn scale(rig: &Rig, p: &Parameters, peak: f64, tick_s: f64, duration_s: f64) -> Scale {
     let kt = p.get(Parameter::TorqueConstantNmA);
     let (ct, cq) = if rig.propeller.is_some() { p.bollard_coefficients() } else { (0.0, 0.0) };
     let limit = rig.amplifier.current_limit_a;

@@ -5,6 +5,7 @@ use kort_identify::report::{EmpiricalTerm, Finding, HeldOut, ParameterReport, Re
 use kort_thruster::rig::Rig;
 use maud::{Markup, html};
 
+use super::text::error_rows;
 use super::verdict::{badge, gain, percent, plain, scenario, spans};
 use super::{Page, curves, facts, note, number, table};
 
@@ -158,21 +159,7 @@ fn baseline(report: &Report, rig: &Rig) -> Markup {
             ]
         })
         .collect();
-    let errors: Vec<Vec<String>> = report
-        .baseline
-        .channels
-        .iter()
-        .map(|(name, c)| {
-            let percent = |x: f64| format!("{:.3}", 100.0 * x);
-            vec![
-                name.clone(),
-                percent(c.nrmse_train),
-                percent(c.nrmse_heldout),
-                percent(c.noise_floor),
-                if c.white { "yes" } else { "no" }.into(),
-            ]
-        })
-        .collect();
+    let errors = error_rows(&report.baseline.channels);
     html! {
         p { "Parameters of " (report.baseline.model) ", free within their stated tolerances, nothing added." }
         (table(&["parameter", "stated", "fitted", "standard error", "unit", "moved", ""], &rows))

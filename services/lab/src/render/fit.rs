@@ -4,7 +4,7 @@ use kort_identify::identify::FitReport;
 use kort_thruster::rig::Rig;
 
 use super::number;
-use super::text::{Sheet, parameter_rows};
+use super::text::{Sheet, error_rows, parameter_rows};
 
 /// The report for a terminal.
 pub fn text(report: &FitReport, rig: &Rig) -> String {
@@ -25,20 +25,7 @@ pub fn text(report: &FitReport, rig: &Rig) -> String {
         &parameter_rows(&report.parameters, rig),
     );
     sheet.heading("Errors (root mean square, % of full scale)");
-    let rows: Vec<Vec<String>> = report
-        .channels
-        .iter()
-        .map(|(name, c)| {
-            let percent = |x: f64| format!("{:.3}", 100.0 * x);
-            vec![
-                name.clone(),
-                percent(c.nrmse_train),
-                percent(c.nrmse_heldout),
-                percent(c.noise_floor),
-                if c.white { "yes" } else { "no" }.into(),
-            ]
-        })
-        .collect();
+    let rows = error_rows(&report.channels);
     sheet.table(&["", "fitted rows", "held-out rows", "noise alone", "white"], &rows);
     if !report.not_identifiable.is_empty() {
         sheet.heading("Not fixed by these recordings");

@@ -1,6 +1,8 @@
 //! Plain text for a terminal: headings, wrapped items, aligned tables.
 
-use kort_identify::report::ParameterReport;
+use std::collections::BTreeMap;
+
+use kort_identify::report::{ChannelReport, ParameterReport};
 use kort_thruster::rig::Rig;
 
 use super::number;
@@ -87,6 +89,23 @@ impl Sheet {
     pub fn into_text(self) -> String {
         self.text
     }
+}
+
+/// Errors of each channel as percent of full scale: fitted rows, held-out rows, noise alone, white.
+pub fn error_rows(channels: &BTreeMap<String, ChannelReport>) -> Vec<Vec<String>> {
+    let percent = |x: f64| format!("{:.3}", 100.0 * x);
+    channels
+        .iter()
+        .map(|(name, c)| {
+            vec![
+                name.clone(),
+                percent(c.nrmse_train),
+                percent(c.nrmse_heldout),
+                percent(c.noise_floor),
+                if c.white { "yes" } else { "no" }.into(),
+            ]
+        })
+        .collect()
 }
 
 /// Rows of a table of parameters: name, stated, fitted, standard error, unit, moved, remark.

@@ -10,9 +10,7 @@ use kort_thruster::models::ModelName;
 use kort_thruster::parameters::{Parameter, Parameters};
 use kort_thruster::plant::{Plant, Tick};
 use kort_thruster::rig::{AmplifierKind, Rig, Sensors};
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, StandardNormal};
+use kort_thruster::scenario::{self, Measuring};
 use serde::Deserialize;
 
 use super::{Amplifier, AmplifierFault};
@@ -43,20 +41,6 @@ struct EffectKeys {
     values: BTreeMap<String, f64>,
 }
 
-/// Standard deviations of the sensors' noise, as shares measured on stands of this kind.
-mod noise {
-    /// Of the current limit.
-    pub const CURRENT: f64 = 0.003;
-    /// Of the largest thrust.
-    pub const THRUST: f64 = 0.005;
-    /// Of the largest torque.
-    pub const TORQUE: f64 = 0.008;
-    /// Of the largest axial flow.
-    pub const FLOW: f64 = 0.02;
-    /// Of the supply.
-    pub const SUPPLY: f64 = 0.002;
-}
-
 /// The simulated drive.
 pub struct Simulated {
     plant: Plant,
@@ -66,9 +50,7 @@ pub struct Simulated {
     time_s: f64,
     ambient_m_s: f64,
     sensors: Sensors,
-    scale: Scale,
-    random: Option<ChaCha8Rng>,
-    until_flow_s: f64,
+    measuring: Measuring,
 }
 
 impl Simulated {
@@ -94,7 +76,7 @@ impl Simulated {
         }
         let tick_s = thruster.servo_period_ns() as f64 * 1e-9;
         let parameters = Parameters::stated(rig);
-        let scale = scale_of(rig, &parameters, tick_s);
+        let scale = scenario::scale(rig, &parameters, full_drive(rig, &parameters), tick_s, 60.0);
         let mut chosen = Vec::new();
         for effect in &keys.effects {
             chosen.push(resolve(effect, &scale).map_err(|words| fail("effects", words))?);
@@ -112,16 +94,7 @@ impl Simulated {
             time_s: 0.0,
             ambient_m_s: keys.ambient_m_s,
             sensors: rig.sensors,
-            scale,
-            random: (keys.seed != 0).then(|| ChaCha8Rng::seed_from_u64(keys.seed)),
-            until_flow_s: 0.0,
-        })
-    }
-
-    fn noise(&mut self, deviation: f64) -> f64 {
-        self.random.as_mut().map_or(0.0, |random| {
-            let unit: f64 = StandardNormal.sample(random);
-            deviation * unit
+            measuring: Measuring::new(&rig.sensors, scale, if keys.seed == 0 { 0.0 } else { 1.0 }, keys.seed),
         })
     }
 }
@@ -140,9 +113,7 @@ impl Amplifier for Simulated {
                 ..Tick::default()
             });
             self.time_s += self.tick_s;
-            self.until_flow_s -= self.tick_s;
         }
-        let sensed = *self.plant.sensed();
         let truth = self.plant.truth();
         if !(truth.shaft_speed_rad_s.is_finite()
             && truth.current_a.is_finite()
@@ -150,24 +121,19 @@ impl Amplifier for Simulated {
         {
             return Err(AmplifierFault);
         }
-        into.current_a = sensed.current_a + self.noise(noise::CURRENT * self.scale.current_a);
-        into.shaft_angle_rad = sensed.shaft_angle_rad;
-        into.shaft_speed_rad_s = sensed.shaft_speed_rad_s;
-        let thrust = sensed.thrust_n + self.noise(noise::THRUST * self.scale.thrust_n);
-        into.thrust_n = convert(thrust, self.sensors.thrust_full_scale_n, self.sensors.thrust_bits);
-        if self.sensors.torque_transducer {
-            into.torque_n_m = sensed.torque_n_m + self.noise(noise::TORQUE * self.scale.torque_n_m);
-        }
+        let read = self.measuring.read(self.time_s, self.plant.sensed());
+        into.current_a = read.current_a;
+        into.shaft_angle_rad = read.shaft_angle_rad;
+        into.shaft_speed_rad_s = read.shaft_speed_rad_s;
+        into.thrust_n = read.thrust_n;
         // A meter that is slower than the loop shows a value only when it has a new one.
-        if self.until_flow_s <= 0.0 {
-            into.flow_m_s = sensed.flow_m_s + self.noise(noise::FLOW * self.scale.flow_m_s);
-            self.until_flow_s += self.sensors.flow_rate_hz.map_or(self.tick_s, |hz| 1.0 / hz);
+        into.flow_m_s = read.flow_m_s;
+        into.supply_v = read.supply_v;
+        if self.sensors.torque_transducer {
+            into.torque_n_m = read.torque_n_m;
         }
         if self.sensors.ambient_flow_recorded {
             into.ambient_m_s = self.ambient_m_s;
-        }
-        if sensed.supply_v.is_finite() {
-            into.supply_v = sensed.supply_v + self.noise(noise::SUPPLY * sensed.supply_v);
         }
         Ok(())
     }
@@ -175,13 +141,6 @@ impl Amplifier for Simulated {
     fn drive(&mut self, drive: Option<f64>) {
         self.command = drive.unwrap_or(0.0);
     }
-}
-
-/// An analog-digital converter over plus and minus full scale.
-fn convert(value: f64, full_scale: Option<f64>, bits: Option<u32>) -> f64 {
-    let (Some(full), Some(bits)) = (full_scale, bits) else { return value };
-    let step = 2.0 * full / f64::from(bits.clamp(1, 30)).exp2();
-    (value.clamp(-full, full) / step).round() * step
 }
 
 /// An effect with its parameters in order.
@@ -214,31 +173,14 @@ fn resolve(keys: &EffectKeys, scale: &Scale) -> Result<(&'static Descriptor, Vec
     Ok((descriptor, values))
 }
 
-/// Sizes of the rig at full drive in bollard pull.
-fn scale_of(rig: &Rig, p: &Parameters, tick_s: f64) -> Scale {
-    let kt = p.get(Parameter::TorqueConstantNmA);
-    let supply = rig.amplifier.supply_v.unwrap_or(0.0);
-    let resistance = p.get(Parameter::WindingResistanceOhm);
-    let stall = if resistance > 0.0 { supply / resistance } else { f64::INFINITY };
-    let current = rig.amplifier.current_limit_a.min(stall);
-    let current = if current.is_finite() { current } else { 10.0 };
-    let (thrust, torque) = (p.get(Parameter::ThrustCoefficientNS2), p.get(Parameter::TorqueCoefficientNmS2));
-    let speed = if torque > 0.0 { (kt * current / torque).sqrt() } else { 100.0 };
-    let flux = p.get(Parameter::FluxCoefficient) * p.get(Parameter::DensityKgM3) * p.area_m2();
-    Scale {
-        shaft_speed_rad_s: speed,
-        torque_n_m: kt * current,
-        thrust_n: thrust * speed * speed,
-        flow_m_s: if flux > 0.0 { (thrust * speed * speed / flux).sqrt() } else { 1.0 },
-        current_a: current,
-        command: match rig.amplifier.kind {
-            AmplifierKind::Current => current,
-            AmplifierKind::Voltage => supply,
-            AmplifierKind::Speed => speed,
-        },
-        supply_v: supply,
-        inertia_kg_m2: p.get(Parameter::InertiaKgM2),
-        tick_s,
-        duration_s: 60.0,
+/// Largest drive command: current limit, supply, or the speed at which the supply's voltage is reached.
+fn full_drive(rig: &Rig, p: &Parameters) -> f64 {
+    let supply = rig.amplifier.supply_v;
+    match rig.amplifier.kind {
+        AmplifierKind::Current => {
+            Some(rig.amplifier.current_limit_a).filter(|a| a.is_finite()).unwrap_or(10.0)
+        }
+        AmplifierKind::Voltage => supply.unwrap_or(10.0),
+        AmplifierKind::Speed => supply.map_or(100.0, |v| v / p.get(Parameter::TorqueConstantNmA)),
     }
 }
