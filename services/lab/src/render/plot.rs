@@ -200,14 +200,17 @@ const LETTER_PX: i32 = 8;
 
 /// Names beside dots: where the dot is, and whose.
 #[derive(Default)]
-struct Labels(Vec<((i32, i32), usize)>);
+struct Labels(Vec<(Pixel, usize)>);
+
+/// Place on the chart: across, down.
+type Pixel = (i32, i32);
 
 impl Labels {
     /// Dot, place of the label and its series; from the top down, a label that would cover another
     /// goes further down.
-    fn placed(mut self, letters: impl Fn(usize) -> usize) -> Vec<((i32, i32), (i32, i32), usize)> {
+    fn placed(mut self, letters: impl Fn(usize) -> usize) -> Vec<(Pixel, Pixel, usize)> {
         self.0.sort_by_key(|((_, y), _)| *y);
-        let mut placed: Vec<((i32, i32), (i32, i32), usize)> = Vec::new();
+        let mut placed: Vec<(Pixel, Pixel, usize)> = Vec::new();
         let width = |i: usize| LETTER_PX * letters(i) as i32;
         for (dot, i) in self.0 {
             let right = dot.0 + 9 + width(i) < WIDTH as i32;
