@@ -57,7 +57,9 @@ fn stated(rig: &Rig, parameter: P, values: &Parameters) -> Option<Quantity> {
     let loose = |tol| Some(Quantity { value: values.get(parameter), tol: Some(tol) });
     match parameter {
         P::ThrustCoefficientNS2 | P::TorqueCoefficientNmS2 | P::Efficiency => loose(0.5),
-        P::SwirlFluxCoefficient | P::SwirlMassCoefficient => loose(1.5),
+        // The larger the flux, the less the wake turns: up to hardly at all.
+        P::SwirlFluxCoefficient => loose(200.0),
+        P::SwirlMassCoefficient => loose(1.5),
         _ => Parameters::quantity(rig, parameter),
     }
 }
@@ -109,6 +111,18 @@ pub fn hypothesis(model: ModelName, rig: &Rig, shaft_prescribed: bool, needs_cur
         start.push(quantity.value);
     }
     Hypothesis { effects: Vec::new(), free, start, fixed: Vec::new() }
+}
+
+/// Starts of a baseline's fit: as stated and, for a model with swirl, with nearly none, so that
+/// water that does not turn is found as well.
+pub fn starts(hypothesis: &Hypothesis) -> Vec<Hypothesis> {
+    let swirl = hypothesis.free.iter().position(|f| f.target == Target::Base(P::SwirlFluxCoefficient));
+    let still = swirl.map(|k| {
+        let mut other = hypothesis.clone();
+        other.start[k] = 0.05 * other.free[k].high;
+        other
+    });
+    std::iter::once(hypothesis.clone()).chain(still).collect()
 }
 
 /// A hypothesis with one more effect, starting from fitted values of the smaller one and the

@@ -1,6 +1,7 @@
 //! A recording made ready for simulation: inputs on the control grid, responses on the log grid.
 
 use kort_thruster::effects::{Available, Scale};
+use kort_thruster::models::ModelName;
 use kort_thruster::plant::{Driven, Stimulus, Tick};
 use kort_thruster::rig::{AmplifierKind, Rig};
 
@@ -669,7 +670,7 @@ pub fn possible_drivers(series: &[Series]) -> Vec<String> {
 }
 
 /// What the recordings offer, for the effects' `needs`.
-pub fn available(series: &[Series], all: &[Prepared]) -> Available {
+pub fn available(model: ModelName, series: &[Series], all: &[Prepared]) -> Available {
     let mut columns: Vec<String> = series
         .iter()
         .flat_map(|s| s.columns.iter().filter(|c| s.column(&c.0).is_some()).map(|c| c.0.clone()))
@@ -680,6 +681,7 @@ pub fn available(series: &[Series], all: &[Prepared]) -> Available {
         columns,
         shaft_prescribed: all.iter().all(|p| p.driving == Driving::Speed),
         current_prescribed: all.iter().all(|p| p.driving == Driving::Current),
+        axial_flow_modelled: !matches!(model, ModelName::Model0 | ModelName::Model1),
     }
 }
 

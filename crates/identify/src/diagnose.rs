@@ -16,7 +16,6 @@ use crate::heldout::{held_out_rows, longest_block_s};
 use crate::judge::{self, Outcome};
 use crate::library::is_term;
 use crate::locate::{locate, since_edge};
-use crate::noise::Whitener;
 use crate::report::{
     Alternative, Baseline, EmpiricalTerm, Finding, HeldOut, Mismatch, ParameterReport, Report, Verdict,
 };
@@ -83,7 +82,7 @@ pub fn diagnose(
     let setup = Setup::new(series, rig, options.model)?;
     let Setup { problem, hypothesis, notes, thin } = setup;
     let scale = scale(&problem.recordings, rig);
-    let offered = available(series, &problem.recordings);
+    let offered = available(options.model, series, &problem.recordings);
     let mut search = Search::new(problem, scale, &offered);
     let outcome = judge::run(&mut search, &hypothesis, series, progress);
     progress("scoring on held-out data");
@@ -131,10 +130,6 @@ impl<'a> Setup<'a> {
                 100.0 * baseline::UNSTATED_TOL
             ));
         }
-        let whiteners = recordings
-            .iter()
-            .map(|p| p.channels.iter().map(|c| Whitener::flat(0.02 * c.full_scale, c.rows.len())).collect())
-            .collect();
         if settled(&recordings) {
             notes.push(
                 "a table of settled points: nothing in it accelerates, so inertia, added mass, lags and delays do not show; in bollard pull every point has the same angle of attack. kort fit-table makes a rig from such a table and says what it cannot fix"
@@ -147,7 +142,15 @@ impl<'a> Setup<'a> {
             .any(|p| p.channels.iter().any(|c| c.response == crate::data::Response::Current));
         let hypothesis = baseline::hypothesis(model, rig, prescribed, current);
         let thin = too_thin(&recordings);
-        let problem = Problem { model, rig, stated: Parameters::stated(rig), recordings, whiteners, masked };
+        let mut problem = Problem {
+            model,
+            rig,
+            stated: Parameters::stated(rig),
+            recordings,
+            whiteners: Vec::new(),
+            masked,
+        };
+        problem.flat_noise();
         Ok(Self { problem, hypothesis, notes, thin })
     }
 }

@@ -384,6 +384,15 @@ impl<'a> Problem<'a> {
         self.whiten_columns(&fit.columns, fit.residual.len())
     }
 
+    /// Forgets what was learned of the noise: white, and the same share of full scale everywhere.
+    pub fn flat_noise(&mut self) {
+        self.whiteners = self
+            .recordings
+            .iter()
+            .map(|p| p.channels.iter().map(|c| Whitener::flat(0.02 * c.full_scale, c.rows.len())).collect())
+            .collect();
+    }
+
     /// Learns the noise from the residual of a fitted hypothesis.
     pub fn learn_noise(&mut self, hypothesis: &Hypothesis, values: &[f64]) {
         let (parameters, effects) = self.assemble(hypothesis, values);

@@ -127,7 +127,7 @@ pub fn identify(
         *rows = checks::check(one, rig).masked;
     }
     progress("fitting from the stated values");
-    let offered = available(series, &problem.recordings);
+    let offered = available(problem.model, series, &problem.recordings);
     let mut search = Search::new(problem, scale, &offered);
     let mut best = search.baseline(&hypothesis);
     if moving.contains(&true) {

@@ -68,7 +68,7 @@ pub fn run(
 ) -> Outcome {
     progress("fitting the baseline");
     let mut current = search.baseline(start);
-    let offered = available(series, &search.problem.recordings);
+    let offered = available(search.problem.model, series, &search.problem.recordings);
     search.try_columns(series, &mut current, &offered);
     let (named, poor) = names(search, current, Vec::new(), progress);
     let left = excess(&search.problem, &named.last).1;
@@ -130,6 +130,9 @@ fn names(
             gain > rules::BELIEVE && weighty && gain > rules::LEAST_OF_TERM * others
         });
         let holds = round.holds;
+        let list: Vec<String> =
+            named.iter().take(4).map(|c| format!("{} {:.0}", c.effect.id, base - c.criterion)).collect();
+        progress(&format!("candidates and what they gain: {}", list.join(", ")));
         if rounds.is_empty() && holds {
             term = best_term;
         }

@@ -16,6 +16,7 @@ pub mod judge;
 pub mod library;
 pub mod locate;
 pub mod noise;
+mod refit;
 pub mod refuse;
 pub mod report;
 pub mod screen;

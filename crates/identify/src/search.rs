@@ -7,12 +7,14 @@
 use kort_thruster::effects::{self, Available, Descriptor, Scale};
 use rayon::prelude::*;
 
-use crate::baseline::with_effect;
+use crate::baseline;
 use crate::changes;
 use crate::data::{Series, possible_drivers};
-use crate::fit::{Fit, Problem, difference};
+use crate::errors;
+use crate::fit::{Fit, Hypothesis, Problem, Stack, Target, difference};
 use crate::heldout;
 use crate::library::{self, is_term};
+use crate::refit::{TIMING, amends, in_turn, sort, unscreened};
 use crate::screen::{Known, Screened, screen};
 
 /// Thresholds of the search, in units of whitened sums of squares (twice log-likelihoods). Set
@@ -68,10 +70,6 @@ pub mod rules {
     pub const REFITTED: usize = 9;
 }
 
-/// Effects that shift signals in time, and so depend on where the edges of the command lie.
-const TIMING: [&str; 5] =
-    ["transport_delay", "amplifier_lag", "clock_skew", "encoder_filter_lag", "thrust_sensor_lag"];
-
 /// Candidates that are compared each under its own noise before one leads.
 const OWN_NOISE: usize = 4;
 
@@ -105,8 +103,7 @@ pub struct Round {
 
 /// Criterion of a fit; infinite where the simulation broke down.
 pub fn criterion(fit: &Fit) -> f64 {
-    let of_effects =
-        fit.hypothesis.free.iter().filter(|f| matches!(f.target, crate::fit::Target::Effect(..))).count();
+    let of_effects = fit.hypothesis.free.iter().filter(|f| matches!(f.target, Target::Effect(..))).count();
     let all = fit.chi2 + fit.penalty + rules::PER_PARAMETER * of_effects as f64;
     if all.is_finite() { all } else { f64::INFINITY }
 }
@@ -145,23 +142,13 @@ impl<'a> Search<'a> {
     }
 
     /// Fits the baseline: edges, noise and parameters in turn until they agree.
-    pub fn baseline(&mut self, hypothesis: &crate::fit::Hypothesis) -> Fit {
-        let mut at = hypothesis.clone();
-        let mut fit = self.problem.fit(&at, &[], 8);
-        for _ in 0..8 {
-            at.start.clone_from(&fit.values);
-            let moved = self.problem.place_edges(&at, &fit.values);
-            if moved {
-                fit = self.problem.fit(&at, &fit.columns, 3);
-                at.start.clone_from(&fit.values);
-            }
-            self.problem.learn_noise(&at, &fit.values);
-            fit = self.problem.fit(&at, &fit.columns, 4);
-            if !moved {
-                break;
-            }
-        }
-        fit
+    pub fn baseline(&mut self, hypothesis: &Hypothesis) -> Fit {
+        let first = baseline::starts(hypothesis)
+            .into_par_iter()
+            .map(|h| self.problem.fit(&h, &[], 8))
+            .min_by(|a, b| criterion(a).total_cmp(&criterion(b)))
+            .expect("a hypothesis has a start");
+        in_turn(&mut self.problem, first)
     }
 
     /// Tries further columns as drivers of what the baseline leaves; the most promising one is
@@ -205,9 +192,16 @@ impl<'a> Search<'a> {
             self.terms.iter().copied().filter(|t| taken.is_empty() && !t.id.ends_with("_switched")).collect();
         let everything: Vec<&'static Descriptor> =
             self.named.iter().chain(&terms).copied().filter(|e| !taken.contains(&e.id)).collect();
+        let (amending, everything): (Vec<_>, Vec<_>) =
+            everything.into_iter().partition(|e| amends(e, &self.scale));
+        if current.hypothesis.effects.last().is_some_and(|e| amends(e, &self.scale)) {
+            // Other equations: what was known of the responses holds no more.
+            self.known.clear();
+        }
         let screened = screen(&self.problem, current, &everything, &self.scale, &mut self.known);
         let least = (0.25 * rules::BELIEVE).max(0.02 * rules::SHARE_OF_FIRST * so_far);
-        let chosen = choose(&screened, least);
+        let mut chosen = choose(&screened, least);
+        chosen.extend(amending.into_iter().flat_map(|e| unscreened(e, &self.scale)));
         let mut candidates = self.refit(current, &chosen);
         let base = criterion(current);
         if candidates.first().is_none_or(|c| base - c.criterion < 0.3 * rules::BELIEVE) {
@@ -248,14 +242,15 @@ impl<'a> Search<'a> {
         while let Some(leader) = candidates.first_mut() {
             let gain = criterion(&before) - leader.criterion;
             let (without, with) = heldout::left_out(&self.problem, &mut before, &mut leader.fit, &self.scale);
-            let left_out = heldout::paired(&without, &with);
-            let free = self.free_in_time(leader.effect);
-            let (share, least) = if free {
-                (rules::HOLDS_KNOTS, rules::LEAST_SIZE_KNOTS)
+            let left_out = heldout::paired(&without, &with).0;
+            let size = self.size(&before, &leader.fit);
+            holds = if self.free_in_time(leader.effect) {
+                size > rules::LEAST_SIZE_KNOTS
+                    && (left_out > gain * rules::HOLDS_KNOTS
+                        || self.removed_on_held_out(&before, &leader.fit) > rules::HOLDS_KNOTS)
             } else {
-                (rules::HOLDS, rules::LEAST_SIZE)
+                size > rules::LEAST_SIZE && left_out > gain * rules::HOLDS
             };
-            holds = left_out.0 > gain * share && self.size(&before, &leader.fit) > least;
             if holds || candidates.len() == 1 {
                 break;
             }
@@ -271,21 +266,41 @@ impl<'a> Search<'a> {
         })
     }
 
+    /// Share of the squared error above the noise that a fit removes on rows it was not fitted to: the
+    /// full form of the first-order look at left-out blocks, which knots may bend too far for.
+    fn removed_on_held_out(&self, before: &Fit, after: &Fit) -> f64 {
+        let longest_s = heldout::longest_block_s(after.hypothesis.effects.iter(), &self.scale);
+        let held = heldout::held_out_rows(&self.problem, &[after], longest_s);
+        let mut train = self.problem.clone();
+        for (mask, held) in train.masked.iter_mut().zip(&held) {
+            mask.iter_mut().zip(held).for_each(|(m, h)| *m |= *h);
+        }
+        let residual = |fit: &Fit| {
+            let start = Hypothesis { start: fit.values.clone(), ..fit.hypothesis.clone() };
+            let fit = train.fit(&start, &fit.columns, 4);
+            self.problem.residual(&self.problem.respond(&fit.hypothesis, &fit.values))
+        };
+        let (before, after) = rayon::join(|| residual(before), || residual(after));
+        let (floor, full) = (errors::noise_floor(&self.problem, &after), errors::full_scales(&self.problem));
+        let above = |residual: &Stack| -> f64 {
+            errors::sums(&self.problem, residual, |r, row| !self.problem.masked[r][row] && held[r][row])
+                .into_iter()
+                .map(|(name, (sum, n))| (sum / n.max(1) as f64 - floor[name]).max(0.0) / full[name].powi(2))
+                .sum()
+        };
+        1.0 - above(&after) / above(&before).max(1e-12)
+    }
+
     /// Puts that of the best candidates first which leaves least when each learns its own noise: under
     /// the noise of a model that misses something, a poor name may look as good as the right one.
     fn lead_by_own_noise(&self, candidates: &mut Vec<Candidate>, base: f64) {
         let worth = base - candidates[0].criterion;
         let near = candidates.iter().take(OWN_NOISE).take_while(|c| base - c.criterion > 0.5 * worth).count();
-        let left: Vec<f64> = candidates[..near]
-            .par_iter()
-            .map(|c| {
-                let mut own = self.problem.clone();
-                own.learn_noise(&c.fit.hypothesis, &c.fit.values);
-                let size: f64 = own.whiteners.iter().flatten().map(crate::noise::Whitener::log_size).sum();
-                size + c.fit.penalty + rules::PER_PARAMETER * c.fit.hypothesis.free.len() as f64
-            })
-            .collect();
-        let best = (0..near).min_by(|a, b| left[*a].total_cmp(&left[*b])).unwrap_or(0);
+        let own: Vec<(f64, Fit)> = candidates[..near].par_iter().map(|c| self.under_own_noise(c)).collect();
+        let best = (0..near).min_by(|a, b| own[*a].0.total_cmp(&own[*b].0)).unwrap_or(0);
+        for (candidate, (_, fit)) in candidates.iter_mut().zip(own) {
+            candidate.fit = fit;
+        }
         let leader = candidates.remove(best);
         candidates.insert(0, leader);
     }
@@ -321,86 +336,12 @@ impl<'a> Search<'a> {
         Some(fitted.swap_remove(load.unwrap_or(0)))
     }
 
-    /// Re-fits chosen effects on top of a fit, best first.
-    fn refit(&self, current: &Fit, chosen: &[Screened]) -> Vec<Candidate> {
-        let mut all: Vec<Candidate> = chosen
-            .par_iter()
-            .map(|s| {
-                let at = |start: &[f64]| {
-                    with_effect(&current.hypothesis, &current.values, s.effect, &self.scale, Some(start))
-                };
-                // Limits and thresholds do not scale: start where the screen stood, if that is better.
-                // A promise far out may break the simulation: then a part of the way.
-                let part = weaken(s.effect, &self.scale, &s.start);
-                let hypothesis = [at(&s.start), at(&s.origin), at(&part)]
-                    .into_iter()
-                    .map(|h| (self.cost(&h), h))
-                    .min_by(|a, b| a.0.total_cmp(&b.0))
-                    .map_or_else(|| at(&s.start), |best| best.1);
-                let mut fit = self.problem.fit(&hypothesis, &current.columns, 4);
-                if TIMING.contains(&s.effect.id) {
-                    fit = self.with_own_edges(&fit);
-                }
-                Candidate { effect: s.effect, criterion: criterion(&fit), fit, screened: s.gain }
-            })
-            .collect();
-        sort(&mut all);
-        // An effect may have been started from several places: keep its best.
-        let mut seen: Vec<&str> = Vec::new();
-        all.retain(|c| {
-            let fresh = !seen.contains(&c.effect.id);
-            seen.push(c.effect.id);
-            fresh
-        });
-        all
-    }
-
-    /// The same hypothesis fitted again from where it was, under the present noise and edges.
-    pub fn again(&self, fit: &Fit) -> Fit {
-        let mut hypothesis = fit.hypothesis.clone();
-        hypothesis.start.clone_from(&fit.values);
-        self.problem.fit(&hypothesis, &fit.columns, 6)
-    }
-
-    /// Misfit of a hypothesis where it starts.
-    fn cost(&self, hypothesis: &crate::fit::Hypothesis) -> f64 {
-        let residual = self.problem.residual(&self.problem.respond(hypothesis, &hypothesis.start));
-        let cost = self.problem.whiten(&residual).norm_squared();
-        if cost.is_finite() { cost } else { f64::INFINITY }
-    }
-
-    /// Like [`Search::again`], with the command's edges where this hypothesis wants them: a lag or
-    /// a delay judged on edges that were placed without it would never win.
-    fn with_own_edges(&self, fit: &Fit) -> Fit {
-        if self.problem.recordings.iter().all(|r| r.edges.is_empty()) {
-            return self.again(fit);
-        }
-        let mut own = self.problem.clone();
-        own.place_edges(&fit.hypothesis, &fit.values);
-        let mut hypothesis = fit.hypothesis.clone();
-        hypothesis.start.clone_from(&fit.values);
-        own.fit(&hypothesis, &fit.columns, 5)
-    }
-
     /// Largest root mean square difference of two fits' responses over full scale.
     pub fn size(&self, a: &Fit, b: &Fit) -> f64 {
         let y = self.problem.respond(&b.hypothesis, &b.values);
         let x = difference(self.problem.respond(&a.hypothesis, &a.values), &y);
         self.problem.size(&x)
     }
-}
-
-/// The same values with a quarter of the strengths.
-fn weaken(effect: &Descriptor, scale: &Scale, values: &[f64]) -> Vec<f64> {
-    (effect.parameters)(scale)
-        .iter()
-        .zip(values)
-        .map(|(spec, v)| if spec.shape { *v } else { (0.25 * v).clamp(spec.low, spec.high) })
-        .collect()
-}
-
-fn sort(candidates: &mut [Candidate]) {
-    candidates.sort_by(|a, b| a.criterion.total_cmp(&b.criterion).then(a.effect.id.cmp(b.effect.id)));
 }
 
 /// Which screened starts are worth a re-fit: the best by promise, a second start where it

@@ -9,22 +9,42 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     id: "encoder_filter_lag",
     path: Path::Sensor,
     what: "measured shaft speed has a filter slower than stated, or one that is not stated at all",
-    equation: "t2 y' = Om - y, after the stated filter; t2 [s]",
+    equation: "(t1 + dt) y1' = Om - y1 in place of the stated t1, then t2 y' = y1 - y; dt, t2 [s]",
     signature: "shaft speed alone is late and rounded by a fixed time, at all amplitudes; thrust and flow fit",
     confused_with: &["clock_skew", "amplifier_lag", "transport_delay", "entrained_water_inertia", "rotor_inertia_error"],
     separated_by: "the raw shaft angle, differenced",
     reference: "Whitcomb & Yoerger, Comparative Experiments in the Dynamics and Model-Based Control of Marine Thrusters (their speed filter: 10 ms)",
     parameters,
-    starts: |_| vec![vec![0.03], vec![0.1]],
+    starts: |_| vec![vec![0.03, 0.03], vec![0.1, 0.1]],
     needs: speed_measured,
-    build: |values, context| Box::new(EncoderFilterLag { lag_s: values[0], tick_s: context.tick_s, lag: FirstOrder::default() }),
+    build: |values, context| {
+        let tick_s = context.tick_s;
+        let decay = |t: f64| if t > 0.0 { (-tick_s / t).exp() } else { 0.0 };
+        let stated_s = context.rig.sensors.speed_filter_time_constant_s.unwrap_or(0.0);
+        Box::new(EncoderFilterLag {
+            stated: decay(stated_s),
+            slower: decay(stated_s + values[0]),
+            memory: None,
+            lag_s: values[1],
+            tick_s,
+            lag: FirstOrder::default(),
+        })
+    },
 };
 
 fn parameters(_: &Scale) -> Vec<Spec> {
-    vec![Spec::strength("speed_lag_s", "s", 0.01, 0.0, 1.0)]
+    vec![
+        Spec::strength("filter_excess_s", "s", 0.01, 0.0, 1.0),
+        Spec::strength("second_lag_s", "s", 0.01, 0.0, 1.0),
+    ]
 }
 
 struct EncoderFilterLag {
+    /// Decay over a tick of the filter as stated, and as it is.
+    stated: f64,
+    slower: f64,
+    /// Last output of the stated filter, and of the one in its place.
+    memory: Option<(f64, f64)>,
     lag_s: f64,
     tick_s: f64,
     lag: FirstOrder,
@@ -36,6 +56,12 @@ impl Effect for EncoderFilterLag {
     }
 
     fn sense(&mut self, _: &Tick, sensed: &mut Sensed) {
-        sensed.shaft_speed_rad_s = self.lag.step(sensed.shaft_speed_rad_s, self.lag_s, self.tick_s);
+        let seen = sensed.shaft_speed_rad_s;
+        let (before, last) = self.memory.unwrap_or((seen, seen));
+        // The stated filter undone, and the slower one in its place.
+        let raw = (seen - self.stated * before) / (1.0 - self.stated);
+        let slow = self.slower * last + (1.0 - self.slower) * raw;
+        self.memory = Some((seen, slow));
+        sensed.shaft_speed_rad_s = self.lag.step(slow, self.lag_s, self.tick_s);
     }
 }

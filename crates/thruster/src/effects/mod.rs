@@ -6,6 +6,7 @@
 //! prints just that.
 
 use crate::blade::Inflow;
+use crate::models::ModelName;
 use crate::parameters::Parameters;
 use crate::plant::{Balance, Drive, Foil, Local, Sensed, Tick};
 use crate::rig::{AmplifierKind, Rig};
@@ -123,6 +124,8 @@ pub trait Effect: Send {
     fn states(&self) -> usize {
         0
     }
+    /// Once, before the run: other equations or other values of their parameters.
+    fn amend(&self, _model: &mut ModelName, _parameters: &mut Parameters) {}
     /// Which hooks are used; the others are never called.
     fn hooks(&self) -> Hooks;
     /// Once a control tick, before the drive acts: command, limits, lag, supply.
@@ -176,6 +179,8 @@ pub struct Available {
     pub shaft_prescribed: bool,
     /// The current is prescribed (a recorded current drives the model).
     pub current_prescribed: bool,
+    /// The baseline model has the axial flow as a state.
+    pub axial_flow_modelled: bool,
 }
 
 impl Available {
@@ -331,6 +336,7 @@ catalogue! {
     command_dead_band,
     gear_backlash,
     // axial flow
+    axial_flow_dynamics,
     ambient_axial_flow,
     ambient_flow_unsteady,
     tank_recirculation,

@@ -10,7 +10,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     id: "supply_sag",
     path: Path::Drive,
     what: "the bus voltage falls under load through the resistance of cable and battery, and recovers with a lag",
-    equation: "Vbus = V0 - lag(Rs Ibus), Ibus = |im| |R im + ke Om|/V0; Rs [ohm], lag [s]. A voltage drive's output \
+    equation: "Vbus = f V0 - lag(Rs Ibus), Ibus = |im| |R im + ke Om|/V0; Rs [ohm], lag [s], f [1] for a supply not as stated. A voltage drive's output \
                falls in proportion; a current drive meets its voltage limit sooner",
     signature: "on a voltage drive thrust grows more slowly than command; on a current drive only the top is capped; \
                 other loads on the bus show through; thrust over speed squared is unchanged",
@@ -18,12 +18,13 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     separated_by: "the recorded bus voltage; the supply voltage varied",
     reference: "Ohm's law with the power balance of the drive; kort's form",
     parameters,
-    starts: |scale| [0.03, 0.08, 0.14, 0.2, 0.28, 0.4].iter().map(|share| vec![share * source_ohm(scale), 0.01]).collect(),
+    starts,
     needs: voltage_limit_backemf::needs,
     build: |values, context| {
         Box::new(SupplySag {
             source_ohm: values[0],
             recovery_s: values[1],
+            supply_factor: values[2],
             voltage_drive: context.rig.amplifier.kind == crate::rig::AmplifierKind::Voltage,
             tick_s: context.tick_s,
             sag: FirstOrder::default(),
@@ -44,12 +45,22 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
     vec![
         Spec::strength("source_resistance_ohm", "ohm", share * full, 0.0, 2.0 * full),
         Spec::shape("recovery_s", "s", 0.01, 0.0, 20.0),
+        Spec::shape("supply_factor", "1", 1.0, 0.4, 1.2),
     ]
+}
+
+/// Supplies as stated with more and less sag, and lower ones that hardly sag.
+fn starts(scale: &Scale) -> Vec<Vec<f64>> {
+    let full = source_ohm(scale);
+    let stated = [0.03, 0.08, 0.14, 0.2, 0.28, 0.4].iter().map(|share| vec![share * full, 0.01, 1.0]);
+    let lower = [1.1, 1.2, 1.3, 1.45].iter().map(|k| vec![0.05 * full, 0.01, (k * emf_share(scale)).clamp(0.4, 1.0)]);
+    stated.chain(lower).collect()
 }
 
 struct SupplySag {
     source_ohm: f64,
     recovery_s: f64,
+    supply_factor: f64,
     voltage_drive: bool,
     tick_s: f64,
     sag: FirstOrder,
@@ -61,6 +72,7 @@ impl Effect for SupplySag {
     }
 
     fn drive(&mut self, _: &Tick, drive: &mut Drive) {
+        drive.supply_v *= self.supply_factor;
         let winding_v = drive.resistance_ohm * drive.current_a + drive.back_emf_v;
         // Bus and winding exchange power; a braking drive does not lift the bus here.
         let bus_a = (drive.current_a * winding_v).max(0.0) / drive.supply_v;

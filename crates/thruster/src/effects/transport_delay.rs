@@ -1,7 +1,7 @@
 //! A dead time between command and drive: bus, scheduler, serial line.
 
 use super::memory::History;
-use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, commanded, one_start};
+use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, commanded};
 use crate::plant::{Drive, Tick};
 
 /// Catalogue entry.
@@ -15,7 +15,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     separated_by: "steps cross-correlated channel by channel; a chirp (phase slope against roll-off)",
     reference: "Ljung 1999, System Identification",
     parameters,
-    starts: one_start,
+    starts: |_| [0.02, 0.05, 0.1].map(|delay| vec![delay]).to_vec(),
     needs: commanded,
     build: |values, context| Box::new(TransportDelay { delay_s: values[0], past: History::new(values[0], context.tick_s) }),
 };

@@ -153,6 +153,8 @@ impl Plant {
                 Hooked { effect, own }
             })
             .collect();
+        let (mut model, mut parameters) = (model, *parameters);
+        effects.iter().for_each(|e| e.effect.amend(&mut model, &mut parameters));
         let hooked = |used: fn(&crate::effects::Hooks) -> bool| -> Vec<usize> {
             (0..effects.len()).filter(|i| used(&effects[*i].effect.hooks())).collect()
         };
@@ -163,7 +165,7 @@ impl Plant {
         Self {
             model,
             rates_may_hold: !effects.iter().any(changes_between_ticks),
-            parameters: *parameters,
+            parameters,
             sensors: rig.sensors,
             amplifier: rig.amplifier.kind,
             current_limit_a: rig.amplifier.current_limit_a,
@@ -176,7 +178,7 @@ impl Plant {
             sense_hooks: hooked(|h| h.sense),
             effects,
             used_states: next,
-            constants: Constants::new(parameters, rig.propeller.is_none()),
+            constants: Constants::new(&parameters, rig.propeller.is_none()),
             decays: Decays::new(parameters.get(P::TimeConstantS), &rig.sensors, tick_s),
             x: [0.0; STATES],
             current_a: 0.0,

@@ -1,0 +1,185 @@
+//! Effects fitted on top of what is known: from several starts, with the command's edges and the
+//! noise where each of them wants them.
+
+use kort_thruster::effects::{Descriptor, Scale};
+use rayon::prelude::*;
+
+use crate::baseline::with_effect;
+use crate::fit::{Fit, Hypothesis, Problem, Target};
+use crate::noise::Whitener;
+use crate::screen::Screened;
+use crate::search::{Candidate, Search, criterion, rules};
+
+/// Effects that shift signals in time, and so depend on where the edges of the command lie.
+pub(crate) const TIMING: [&str; 5] =
+    ["transport_delay", "amplifier_lag", "clock_skew", "encoder_filter_lag", "thrust_sensor_lag"];
+
+impl Search<'_> {
+    /// Re-fits chosen effects on top of a fit, best first.
+    pub(crate) fn refit(&self, current: &Fit, chosen: &[Screened]) -> Vec<Candidate> {
+        let mut all: Vec<Candidate> = chosen
+            .par_iter()
+            .map(|s| {
+                let at = |start: &[f64]| {
+                    with_effect(&current.hypothesis, &current.values, s.effect, &self.scale, Some(start))
+                };
+                // Limits and thresholds do not scale: start where the screen stood, if that is better.
+                // A promise far out may break the simulation: then a part of the way.
+                let part = weaken(s.effect, &self.scale, &s.start);
+                let hypothesis = [at(&s.start), at(&s.origin), at(&part)]
+                    .into_iter()
+                    .map(|h| (self.cost(&h), h))
+                    .min_by(|a, b| a.0.total_cmp(&b.0))
+                    .map_or_else(|| at(&s.start), |best| best.1);
+                // Derivatives carry over, unless the equations are others.
+                let known = if amends(s.effect, &self.scale) { &[][..] } else { &current.columns };
+                let mut fit = self.problem.fit(&hypothesis, known, if known.is_empty() { 8 } else { 4 });
+                if TIMING.contains(&s.effect.id) {
+                    fit = self.with_own_edges(&fit);
+                }
+                Candidate { effect: s.effect, criterion: criterion(&fit), fit, screened: s.gain }
+            })
+            .collect();
+        sort(&mut all);
+        // An effect may have been started from several places: keep its best.
+        let mut seen: Vec<&str> = Vec::new();
+        all.retain(|c| {
+            let fresh = !seen.contains(&c.effect.id);
+            seen.push(c.effect.id);
+            fresh
+        });
+        all
+    }
+
+    /// The same hypothesis fitted again from where it was, under the present noise and edges.
+    pub fn again(&self, fit: &Fit) -> Fit {
+        let mut hypothesis = fit.hypothesis.clone();
+        hypothesis.start.clone_from(&fit.values);
+        self.problem.fit(&hypothesis, &fit.columns, 6)
+    }
+
+    /// Misfit of a hypothesis where it starts.
+    fn cost(&self, hypothesis: &Hypothesis) -> f64 {
+        let residual = self.problem.residual(&self.problem.respond(hypothesis, &hypothesis.start));
+        let cost = self.problem.whiten(&residual).norm_squared();
+        if cost.is_finite() { cost } else { f64::INFINITY }
+    }
+
+    /// Like [`Search::again`], with the command's edges where this hypothesis wants them: a lag or
+    /// a delay judged on edges that were placed without it would never win.
+    pub(crate) fn with_own_edges(&self, fit: &Fit) -> Fit {
+        if self.problem.recordings.iter().all(|r| r.edges.is_empty()) {
+            return self.again(fit);
+        }
+        // Edges that were placed too late hold a delay small, and the other way round: from several sizes.
+        let slot = fit.hypothesis.effects.len() - 1;
+        let own_value = |k: usize| match fit.hypothesis.free[k].target {
+            Target::Effect(s, j) if s == slot => Some(j),
+            _ => None,
+        };
+        let from = |value: &dyn Fn(usize, usize) -> f64| {
+            let mut hypothesis = fit.hypothesis.clone();
+            for (k, free) in fit.hypothesis.free.iter().enumerate() {
+                let wanted = own_value(k).map_or(fit.values[k], |j| value(k, j));
+                hypothesis.start[k] = wanted.clamp(free.low, free.high);
+            }
+            hypothesis
+        };
+        let far = (fit.hypothesis.effects[slot].starts)(&self.scale)
+            .into_iter()
+            .map(|start| from(&|_, j| start[j]))
+            .map(|h| (self.cost(&h), h))
+            .min_by(|a, b| a.0.total_cmp(&b.0));
+        let near = [1.0, 2.0, 3.0].map(|factor| from(&|k, _| factor * fit.values[k]));
+        near.into_iter()
+            .chain(far.map(|f| f.1))
+            .collect::<Vec<_>>()
+            .into_par_iter()
+            .map(|hypothesis| {
+                let mut own = self.problem.clone();
+                own.place_edges(&hypothesis, &hypothesis.start);
+                own.fit(&hypothesis, &fit.columns, 5)
+            })
+            .min_by(|a, b| criterion(a).total_cmp(&criterion(b)))
+            .unwrap_or_else(|| fit.clone())
+    }
+
+    /// A candidate fitted under the noise it leaves itself, and what it leaves. The noise of a model
+    /// that misses something forgives slow errors; so once more from white noise, if that leaves less.
+    pub(crate) fn under_own_noise(&self, candidate: &Candidate) -> (f64, Fit) {
+        let left = |own: &Problem, fit: &Fit| {
+            let size: f64 = own.whiteners.iter().flatten().map(Whitener::log_size).sum();
+            size + fit.penalty + rules::PER_PARAMETER * fit.hypothesis.free.len() as f64
+        };
+        let fit = candidate.fit.clone();
+        let mut own = self.problem.clone();
+        own.learn_noise(&fit.hypothesis, &fit.values);
+        let here = left(&own, &fit);
+        if self.free_in_time(candidate.effect) {
+            return (here, fit);
+        }
+        let mut own = self.problem.clone();
+        own.flat_noise();
+        let start = Hypothesis { start: fit.values.clone(), ..fit.hypothesis.clone() };
+        let first = own.fit(&start, &[], 8);
+        let afresh = in_turn(&mut own, first);
+        own.learn_noise(&afresh.hypothesis, &afresh.values);
+        let there = left(&own, &afresh);
+        if there < here { (there, afresh) } else { (here, fit) }
+    }
+}
+
+/// Whether an effect has no strength that could be zero: it puts other equations in the place of
+/// the baseline's.
+pub(crate) fn amends(effect: &Descriptor, scale: &Scale) -> bool {
+    (effect.parameters)(scale).iter().all(|p| p.shape)
+}
+
+/// The starts of an effect at which no first-order look is possible.
+pub(crate) fn unscreened(effect: &'static Descriptor, scale: &Scale) -> Vec<Screened> {
+    let default: Vec<f64> = (effect.parameters)(scale).iter().map(|p| p.start).collect();
+    std::iter::once(default)
+        .chain((effect.starts)(scale))
+        .map(|start| Screened {
+            effect,
+            origin: start.clone(),
+            start,
+            gain: 0.0,
+            plain: 0.0,
+            directions: 0,
+            size: 0.0,
+        })
+        .collect()
+}
+
+/// Edges, noise and parameters in turn until they agree.
+pub(crate) fn in_turn(problem: &mut Problem, mut fit: Fit) -> Fit {
+    let mut at = fit.hypothesis.clone();
+    for _ in 0..8 {
+        at.start.clone_from(&fit.values);
+        let moved = problem.place_edges(&at, &fit.values);
+        if moved {
+            fit = problem.fit(&at, &fit.columns, 3);
+            at.start.clone_from(&fit.values);
+        }
+        problem.learn_noise(&at, &fit.values);
+        fit = problem.fit(&at, &fit.columns, 4);
+        if !moved {
+            break;
+        }
+    }
+    fit
+}
+
+/// The same values with a quarter of the strengths.
+fn weaken(effect: &Descriptor, scale: &Scale, values: &[f64]) -> Vec<f64> {
+    (effect.parameters)(scale)
+        .iter()
+        .zip(values)
+        .map(|(spec, v)| if spec.shape { *v } else { (0.25 * v).clamp(spec.low, spec.high) })
+        .collect()
+}
+
+pub(crate) fn sort(candidates: &mut [Candidate]) {
+    candidates.sort_by(|a, b| a.criterion.total_cmp(&b.criterion).then(a.effect.id.cmp(b.effect.id)));
+}
