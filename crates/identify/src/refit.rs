@@ -35,7 +35,7 @@ impl Search<'_> {
                 let known = if amends(s.effect, &self.scale) { &[][..] } else { &current.columns };
                 let mut fit = self.problem.fit(&hypothesis, known, if known.is_empty() { 8 } else { 4 });
                 if TIMING.contains(&s.effect.id) {
-                    fit = self.with_own_edges(&fit);
+                    fit = self.with_own_edges(&fit, &[1.0, 2.0, 3.0]);
                 }
                 Candidate { effect: s.effect, criterion: criterion(&fit), fit, screened: s.gain }
             })
@@ -58,16 +58,13 @@ impl Search<'_> {
         self.problem.fit(&hypothesis, &fit.columns, 6)
     }
 
-    /// Misfit of a hypothesis where it starts.
     fn cost(&self, hypothesis: &Hypothesis) -> f64 {
-        let residual = self.problem.residual(&self.problem.respond(hypothesis, &hypothesis.start));
-        let cost = self.problem.whiten(&residual).norm_squared();
-        if cost.is_finite() { cost } else { f64::INFINITY }
+        cost(&self.problem, hypothesis)
     }
 
     /// Like [`Search::again`], with the command's edges where this hypothesis wants them: a lag or
     /// a delay judged on edges that were placed without it would never win.
-    pub(crate) fn with_own_edges(&self, fit: &Fit) -> Fit {
+    pub(crate) fn with_own_edges(&self, fit: &Fit, sizes: &[f64]) -> Fit {
         if self.problem.recordings.iter().all(|r| r.edges.is_empty()) {
             return self.again(fit);
         }
@@ -85,23 +82,22 @@ impl Search<'_> {
             }
             hypothesis
         };
-        let far = (fit.hypothesis.effects[slot].starts)(&self.scale)
-            .into_iter()
-            .map(|start| from(&|_, j| start[j]))
-            .map(|h| (self.cost(&h), h))
-            .min_by(|a, b| a.0.total_cmp(&b.0));
-        let near = [1.0, 2.0, 3.0].map(|factor| from(&|k, _| factor * fit.values[k]));
-        near.into_iter()
-            .chain(far.map(|f| f.1))
-            .collect::<Vec<_>>()
+        let mut starts: Vec<Hypothesis> =
+            sizes.iter().map(|factor| from(&|k, _| factor * fit.values[k])).collect();
+        if sizes.len() > 1 {
+            let far = (fit.hypothesis.effects[slot].starts)(&self.scale).into_iter();
+            let far = far.map(|start| from(&|_, j| start[j])).map(|h| (self.cost(&h), h));
+            starts.extend(far.min_by(|a, b| a.0.total_cmp(&b.0)).map(|f| f.1));
+        }
+        starts
             .into_par_iter()
-            .map(|hypothesis| {
+            .map(|start| {
                 let mut own = self.problem.clone();
-                own.place_edges(&hypothesis, &hypothesis.start);
-                own.fit(&hypothesis, &fit.columns, 5)
+                own.place_edges(&start, &start.start);
+                (cost(&own, &start), own, start)
             })
-            .min_by(|a, b| criterion(a).total_cmp(&criterion(b)))
-            .unwrap_or_else(|| fit.clone())
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+            .map_or_else(|| fit.clone(), |(_, own, start)| own.fit(&start, &fit.columns, 5))
     }
 
     /// A candidate fitted under the noise it leaves itself, and what it leaves. The noise of a model
@@ -127,6 +123,13 @@ impl Search<'_> {
         let there = left(&own, &afresh);
         if there < here { (there, afresh) } else { (here, fit) }
     }
+}
+
+/// Misfit of a hypothesis where it starts; infinite where the simulation breaks down.
+fn cost(problem: &Problem, hypothesis: &Hypothesis) -> f64 {
+    let residual = problem.residual(&problem.respond(hypothesis, &hypothesis.start));
+    let cost = problem.whiten(&residual).norm_squared();
+    if cost.is_finite() { cost } else { f64::INFINITY }
 }
 
 /// Whether an effect has no strength that could be zero: it puts other equations in the place of

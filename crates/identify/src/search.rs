@@ -224,7 +224,7 @@ impl<'a> Search<'a> {
                 .into_par_iter()
                 .map(|c| {
                     let fit = if TIMING.contains(&c.effect.id) {
-                        self.with_own_edges(&c.fit)
+                        self.with_own_edges(&c.fit, &[1.0])
                     } else {
                         self.again(&c.fit)
                     };
