@@ -12,16 +12,16 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     what: "the axial flow through the propeller is a state of its own: Models 0 and 1 tie thrust and load to the shaft \
            speed alone, while the water needs time to follow",
     equation: "T = rho a l gam vp' + dbeta rho a vp|vp|, with lift and drag of the blade in (0.7 r Om, vp): Model 2; \
-               fitted as factors on the stated CLmax, CDmax, dbeta and gam",
+               fitted as factors on the stated CLmax, CDmax, dbeta, gam and pitch",
     signature: "thrust and load after a step of the shaft speed are two to three times their steady values and settle as \
                 the water comes up; the flow meter lags behind the shaft",
     confused_with: &["stand_resonance", "inertia_added_mass_error", "amplifier_lag"],
     separated_by: "steps of several sizes: the flow settles over shaft angle, a lag or a resonance over seconds",
     reference: "Healey et al. 1995 (IEEE JOE 20:354); Whitcomb & Yoerger 1999, Models 2 and 3",
     parameters,
-    starts: |_| vec![vec![1.0, 1.0, 1.0, 2.5]],
+    starts: |_| vec![vec![1.0, 1.0, 1.0, 2.5, 1.0]],
     needs: static_baseline,
-    build: |values, _| Box::new(AxialFlowDynamics { factors: [values[0], values[1], values[2], values[3]] }),
+    build: |values, _| Box::new(AxialFlowDynamics { factors: [values[0], values[1], values[2], values[3], values[4]] }),
 };
 
 /// Factors on what the rig states.
@@ -31,6 +31,7 @@ fn parameters(_: &Scale) -> Vec<Spec> {
         Spec::shape("drag_factor", "1", 1.0, 0.2, 5.0),
         Spec::shape("flux_factor", "1", 1.0, 0.2, 5.0),
         Spec::shape("added_mass_factor", "1", 1.0, 0.3, 5.0),
+        Spec::shape("pitch_factor", "1", 1.0, 0.8, 1.25),
     ]
 }
 
@@ -42,7 +43,7 @@ fn static_baseline(rig: &Rig, available: &Available) -> Result<(), &'static str>
 }
 
 struct AxialFlowDynamics {
-    factors: [f64; 4],
+    factors: [f64; 5],
 }
 
 impl Effect for AxialFlowDynamics {
@@ -55,7 +56,7 @@ impl Effect for AxialFlowDynamics {
         if matches!(model, ModelName::Model0 | ModelName::Model1) {
             *model = ModelName::Model2;
         }
-        let water = [P::LiftMax, P::DragMax, P::FluxCoefficient, P::AddedMassCoefficient];
+        let water = [P::LiftMax, P::DragMax, P::FluxCoefficient, P::AddedMassCoefficient, P::PitchRad];
         for (parameter, factor) in water.into_iter().zip(self.factors) {
             parameters.set(parameter, factor * parameters.get(parameter));
         }
