@@ -113,13 +113,13 @@ pub fn hypothesis(model: ModelName, rig: &Rig, shaft_prescribed: bool, needs_cur
     Hypothesis { effects: Vec::new(), free, start, fixed: Vec::new() }
 }
 
-/// Starts of a baseline's fit: as stated and, for a model with swirl, with nearly none, so that
-/// water that does not turn is found as well.
+/// Starts of a baseline's fit: as stated and, for a model with swirl, with hardly any, so that water
+/// that does not turn is found as well.
 pub fn starts(hypothesis: &Hypothesis) -> Vec<Hypothesis> {
     let swirl = hypothesis.free.iter().position(|f| f.target == Target::Base(P::SwirlFluxCoefficient));
     let still = swirl.map(|k| {
         let mut other = hypothesis.clone();
-        other.start[k] = 0.05 * other.free[k].high;
+        other.start[k] = 0.5 * other.free[k].high;
         other
     });
     std::iter::once(hypothesis.clone()).chain(still).collect()

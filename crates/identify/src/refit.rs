@@ -103,10 +103,6 @@ impl Search<'_> {
     /// A candidate fitted under the noise it leaves itself, and what it leaves. The noise of a model
     /// that misses something forgives slow errors; so once more from white noise, if that leaves less.
     pub(crate) fn under_own_noise(&self, candidate: &Candidate) -> (f64, Fit) {
-        let left = |own: &Problem, fit: &Fit| {
-            let size: f64 = own.whiteners.iter().flatten().map(Whitener::log_size).sum();
-            size + fit.penalty + rules::PER_PARAMETER * fit.hypothesis.free.len() as f64
-        };
         let fit = candidate.fit.clone();
         let mut own = self.problem.clone();
         own.learn_noise(&fit.hypothesis, &fit.values);
@@ -123,6 +119,13 @@ impl Search<'_> {
         let there = left(&own, &afresh);
         if there < here { (there, afresh) } else { (here, fit) }
     }
+}
+
+/// What a fit leaves, when the noise was learned from it: twice the logarithm of its size, and what
+/// its parameters cost.
+pub(crate) fn left(problem: &Problem, fit: &Fit) -> f64 {
+    let size: f64 = problem.whiteners.iter().flatten().map(Whitener::log_size).sum();
+    size + fit.penalty + rules::PER_PARAMETER * fit.hypothesis.free.len() as f64
 }
 
 /// Misfit of a hypothesis where it starts; infinite where the simulation breaks down.

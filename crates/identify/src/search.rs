@@ -14,7 +14,7 @@ use crate::errors;
 use crate::fit::{Fit, Hypothesis, Problem, Stack, Target, difference};
 use crate::heldout;
 use crate::library::{self, is_term};
-use crate::refit::{TIMING, amends, in_turn, sort, unscreened};
+use crate::refit::{TIMING, amends, in_turn, left, sort, unscreened};
 use crate::screen::{Known, Screened, screen};
 
 /// Thresholds of the search, in units of whitened sums of squares (twice log-likelihoods). Set
@@ -143,12 +143,18 @@ impl<'a> Search<'a> {
 
     /// Fits the baseline: edges, noise and parameters in turn until they agree.
     pub fn baseline(&mut self, hypothesis: &Hypothesis) -> Fit {
-        let first = baseline::starts(hypothesis)
+        let (_, problem, fit) = baseline::starts(hypothesis)
             .into_par_iter()
-            .map(|h| self.problem.fit(&h, &[], 8))
-            .min_by(|a, b| criterion(a).total_cmp(&criterion(b)))
+            .map(|start| {
+                let mut own = self.problem.clone();
+                let first = own.fit(&start, &[], 8);
+                let fit = in_turn(&mut own, first);
+                (left(&own, &fit), own, fit)
+            })
+            .min_by(|a, b| a.0.total_cmp(&b.0))
             .expect("a hypothesis has a start");
-        in_turn(&mut self.problem, first)
+        self.problem = problem;
+        fit
     }
 
     /// Tries further columns as drivers of what the baseline leaves; the most promising one is

@@ -46,7 +46,8 @@ impl Effect for ThrustSensor {
     /// A play operator of half-width `width_n` carries the memory of the loop.
     fn sense(&mut self, _: &Tick, sensed: &mut Sensed) {
         let t = sensed.thrust_n;
-        self.anchor_n = self.anchor_n.clamp(t - self.width_n, t + self.width_n);
+        // Not `clamp`, which panics on the NaN of a simulation that broke down.
+        self.anchor_n = self.anchor_n.max(t - self.width_n).min(t + self.width_n);
         sensed.thrust_n = t * (1.0 + self.gain_error) + self.bias_n + self.loop_n * (self.anchor_n - t) / self.width_n;
     }
 }

@@ -445,10 +445,10 @@ impl Plant {
                     - balance.flux_kg_m * (flow - balance.ambient_m_s) * flow.abs())
                     / balance.added_mass_kg;
                 if self.model == ModelName::RotationalFlow {
-                    // C4: rho a l gr us' = Q/re - dbr rho a |vp| us
-                    rates[SWIRL] = (balance.blade_torque_n_m / c.lever_m
-                        - c.swirl_flux_kg_m * flow.abs() * x[SWIRL])
-                        / c.swirl_mass_kg;
+                    // C4: rho a l gr us' = Q/re - dbr rho a |vp| us, no faster than a tick can follow.
+                    let washed = c.swirl_flux_kg_m * flow.abs();
+                    rates[SWIRL] = (balance.blade_torque_n_m / c.lever_m - washed * x[SWIRL])
+                        / c.swirl_mass_kg.max(washed * self.tick_s);
                 }
             }
         }
