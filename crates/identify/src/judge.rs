@@ -6,7 +6,7 @@ use kort_thruster::effects::Descriptor;
 
 use crate::baseline::{Member, members, recompose};
 use crate::changes;
-use crate::data::{Series, available};
+use crate::data::{Driving, Series, available};
 use crate::errors;
 use crate::fit::{Fit, Problem};
 use crate::library::is_term;
@@ -126,7 +126,8 @@ fn names(
         let believed = named.first().is_some_and(|best| {
             let gain = base - best.criterion;
             let others = best_term.as_ref().map_or(0.0, |t| base - t.criterion);
-            let weighty = gain > rules::SHARE_OF_FIRST * so_far || round.size > rules::CLEAR_SIZE;
+            let clear = round.size > rules::CLEAR_SIZE && commanded(&search.problem);
+            let weighty = gain > rules::SHARE_OF_FIRST * so_far || clear;
             gain > rules::BELIEVE && weighty && gain > rules::LEAST_OF_TERM * others
         });
         let holds = round.holds;
@@ -223,6 +224,12 @@ fn excess(problem: &Problem, fit: &Fit) -> (&'static str, f64) {
         .unwrap_or(("", 0.0))
 }
 
+/// Whether commands drive. Between the rows of a measured driver nobody knows what drove: its steps
+/// leave errors of their own.
+fn commanded(problem: &Problem) -> bool {
+    problem.recordings.iter().all(|r| matches!(r.driving, Driving::Command(_)))
+}
+
 /// Whether the names found leave so much of the error that the physics is not among them. What
 /// changes freely with time is followed by its knots coarsely only, and may leave what it leaves.
 fn leaves_too_much(search: &Search, baseline: &Fit, current: &Fit, places: &[Place]) -> bool {
@@ -236,6 +243,7 @@ fn leaves_too_much(search: &Search, baseline: &Fit, current: &Fit, places: &[Pla
         [_] => rules::MAY_LEAVE,
         _ => rules::SEVERAL_MAY_LEAVE,
     };
+    let may_leave = if commanded(&search.problem) { may_leave } else { rules::DRIVER_LEAVES * may_leave };
     real && sum(&after) > may_leave * sum(&before)
 }
 

@@ -20,8 +20,15 @@ impl Search<'_> {
         let mut all: Vec<Candidate> = chosen
             .par_iter()
             .map(|s| {
+                // Under other equations what was fitted is no place to start from: what is stated is.
+                let from: Vec<f64> = if amends(s.effect, &self.scale) {
+                    let stated = |k: usize| current.hypothesis.free[k].prior.map(|p| p.0);
+                    (0..current.values.len()).map(|k| stated(k).unwrap_or(current.values[k])).collect()
+                } else {
+                    current.values.clone()
+                };
                 let at = |start: &[f64]| {
-                    with_effect(&current.hypothesis, &current.values, s.effect, &self.scale, Some(start))
+                    with_effect(&current.hypothesis, &from, s.effect, &self.scale, Some(start))
                 };
                 // Limits and thresholds do not scale: start where the screen stood, if that is better.
                 // A promise far out may break the simulation: then a part of the way.

@@ -62,6 +62,8 @@ pub mod rules {
     pub const MAY_LEAVE: f64 = 0.10;
     /// ... several names together.
     pub const SEVERAL_MAY_LEAVE: f64 = 0.05;
+    /// How much more names may leave where a measured column drives.
+    pub const DRIVER_LEAVES: f64 = 4.0;
     /// A name must explain at least this share of what the best term explains to be followed.
     pub const LEAST_OF_TERM: f64 = 0.35;
     /// Most effects found in one recording.
