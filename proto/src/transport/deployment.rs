@@ -19,8 +19,8 @@ use thiserror::Error;
 use super::clock::monotonic_ns;
 use super::ports::{Services, create_services};
 
-/// Longest root: iceoryx2 appends up to 130 bytes and panics beyond 255.
-const ROOT_BYTES_MAX: usize = 100;
+/// Longest root: the sockets by which iceoryx2 wakes a process lie under it, and a socket path has 107 bytes.
+const ROOT_BYTES_MAX: usize = 21;
 /// What the services of one thruster and its peers take in `/dev/shm`, with as much again to spare, KiB.
 const NEEDED_KIB: u64 = 8192;
 /// Files they are.
