@@ -101,7 +101,7 @@ pub fn read_recording(path: &Path, map: Option<&ColumnMap>) -> Result<Recording,
     let size = file.metadata().map_or(0, |m| m.len());
     let bar = progress::bytes(size, path.display().to_string());
     let recording = Recording::decode(&path.display().to_string(), bar.wrap_read(file), map);
-    bar.finish_and_clear();
+    drop(bar);
     let recording = recording.map_err(Failure::input)?;
     for note in &recording.notes {
         eprintln!("{}: note: {note}", path.display());

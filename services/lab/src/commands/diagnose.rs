@@ -42,7 +42,7 @@ impl Diagnose {
         let spinner = progress::spinner();
         let told = |text: &str| spinner.set_message(text.to_string());
         let diagnosis = self.input.on_threads(|| diagnose(&loaded.series, &loaded.rig, &options, &told))?;
-        spinner.finish_and_clear();
+        drop(spinner);
         let mut diagnosis = diagnosis.map_err(Failure::input)?;
         diagnosis.report.notes.splice(0..0, loaded.notes);
         if let Some(path) = &self.html {

@@ -54,7 +54,7 @@ impl Fit {
         let spinner = progress::spinner();
         let told = |text: &str| spinner.set_message(text.to_string());
         let report = self.input.on_threads(|| identify(&loaded.series, &loaded.rig, &options, &told))?;
-        spinner.finish_and_clear();
+        drop(spinner);
         let mut report = report.map_err(Failure::input)?;
         report.notes.splice(0..0, loaded.notes);
         if let Some(path) = &self.output {

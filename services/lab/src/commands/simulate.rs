@@ -111,7 +111,7 @@ fn write(run: &mut Run, format: Format, path: &Path, rig: &Rig) -> Result<f64, F
         let _ = std::fs::remove_file(path);
         Failure::unwritten(path, e)
     });
-    bar.finish_and_clear();
+    drop(bar);
     done
 }
 

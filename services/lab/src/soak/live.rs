@@ -71,12 +71,15 @@ pub fn live(
     let service = Service::take(url.trim_end_matches('/'), thruster)?;
     let mut scenarios = Vec::new();
     let mut played_s = 0.0;
+    let all_s: f64 = loaded.iter().map(|l| l.controllers.len() as f64 * l.scenario.duration_s).sum();
+    let bar = crate::progress::bar(all_s as u64, "seconds driven");
     for l in loaded {
         let mut laws = Vec::new();
         for (name, config) in &l.controllers {
-            eprintln!("{}: {name} for {:.0} s", l.scenario.name, l.scenario.duration_s);
+            bar.say(&format!("{}: {name} for {:.0} s", l.scenario.name, l.scenario.duration_s));
             service.switch(config)?;
             let outcome = drive(&service, l, seed, &|share, rms_n, energy_j| {
+                bar.set_position((played_s + share * l.scenario.duration_s) as u64);
                 if let Some(metrics) = watch.metrics {
                     metrics.progress(name, &l.scenario.name, 0, share, rms_n, energy_j);
                 }
@@ -90,6 +93,7 @@ pub fn live(
         }
         scenarios.push(ScenarioResult::new(&l.scenario.name, &l.scenario.what, l.thrust_max_n, laws));
     }
+    drop(bar);
     eprintln!("{played_s:.0} s driven in {:.1} s", started.elapsed().as_secs_f64());
     Ok(Report::new(loaded.iter().map(|l| l.scenario.duration_s).sum(), played_s, scenarios))
 }

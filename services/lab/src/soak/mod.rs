@@ -235,7 +235,7 @@ pub fn soak(loaded: &[Loaded], seed: u64, jobs: usize, watch: &Watch) -> Result<
             })
             .collect()
     });
-    bar.finish_and_clear();
+    drop(bar);
     let mut outcomes = outcomes.into_iter();
     let mut scenarios = Vec::with_capacity(loaded.len());
     for l in loaded {

@@ -9,6 +9,7 @@ mod score;
 mod tally;
 
 use std::path::PathBuf;
+use std::time::Instant;
 
 use clap::Args;
 use kort_truth::{CaseKind, REPORTING_SEED};
@@ -73,10 +74,15 @@ impl Prove {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(Failure::failed)?;
         let plan = self.plan();
         if let Some(folder) = &self.write_cases {
-            pool.install(|| plan.par_iter().try_for_each(|&(kind, seed)| cases::write(folder, kind, seed)))?;
+            let bar = progress::bar(plan.len() as u64, "cases written");
+            let write =
+                |&(kind, seed): &(CaseKind, u64)| cases::write(folder, kind, seed).inspect(|()| bar.inc(1));
+            pool.install(|| plan.par_iter().try_for_each(write))?;
+            drop(bar);
             eprintln!("wrote {} cases under {}", plan.len(), folder.display());
             return Ok(Outcome::Done);
         }
+        let started = Instant::now();
         let bar = progress::bar(plan.len() as u64, "cases diagnosed");
         let mut results: Vec<score::Scored> = Vec::with_capacity(plan.len());
         let scored = |&(kind, seed): &(CaseKind, u64)| {
@@ -85,7 +91,8 @@ impl Prove {
             score::open(&answer, &report)
         };
         pool.install(|| plan.par_iter().map(scored).collect_into_vec(&mut results));
-        bar.finish_and_clear();
+        drop(bar);
+        eprintln!("{} cases diagnosed in {:.0} s", plan.len(), started.elapsed().as_secs_f64());
 
         let proof = tally::Proof::new(self.seed, results);
         if let Some(path) = &self.html {
