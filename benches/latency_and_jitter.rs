@@ -10,17 +10,16 @@
 //! - bare: two processes that exchange 128 bytes at 1 kHz through iceoryx2 (sample and event) and
 //!   through a Unix datagram socket, woken the same way, at the same priority;
 //! - jitter: lateness of the wake-up of the servo against a bare loop on `clock_nanosleep`, idle
-//!   and with a spinning thread for every core but one.
+//!   and with a spinning process for every core but one. Both loops run turn about, second by second.
 
 use std::os::unix::net::UnixDatagram;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use iceoryx2::prelude::*;
 use kort_proto::transport::{Deployment, GatewayPorts, Ticker, monotonic_ns, realtime};
+use rustix::process::Signal;
 
 const PERIOD_NS: u64 = 1_000_000;
 const PRIORITY: i32 = 80;
@@ -28,10 +27,12 @@ type Sample = [u64; 16];
 
 fn main() {
     let arguments: Vec<String> = std::env::args().collect();
-    if let [_, role, folder] = arguments.as_slice()
-        && role.starts_with("echo-")
-    {
-        return echo(role, Path::new(folder));
+    match arguments.as_slice() {
+        [_, role, folder] if role.starts_with("echo-") => return echo(role, Path::new(folder)),
+        [_, role, _] if role == "spin" => loop {
+            std::hint::spin_loop();
+        },
+        _ => {}
     }
     let seconds: u64 = arguments.iter().find_map(|a| a.parse().ok()).unwrap_or(10);
     let folder = std::env::temp_dir().join(format!("kl-{}", std::process::id()));
@@ -53,23 +54,10 @@ fn main() {
     println!("                              {}\n", ratios(&service.1, &socket.1, "answered / round trip"));
 
     for loaded in [false, true] {
-        let stop = Arc::new(AtomicBool::new(false));
         let spinners =
             if loaded { std::thread::available_parallelism().map_or(1, |n| n.get() - 1) } else { 0 };
-        let spinning: Vec<_> = (0..spinners)
-            .map(|_| {
-                let stop = Arc::clone(&stop);
-                std::thread::spawn(move || {
-                    while !stop.load(Ordering::Relaxed) {
-                        std::hint::spin_loop();
-                    }
-                })
-            })
-            .collect();
-        let bare = bare_loop(seconds);
-        let servo = self::servo(&folder, seconds);
-        stop.store(true, Ordering::Relaxed);
-        spinning.into_iter().for_each(|thread| drop(thread.join()));
+        let _spinning: Vec<_> = (0..spinners).map(|_| copy("spin", &folder)).collect();
+        let (bare, servo) = jitter(&folder, seconds);
         let words = if loaded { "loaded" } else { "idle" };
         println!("jitter {words}, bare loop   {}", figures(&bare));
         println!("jitter {words}, servo       {}", figures(&servo));
@@ -121,11 +109,24 @@ fn ratios(a: &Spread, b: &Spread, words: &str) -> String {
 /// A process that ends with this one's handle.
 struct Running(Child);
 
+impl Running {
+    fn signal(&self, signal: Signal) {
+        let process = rustix::process::Pid::from_child(&self.0);
+        rustix::process::kill_process(process, signal).expect("the process takes a signal");
+    }
+}
+
 impl Drop for Running {
     fn drop(&mut self) {
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
+}
+
+/// A copy of this program in another role.
+fn copy(role: &str, folder: &Path) -> Running {
+    let program = std::env::current_exe().expect("this program");
+    Running(Command::new(program).arg(role).arg(folder).spawn().expect("a copy starts"))
 }
 
 fn role(role: &str, folder: &Path) -> Running {
@@ -154,9 +155,7 @@ fn service(folder: &Path, seconds: u64) -> (Spread, Spread) {
     let _controller = role("controller", folder);
     let ports = ports(folder);
     let (mut one_way, mut round_trip, mut last) = (Vec::new(), Vec::new(), 0);
-    let end = Instant::now() + Duration::from_secs(seconds);
-    while Instant::now() < end {
-        std::thread::sleep(Duration::from_millis(20));
+    watch(Duration::from_secs(seconds), || {
         while let Some(state) = ports.state.next() {
             one_way.push(state.timing.lateness_ns);
         }
@@ -166,49 +165,71 @@ fn service(folder: &Path, seconds: u64) -> (Spread, Spread) {
                 round_trip.push(t.command_stamp_ns.saturating_sub(t.command_telemetry_stamp_ns));
             }
         }
-    }
+    });
     (spread(one_way), spread(round_trip))
 }
 
-/// Lateness of every wake-up of the real servo.
-fn servo(folder: &Path, seconds: u64) -> Spread {
-    let _servo = role("servo", folder);
+/// Lateness of every wake-up of the bare loop and of the real servo, turn about: what the machine
+/// does meanwhile (a host's other guests above all) then falls on both alike.
+fn jitter(folder: &Path, seconds: u64) -> (Spread, Spread) {
+    let process = role("servo", folder);
     let ports = ports(folder);
-    let mut late = Vec::new();
-    let end = Instant::now() + Duration::from_secs(seconds);
-    while Instant::now() < end {
-        std::thread::sleep(Duration::from_millis(20));
-        while let Some(t) = ports.telemetry.next() {
-            late.push(t.timing.lateness_ns);
-        }
+    let (mut bare, mut servo) = (Vec::new(), Vec::new());
+    for _ in 0..seconds {
+        process.signal(Signal::STOP);
+        bare.extend(bare_loop());
+        while ports.telemetry.next().is_some() {}
+        process.signal(Signal::CONT);
+        let woken_ns = monotonic_ns();
+        watch(Duration::from_secs(1), || {
+            while let Some(t) = ports.telemetry.next() {
+                // The tick that was slept through is not the servo's lateness.
+                if t.header.stamp_ns > woken_ns + 10 * PERIOD_NS {
+                    servo.push(t.timing.lateness_ns);
+                }
+            }
+        });
     }
-    spread(late)
+    (spread(bare), spread(servo))
 }
 
-/// The same deadlines and the same priority, and nothing to do.
-fn bare_loop(seconds: u64) -> Spread {
-    let thread = std::thread::spawn(move || {
-        realtime(PRIORITY, false);
+/// Looks every 20 ms for as long.
+fn watch(time: Duration, mut look: impl FnMut()) {
+    let end = Instant::now() + time;
+    while Instant::now() < end {
+        std::thread::sleep(Duration::from_millis(20));
+        look();
+    }
+}
+
+/// A second of the servo's deadlines at its priority, with memory locked and a reader as it has,
+/// and nothing to do.
+fn bare_loop() -> Vec<u64> {
+    let thread = std::thread::spawn(|| {
+        realtime(PRIORITY, true);
         let mut ticker = Ticker::new(PERIOD_NS);
-        (0..seconds * 1000)
-            .map(|_| {
-                ticker.wait();
-                ticker.timing.lateness_ns
-            })
-            .collect()
+        let mut late = Vec::with_capacity(1000);
+        while late.len() < late.capacity() {
+            ticker.wait();
+            late.push(ticker.timing.lateness_ns);
+        }
+        late
     });
-    spread(thread.join().expect("the bare loop"))
+    watch(Duration::from_secs(1), || {});
+    thread.join().expect("the bare loop")
 }
 
 /// This process pings, a copy of it echoes with its time of receipt.
+///
+/// The pings have a thread of their own, and the copy starts before that thread is a real-time one:
+/// whatever a real-time thread starts is one too, the load of the jitter included.
 fn ping_pong(role: &str, folder: &Path, seconds: u64) -> (Spread, Spread) {
-    let (wire, other) = open(role, folder, true);
-    let program = std::env::current_exe().expect("this program");
-    let _echo = Running(Command::new(program).arg(role).arg(folder).spawn().expect("the echo starts"));
-    std::thread::sleep(Duration::from_secs(1));
-    let thread = move || {
+    let (role, folder) = (role.to_owned(), folder.to_path_buf());
+    let thread = std::thread::spawn(move || {
+        let (wire, _other) = open(&role, &folder, true);
+        let _echo = copy(&role, &folder);
+        std::thread::sleep(Duration::from_secs(1));
         realtime(PRIORITY, false);
-        let _other = other;
         let (mut one_way, mut round_trip) = (Vec::new(), Vec::new());
         let mut ticker = Ticker::new(PERIOD_NS);
         for i in 0..seconds * 1000 {
@@ -224,8 +245,8 @@ fn ping_pong(role: &str, folder: &Path, seconds: u64) -> (Spread, Spread) {
         }
         wire.send([0; 16]);
         (spread(one_way), spread(round_trip))
-    };
-    thread()
+    });
+    thread.join().expect("the pings")
 }
 
 fn echo(role: &str, folder: &Path) {

@@ -84,3 +84,37 @@ pub fn realtime(priority: i32, lock_memory: bool) -> Vec<String> {
     }
     missing
 }
+
+/// Makes the calling thread an ordinary one, whatever it inherited: a service manager (or `chrt`)
+/// that starts a process as a real-time one makes all its threads so, and one that works at the
+/// priority of a loop keeps the loop waiting.
+pub fn ordinary() {
+    // SAFETY: as above. A thread may always give up its priority.
+    unsafe {
+        let parameter = libc::sched_param { sched_priority: 0 };
+        libc::sched_setscheduler(0, libc::SCHED_OTHER, &parameter);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_thread_that_a_real_time_one_starts_can_be_made_ordinary() {
+        // SAFETY: 0 is the calling thread.
+        let policy = || unsafe { libc::sched_getscheduler(0) };
+        let started = std::thread::spawn(move || {
+            // Where it is not permitted both stay ordinary.
+            let _ = realtime(1, false);
+            assert_eq!(std::thread::spawn(policy).join().expect("a thread"), policy());
+            std::thread::spawn(move || {
+                ordinary();
+                policy()
+            })
+            .join()
+            .expect("a thread")
+        });
+        assert_eq!(started.join().expect("a thread"), libc::SCHED_OTHER);
+    }
+}

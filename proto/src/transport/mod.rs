@@ -5,6 +5,6 @@ mod clock;
 mod deployment;
 mod ports;
 
-pub use clock::{Ticker, monotonic_ns, realtime};
+pub use clock::{Ticker, monotonic_ns, ordinary, realtime};
 pub use deployment::{Deployment, Owner, TransportError};
 pub use ports::{ControllerPorts, GatewayPorts, Inbox, Outbox, ServoPorts, Ticks, Waker, create_services};

@@ -7,7 +7,9 @@ use std::time::Duration;
 use kort_proto::config::{Config, ConfigError};
 use kort_proto::messages::Request;
 use kort_proto::signals::Signals;
-use kort_proto::transport::{Deployment, ServoPorts, Ticker, TransportError, monotonic_ns, realtime};
+use kort_proto::transport::{
+    Deployment, ServoPorts, Ticker, TransportError, monotonic_ns, ordinary, realtime,
+};
 use kort_thruster::rig::Rig;
 use thiserror::Error;
 use tracing::{info, warn};
@@ -136,6 +138,7 @@ fn own(
     let (deployment, stop) = (deployment.clone(), Arc::clone(stop));
     let (tell, told) = std::sync::mpsc::channel();
     let thread = std::thread::Builder::new().name("owner".into()).spawn(move || {
+        ordinary();
         let created = deployment.own().and_then(|mut owner| {
             owner.create(&ids.iter().map(String::as_str).collect::<Vec<_>>())?;
             Ok(owner)
