@@ -136,6 +136,11 @@ fn errors_are_usage_errors_with_a_hint_and_leave_no_file() {
         ("[[segments]]\nkind = \"hold\"\nvalue = nan\nduration_s = 1", "segments[0].value"),
         ("[[segments]]\nkind = \"replay\"\nrecording = \"none.csv\"\ncolumn = \"thrust_cmd_n\"", "none.csv"),
         ("{\"segments\": 3}", "segments"),
+        (&format!("{step}{}", step.replace("0.5", "\"big\"")), "`segments[1].value` = \"big\""),
+        (
+            "{\"segments\": [{\"kind\": \"hold\", \"value\": \"big\", \"duration_s\": 1}]}",
+            "expected a number",
+        ),
     ] {
         std::fs::write(&scenario, text).unwrap();
         let output = simulate(RIG, scenario.to_str().unwrap(), &out, &[]);

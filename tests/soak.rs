@@ -162,6 +162,10 @@ fn mistakes_in_a_scenario_are_named() {
             "[[truth.change]]\nat_s = -1\nfactors = { lift_max = 0.7 }\n".to_owned(),
             ["truth.change.at_s", "0 to 12"],
         ),
+        (
+            "[[reference]]\nkind = \"sine\"\namplitude = \"big\"\nperiod_s = 3\nfor_s = 6\n".to_owned(),
+            ["`reference[1].amplitude` = \"big\"", "expected a number"],
+        ),
         ("[truth]\nfactors = { lift = 0.7 }\n".to_owned(), ["lift", "lift_max"]),
         (
             "[[reference]]\nkind = \"replay\"\nfile = \"none.csv\"\n".to_owned(),

@@ -5,10 +5,12 @@
 
 mod excitation;
 mod measuring;
+mod place;
 mod run;
 
 pub use excitation::{Excitation, NoReplays, Replayed, Replays, Segment};
 pub use measuring::Measuring;
+pub use place::{complaint, from_toml};
 pub use run::{Run, scale};
 
 use std::collections::BTreeMap;
@@ -223,9 +225,8 @@ impl Scenario {
     /// Reads a scenario from TOML.
     ///
     /// # Errors
-    /// [`ScenarioError::Syntax`] with line and key.
+    /// [`ScenarioError::Syntax`] with line or key.
     pub fn from_toml(text: &str) -> Result<Self, ScenarioError> {
-        toml::from_str(text)
-            .map_err(|e| ScenarioError::Syntax { message: e.to_string().trim_end().to_string() })
+        from_toml(text).map_err(|message| ScenarioError::Syntax { message })
     }
 }

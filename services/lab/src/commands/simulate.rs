@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use clap::Args as ClapArgs;
 use kort_recording::{Format, Writer};
 use kort_thruster::rig::Rig;
-use kort_thruster::scenario::{Replayed, Replays, Run, Scenario};
+use kort_thruster::scenario::{self, Replayed, Replays, Run, Scenario};
 use serde::Serialize;
 
 use crate::failure::{Failure, Outcome, print, print_json};
@@ -128,9 +128,10 @@ fn read_scenario(wanted: &Path) -> Result<Scenario, Failure> {
             fail(&"`next_experiment` is null: this report asks for no further run\nhint: choose a scenario yourself")
         })?;
     }
-    serde_path_to_error::deserialize(json).map_err(|e| {
-        let (path, why) = (e.path().to_string(), e.into_inner());
-        fail(&format!("`{path}`: {why}\nhint: docs/recordings.md lists the keys of a scenario"))
+    serde_json::from_value(json.clone()).map_err(|e| {
+        let tree = toml::Value::try_from(json).ok();
+        let said = tree.as_ref().and_then(scenario::complaint::<Scenario>).unwrap_or_else(|| e.to_string());
+        fail(&format!("{said}\nhint: docs/recordings.md lists the keys of a scenario"))
     })
 }
 

@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use kort_thruster::models::ModelName;
 use kort_thruster::parameters::Parameter;
 use kort_thruster::rig::Rig;
+use kort_thruster::scenario;
 use serde::Deserialize;
 use thiserror::Error;
 
@@ -374,9 +375,8 @@ impl Scenario {
         let text = std::fs::read_to_string(path).map_err(|e| {
             error(format!("{e}\nhint: scenarios shipped with kort are config/scenarios/soak-*.toml"))
         })?;
-        let scenario: Self = toml::from_str(&text).map_err(|e| {
-            error(format!("{}\nhint: docs/control.md lists every key", e.to_string().trim_end()))
-        })?;
+        let scenario: Self = scenario::from_toml(&text)
+            .map_err(|said| error(format!("{said}\nhint: docs/control.md lists every key")))?;
         scenario.check().map_err(&error)?;
         let rig_path = path.parent().unwrap_or(Path::new(".")).join(&scenario.rig);
         let rig_error = |message: String| ScenarioError { file: rig_path.display().to_string(), message };
