@@ -60,7 +60,9 @@ fn bytes_depend_on_input_and_seed_alone() {
         let mut args = vec!["diagnose", swirl(), "--rig", STAND, "--json"];
         args.extend(more);
         let output = kort(&args);
-        assert!(output.stderr.is_empty(), "no talk off a terminal: {}", stderr(&output));
+        // Off a terminal no bar; a slow machine may see the plain lines of progress.
+        let said = stderr(&output);
+        assert!(said.lines().all(|line| line.ends_with(" so far")) && !said.contains('\x1b'), "{said}");
         lab::check_diagnosis(&json(&output));
         output.stdout
     };
