@@ -35,7 +35,7 @@ fn main() {
         _ => {}
     }
     let seconds: u64 = arguments.iter().find_map(|a| a.parse().ok()).unwrap_or(10);
-    let folder = std::env::temp_dir().join(format!("kl-{}", std::process::id()));
+    let folder = std::env::temp_dir().join(format!("kort-bench-{}", std::process::id()));
     std::fs::create_dir_all(&folder).expect("a folder");
     println!("{seconds} s each; microseconds p50 / p99 / p99.9 / max\n");
 

@@ -240,7 +240,7 @@ fn what_stands_in_the_way_of_a_start_is_said_once() {
         .arg(&root));
     let words = String::from_utf8_lossy(&up.stderr);
     assert_eq!(up.status.code(), Some(1), "{words}");
-    assert!(words.contains("at most 21 bytes") && !words.contains("panicked"), "{words}");
+    assert!(words.contains("at most 35 bytes") && !words.contains("panicked"), "{words}");
 }
 
 #[test]

@@ -8,8 +8,10 @@ use kort_proto::transport::{ControllerPorts, Deployment, GatewayPorts, ServoPort
 
 #[test]
 fn samples_travel_from_gateway_to_servo_and_back() {
-    let dir = tempfile::tempdir().unwrap();
-    let deployment = Deployment::new(Some(&dir.path().join("root")));
+    // The longest root that is allowed: the sockets' paths under it must have room.
+    let dir = tempfile::Builder::new().prefix("k").rand_bytes(8).tempdir_in("/tmp").unwrap();
+    let root = dir.path().join("r".repeat(35 - 1 - dir.path().as_os_str().len()));
+    let deployment = Deployment::new(Some(&root));
     assert!(matches!(GatewayPorts::open(&deployment, "t1"), Err(TransportError::NoGeneration { .. })));
     let mut owner = deployment.own().unwrap();
     owner.create(&["t1", "t2"]).unwrap();

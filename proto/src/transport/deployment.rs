@@ -20,7 +20,7 @@ use super::clock::monotonic_ns;
 use super::ports::{Services, create_services};
 
 /// Longest root: the sockets by which iceoryx2 wakes a process lie under it, and a socket path has 107 bytes.
-const ROOT_BYTES_MAX: usize = 21;
+const ROOT_BYTES_MAX: usize = 35;
 /// What the services of one thruster and its peers take in `/dev/shm`, with as much again to spare, KiB.
 const NEEDED_KIB: u64 = 8192;
 /// Files they are.
@@ -190,11 +190,12 @@ impl Deployment {
             return Err(path_error());
         }
         let mut config = Config::default();
-        let folder = self.root.join(format!("{generation:x}"));
+        let tag = tag(generation);
+        let folder = self.root.join(&tag);
         let root =
             iceoryx2::prelude::Path::new(folder.as_os_str().as_encoded_bytes()).map_err(|_| path_error())?;
         config.global.set_root_path(&root);
-        let prefix = format!("{}{generation:x}_", self.prefix());
+        let prefix = format!("{}{tag}_", self.prefix());
         config.global.prefix = FileName::new(prefix.as_bytes()).map_err(|_| path_error())?;
         // Clearing up after the dead takes tens of milliseconds: only the owner does it.
         config.global.node.cleanup_dead_nodes_on_creation = false;
@@ -203,13 +204,15 @@ impl Deployment {
         Ok(config)
     }
 
-    /// Prefix of the objects in `/dev/shm`: a hash (FNV-1a) of the root keeps deployments apart.
+    /// Prefix of the objects in `/dev/shm`: a hash (FNV-1a, 32 bits) of the root keeps deployments apart.
     fn prefix(&self) -> String {
-        let hash =
-            self.root.as_os_str().as_encoded_bytes().iter().fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
-                (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3)
-            });
-        format!("kort_{hash:016x}_")
+        let hash = self
+            .root
+            .as_os_str()
+            .as_encoded_bytes()
+            .iter()
+            .fold(0x811c_9dc5_u32, |hash, byte| (hash ^ u32::from(*byte)).wrapping_mul(0x0100_0193));
+        format!("kort_{hash:08x}_")
     }
 
     fn generation_file(&self) -> PathBuf {
@@ -223,6 +226,11 @@ impl Deployment {
         name.push(extension);
         self.root.with_file_name(name)
     }
+}
+
+/// A generation in names of files: milliseconds are enough to tell two apart, and short.
+fn tag(generation_ns: u64) -> String {
+    format!("{:x}", generation_ns / 1_000_000)
 }
 
 /// The process that owns a deployment; the lock is given up when it is dropped or dies.
