@@ -10,6 +10,10 @@ use crate::fit::{Free, Hypothesis, Target};
 /// Relative uncertainty (two sigma) of a coefficient in a rig that states no tolerance at all.
 pub const UNSTATED_TOL: f64 = 0.5;
 
+/// A coefficient may move by this many stated tolerances (two sigma each). Beyond that it would not be
+/// the coefficient that was stated: what is left then shows as a mismatch instead of hiding in it.
+const REACH: f64 = 2.0;
+
 /// Parameters that shape a model's response.
 fn used(model: ModelName, dry: bool, shaft_prescribed: bool) -> Vec<P> {
     let shaft = [
@@ -96,7 +100,7 @@ pub fn hypothesis(model: ModelName, rig: &Rig, shaft_prescribed: bool, needs_cur
         if quantity.value == 0.0 || (parameter == P::TimeConstantS && !needs_current) {
             continue;
         }
-        let reach = (3.0 * tol).max(0.05) * quantity.value.abs();
+        let reach = REACH * tol * quantity.value.abs();
         let low = quantity.value - reach;
         free.push(Free {
             target: Target::Base(parameter),

@@ -37,7 +37,8 @@ pub fn check(series: &Series, rig: &Rig) -> Checked {
     unsigned_speed(series, &mut out);
     rest_bias(series, &mut out);
     gaps(series, &mut out);
-    out.notes.extend(supply_sag(series).map(|sag| format!("{}: {sag}", series.name)));
+    out.notes
+        .extend(supply_sag(series).and_then(|sag| sag.words()).map(|sag| format!("{}: {sag}", series.name)));
     out
 }
 
@@ -170,22 +171,67 @@ fn rest_bias(series: &Series, out: &mut Checked) {
     }
 }
 
-/// A recorded supply that falls as the commands rise. Power goes with the cube of a duty or a
-/// speed; every thruster whose command is recorded loads the same supply.
-pub fn supply_sag(series: &Series) -> Option<String> {
+/// A recorded supply that falls with the load.
+pub struct Sag {
+    /// At no load, V.
+    rest_v: f64,
+    /// At the largest load, V.
+    full_v: f64,
+    /// Of supply and load.
+    correlation: f64,
+    /// What stands for the load, in words.
+    load: String,
+}
+
+impl Sag {
+    /// Share of the supply that is lost at the largest load; zero where supply and load have little to
+    /// do with each other.
+    pub fn share(&self) -> f64 {
+        if self.correlation < -0.4 { (1.0 - self.full_v / self.rest_v).max(0.0) } else { 0.0 }
+    }
+
+    /// In words, if it is large enough to speak of.
+    pub fn words(&self) -> Option<String> {
+        (self.share() > 0.01).then(|| {
+            format!(
+                "supply_v sags as {}: about {:.2} V at rest, {:.2} V at the largest load (correlation {:.2}); a constant supply would be wrong here",
+                self.load, self.rest_v, self.full_v, self.correlation
+            )
+        })
+    }
+}
+
+/// How the recorded supply follows the load: power where current and shaft speed are recorded, else the
+/// cube of a duty or a speed; every thruster whose command is recorded loads the same supply.
+pub fn supply_sag(series: &Series) -> Option<Sag> {
     let supply = series.column("supply_v")?;
-    let commands: Vec<&[f64]> = series
-        .columns
-        .iter()
-        .filter(|c| ["duty_cmd", "speed_cmd_rad_s", "voltage_cmd_v"].iter().any(|n| c.0.starts_with(n)))
-        .filter_map(|c| series.column(&c.0))
-        .collect();
-    let rows: Vec<(f64, f64)> = (0..supply.len())
-        .filter(|k| supply[*k].is_finite() && commands.iter().all(|c| c[*k].is_finite()))
-        .map(|k| (commands.iter().map(|c| c[k].abs().powi(3)).sum(), supply[k]))
-        .collect();
+    let current = series.column("current_a").or_else(|| series.column("current_cmd_a"));
+    let (load, rows): (String, Vec<(f64, f64)>) = match (current, series.column("shaft_speed_rad_s")) {
+        (Some(current), Some(speed)) => {
+            let power = (0..supply.len()).map(|k| (current[k] * speed[k]).max(0.0));
+            ("current times shaft speed rises".into(), power.zip(supply.iter().copied()).collect())
+        }
+        _ => {
+            let commands: Vec<&[f64]> = series
+                .columns
+                .iter()
+                .filter(|c| {
+                    ["duty_cmd", "speed_cmd_rad_s", "voltage_cmd_v"].iter().any(|n| c.0.starts_with(n))
+                })
+                .filter_map(|c| series.column(&c.0))
+                .collect();
+            let cubes = (0..supply.len()).map(|k| commands.iter().map(|c| c[k].abs().powi(3)).sum());
+            let words = match commands.len() {
+                0 => return None,
+                1 => "the cube of the command rises".into(),
+                n => format!("the cubes of the {n} commands together rise"),
+            };
+            (words, cubes.zip(supply.iter().copied()).collect())
+        }
+    };
+    let rows: Vec<(f64, f64)> = rows.into_iter().filter(|r| r.0.is_finite() && r.1.is_finite()).collect();
     let n = rows.len() as f64;
-    if commands.is_empty() || rows.len() < 50 {
+    if rows.len() < 50 {
         return None;
     }
     let (mx, my) = (rows.iter().map(|r| r.0).sum::<f64>() / n, rows.iter().map(|r| r.1).sum::<f64>() / n);
@@ -195,14 +241,13 @@ pub fn supply_sag(series: &Series) -> Option<String> {
         xy += (x - mx) * (y - my);
         yy += (y - my).powi(2);
     }
-    let correlation = xy / (xx * yy).sqrt().max(1e-300);
+    let slope = xy / xx.max(1e-300);
     let top = rows.iter().map(|r| r.0).fold(0.0, f64::max);
-    let (rest, full) = (my - xy / xx.max(1e-300) * mx, my + xy / xx.max(1e-300) * (top - mx));
-    (correlation < -0.4 && rest - full > 0.01 * rest).then(|| {
-        let of = if commands.len() > 1 { format!("the {} commands together rise", commands.len()) } else { "the command rises".into() };
-        format!(
-            "supply_v sags as {of}: about {rest:.2} V at rest, {full:.2} V at the largest load (correlation {correlation:.2} with the commands cubed); a constant supply would be wrong here"
-        )
+    Some(Sag {
+        rest_v: my - slope * mx,
+        full_v: my + slope * (top - mx),
+        correlation: xy / (xx * yy).sqrt().max(1e-300),
+        load,
     })
 }
 

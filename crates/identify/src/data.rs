@@ -455,7 +455,7 @@ fn instead(series: &Series, driving: &str) -> String {
     let others: Vec<&str> =
         series.columns.iter().map(|c| c.0.as_str()).filter(|n| *n != driving && *n != "time_s").collect();
     let mut found = if others.is_empty() { "nothing else is in it".into() } else { others.join(", ") };
-    if let Some(sag) = crate::checks::supply_sag(series) {
+    if let Some(sag) = crate::checks::supply_sag(series).and_then(|sag| sag.words()) {
         found.push_str(&format!("\nnote: {sag}"));
     }
     found
@@ -682,6 +682,11 @@ pub fn available(model: ModelName, series: &[Series], all: &[Prepared]) -> Avail
         shaft_prescribed: all.iter().all(|p| p.driving == Driving::Speed),
         current_prescribed: all.iter().all(|p| p.driving == Driving::Current),
         axial_flow_modelled: !matches!(model, ModelName::Model0 | ModelName::Model1),
+        supply_sag_share: series
+            .iter()
+            .map(|s| crate::checks::supply_sag(s).map(|sag| sag.share()))
+            .collect::<Option<Vec<f64>>>()
+            .map(|shares| shares.into_iter().fold(0.0, f64::max)),
     }
 }
 

@@ -250,7 +250,8 @@ impl<'a> Search<'a> {
         while let Some(leader) = candidates.first_mut() {
             let gain = criterion(&before) - leader.criterion;
             let (without, with) = heldout::left_out(&self.problem, &mut before, &mut leader.fit, &self.scale);
-            let left_out = heldout::paired(&without, &with).0;
+            // What is stated is no data that could be left out: leaving it costs either fit what it costs.
+            let left_out = heldout::paired(&without, &with).0 + before.penalty - leader.fit.penalty;
             let size = self.size(&before, &leader.fit);
             holds = if self.free_in_time(leader.effect) {
                 size > rules::LEAST_SIZE_KNOTS

@@ -129,39 +129,85 @@ impl<'a> Experiment<'a> {
     /// The share of [`Self::share`] that a re-fit of the seven base parameters leaves (linearised,
     /// channels weighed by their noise, none moved beyond its stated tolerance).
     pub fn visible(&self, hidden: &Hidden, tolerances: &[f64; 7]) -> f64 {
-        let change = self.change(hidden);
-        let weigh = |list: &[(&'static str, Vec<f64>, f64)]| -> Vec<f64> {
-            list.iter().flat_map(|(_, values, noise)| values.iter().map(move |value| value / noise)).collect()
-        };
-        let full: Vec<f64> =
-            responses(&self.clean, self.channels).iter().map(|(_, values, _)| largest(values)).collect();
-        let step = 1e-3;
-        let columns: Vec<Vec<f64>> = (0..7)
-            .map(|index| {
-                let moved = varied(self.thruster, index, 1.0 + step);
-                let moved =
-                    responses(&smooth(&moved, &Hidden::default(), self.scale, self.command_a), self.channels);
-                let clean = responses(&self.clean, self.channels);
-                let slopes: Vec<_> = moved
-                    .into_iter()
-                    .zip(clean)
-                    .zip(&full)
-                    .map(|(((name, m, noise), (_, c, _)), full)| {
-                        (
-                            name,
-                            m.iter().zip(&c).map(|(m, c)| (m - c) / step / full).collect::<Vec<f64>>(),
-                            noise,
-                        )
-                    })
-                    .collect();
-                weigh(&slopes)
-            })
-            .collect();
-        let target = weigh(&change);
-        let energy = |values: &[f64]| values.iter().map(|value| value * value).sum::<f64>();
-        let rest = refit::residual_within(&columns, &target, tolerances);
+        let target = self.weighed(hidden);
+        let rest = refit::residual_within(&self.base_columns(), &target, tolerances);
         self.share(hidden).0 * (energy(&rest) / energy(&target).max(1e-30)).sqrt()
     }
+
+    /// What tells `hidden` from a rival: the sum of squares, in the noise of the channels, that the
+    /// best strength of the rival leaves together with a re-fit of the base parameters, and what that
+    /// re-fit costs against the stated tolerances (two sigma). `rival` makes one of a given strength;
+    /// the search begins at `strength`.
+    #[cfg(test)]
+    pub fn apart(
+        &self,
+        hidden: &Hidden,
+        rival: impl Fn(f64) -> Hidden,
+        strength: f64,
+        tolerances: &[f64; 7],
+    ) -> f64 {
+        let wanted = responses(&smooth(self.thruster, hidden, self.scale, self.command_a), self.channels);
+        let full: Vec<f64> = responses(&self.clean, self.channels).iter().map(|c| largest(&c.1)).collect();
+        let mut residual = |values: &[f64]| -> Vec<f64> {
+            let thruster = (0..7).fold(self.thruster.clone(), |thruster, k| varied(&thruster, k, values[k]));
+            let rows = smooth(&thruster, &rival(values[7]), self.scale, self.command_a);
+            let channels = responses(&rows, self.channels).into_iter().zip(&wanted).zip(&full);
+            let data = channels.flat_map(|(((_, a, noise), (_, b, _)), full)| {
+                a.into_iter().zip(b).map(move |(a, b)| (a - b) / (noise * full)).collect::<Vec<f64>>()
+            });
+            data.chain(values.iter().zip(tolerances).map(|(v, tol)| 2.0 * (v - 1.0) / tol)).collect()
+        };
+        let mut values = vec![1.0; 8];
+        values[7] = strength;
+        let mut cost = energy(&residual(&values));
+        for _ in 0..10 {
+            let mut next = refit::gauss_newton_step(values.clone(), &mut residual, &[0.0; 8]);
+            let mut there = energy(&residual(&next));
+            // A step too far is halved.
+            for _ in 0..8 {
+                if there < cost {
+                    break;
+                }
+                next.iter_mut().zip(&values).for_each(|(n, v)| *n = 0.5 * (*n + v));
+                there = energy(&residual(&next));
+            }
+            if there > 0.999 * cost {
+                break;
+            }
+            (values, cost) = (next, there);
+        }
+        cost
+    }
+
+    /// The change that `hidden` makes on all channels, in their noise.
+    fn weighed(&self, hidden: &Hidden) -> Vec<f64> {
+        let change = self.change(hidden);
+        change.iter().flat_map(|(_, values, noise)| values.iter().map(move |value| value / noise)).collect()
+    }
+
+    /// What a relative change of each base parameter does, on all channels, in their noise.
+    fn base_columns(&self) -> Vec<Vec<f64>> {
+        let step = 1e-3;
+        let clean = responses(&self.clean, self.channels);
+        (0..7)
+            .map(|index| {
+                let moved = varied(self.thruster, index, 1.0 + step);
+                let moved = smooth(&moved, &Hidden::default(), self.scale, self.command_a);
+                responses(&moved, self.channels)
+                    .into_iter()
+                    .zip(&clean)
+                    .flat_map(|((_, m, noise), (_, c, _))| {
+                        let unit = step * largest(c) * noise;
+                        m.into_iter().zip(c).map(move |(m, c)| (m - c) / unit).collect::<Vec<f64>>()
+                    })
+                    .collect()
+            })
+            .collect()
+    }
+}
+
+fn energy(values: &[f64]) -> f64 {
+    values.iter().map(|value| value * value).sum()
 }
 
 /// A thruster with one of its seven base parameters scaled.

@@ -13,7 +13,7 @@ pub enum Programme {
     Staircase,
     /// Holds at one sign, never back to rest.
     OneSided,
-    /// Slow triangles and sines only, both signs.
+    /// Slow sines only, both signs: nowhere a corner that would show a lag from a delay.
     SlowRamps,
 }
 
@@ -38,7 +38,7 @@ pub fn commands(programme: Programme, limit_a: f64, rng: &mut impl Rng) -> Vec<f
         }
         Programme::SlowRamps => {
             for share in [0.9, 0.5, 0.8] {
-                triangle(&mut out, share * limit_a, rng.random_range(14.0..20.0));
+                sine(&mut out, share * limit_a, rng.random_range(14.0..20.0));
             }
         }
     }
@@ -87,6 +87,14 @@ fn triangle(out: &mut Vec<f64>, top: f64, period_s: f64) {
             4.0 * phase - 4.0
         };
         (top * wave * 1e5).round() / 1e5
+    }));
+}
+
+fn sine(out: &mut Vec<f64>, top: f64, period_s: f64) {
+    let count = ticks(period_s);
+    out.extend((0..count).map(|tick| {
+        let phase = std::f64::consts::TAU * tick as f64 / count as f64;
+        (top * phase.sin() * 1e5).round() / 1e5
     }));
 }
 

@@ -181,6 +181,8 @@ pub struct Available {
     pub current_prescribed: bool,
     /// The baseline model has the axial flow as a state.
     pub axial_flow_modelled: bool,
+    /// Share of the supply lost at the largest load, where every recording holds the supply.
+    pub supply_sag_share: Option<f64>,
 }
 
 impl Available {

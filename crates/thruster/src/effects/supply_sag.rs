@@ -2,8 +2,9 @@
 
 use super::memory::FirstOrder;
 use super::voltage_limit_backemf::{self, emf_share};
-use super::{Descriptor, Effect, Hooks, Path, Scale, Spec};
+use super::{Available, Descriptor, Effect, Hooks, Path, Scale, Spec};
 use crate::plant::{Drive, Tick};
+use crate::rig::Rig;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -19,7 +20,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     reference: "Ohm's law with the power balance of the drive; kort's form",
     parameters,
     starts,
-    needs: voltage_limit_backemf::needs,
+    needs,
     build: |values, context| {
         Box::new(SupplySag {
             source_ohm: values[0],
@@ -55,6 +56,23 @@ fn starts(scale: &Scale) -> Vec<Vec<f64>> {
     let stated = [0.03, 0.08, 0.14, 0.2, 0.28, 0.4].iter().map(|share| vec![share * full, 0.01, 1.0]);
     let lower = [1.1, 1.2, 1.3, 1.45].iter().map(|k| vec![0.05 * full, 0.01, (k * emf_share(scale)).clamp(0.4, 1.0)]);
     stated.chain(lower).collect()
+}
+
+/// A recorded supply that loses less than this share at the largest load is no sagging one.
+const LEAST_SHARE: f64 = 0.02;
+
+fn needs(rig: &Rig, available: &Available) -> Result<(), &'static str> {
+    voltage_limit_backemf::supply_known(rig, available)?;
+    if available.supply_sag_share.is_some_and(|share| share < LEAST_SHARE) {
+        Err("the recorded supply hardly falls under load")
+    } else {
+        Ok(())
+    }
+}
+
+/// Whether the recorded supply falls so far that it brings the voltage limit with it.
+pub(super) fn recorded(available: &Available) -> bool {
+    available.supply_sag_share.is_some_and(|share| share > 2.0 * LEAST_SHARE)
 }
 
 struct SupplySag {

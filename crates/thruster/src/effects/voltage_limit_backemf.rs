@@ -41,7 +41,17 @@ fn starts(scale: &Scale) -> Vec<Vec<f64>> {
     [0.88, 0.94, 1.0, 1.03, 1.06, 1.09, 1.12, 1.15, 1.18, 1.22, 1.26, 1.3, 1.35, 1.4, 1.5, 1.7].iter().map(|k| vec![(1.0 - k * emf_share(scale)).clamp(-0.2, 0.9), 1.0]).collect()
 }
 
-pub(super) fn needs(rig: &Rig, available: &Available) -> Result<(), &'static str> {
+fn needs(rig: &Rig, available: &Available) -> Result<(), &'static str> {
+    supply_known(rig, available)?;
+    if super::supply_sag::recorded(available) {
+        Err("the recorded supply falls under load and brings the limit with it: supply_sag stands for both")
+    } else {
+        Ok(())
+    }
+}
+
+/// Needs a command, and a supply and a winding to set against each other.
+pub(super) fn supply_known(rig: &Rig, available: &Available) -> Result<(), &'static str> {
     commanded(rig, available)?;
     if rig.amplifier.supply_v.is_none() {
         Err("the rig states no supply voltage")
