@@ -5,14 +5,14 @@ use kort_thruster::models::ModelName;
 use kort_thruster::parameters::{Parameter as P, Parameters};
 use kort_thruster::rig::{Quantity, Rig};
 
-use crate::fit::{Free, Hypothesis, Target};
+use crate::fit::{Columns, Free, Hypothesis, Target};
 
 /// Relative uncertainty (two sigma) of a coefficient in a rig that states no tolerance at all.
 pub const UNSTATED_TOL: f64 = 0.5;
 
-/// A coefficient may move by this many stated tolerances (two sigma each). Beyond that it would not be
+/// A coefficient may move by this many stated tolerances (two sigma each). Beyond them it would not be
 /// the coefficient that was stated: what is left then shows as a mismatch instead of hiding in it.
-const REACH: f64 = 2.0;
+const REACH: f64 = 1.5;
 
 /// Parameters that shape a model's response.
 fn used(model: ModelName, dry: bool, shaft_prescribed: bool) -> Vec<P> {
@@ -183,11 +183,7 @@ pub fn members(problem: &crate::fit::Problem, fit: &crate::fit::Fit) -> Vec<Memb
 
 /// The same baseline, at a fit's values, with other members; derivative columns that carry over
 /// come with it.
-pub fn recompose(
-    fit: &crate::fit::Fit,
-    members: &[Member],
-    scale: &Scale,
-) -> (Hypothesis, Vec<Option<std::sync::Arc<crate::fit::Stack>>>) {
+pub fn recompose(fit: &crate::fit::Fit, members: &[Member], scale: &Scale) -> (Hypothesis, Columns) {
     let base: Vec<usize> =
         (0..fit.values.len()).filter(|k| matches!(fit.hypothesis.free[*k].target, Target::Base(_))).collect();
     let values: Vec<f64> = base.iter().map(|k| fit.values[*k]).collect();

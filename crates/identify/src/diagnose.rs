@@ -249,8 +249,10 @@ fn write(
 
     let all = members(&search.problem, &last_train);
     let total_gain: f64 = outcome.places.iter().map(|p| p.gain).sum();
+    let top_gain = outcome.places.iter().map(|p| p.gain).fold(0.0, f64::max);
     let single = outcome.places.len() == 1;
     let mut findings = Vec::new();
+    let mut weak: Vec<&str> = Vec::new();
     let mut mismatch = Vec::new();
     let mut alternatives = Vec::new();
     let mut empirical_term = None;
@@ -259,6 +261,14 @@ fn write(
         let without =
             if rest.is_empty() { residual_baseline.clone() } else { plain(&with(&rest), &search.problem) };
         let held_here = score(&without, &residual_last);
+        if place.gain < top_gain && held_here.excess_error_removed < LEAST_OF_A_FINDING {
+            // Beside a larger find, a name that hardly removes anything on new data is none.
+            weak.push(place.chosen.id);
+            if !is_term(place.chosen) {
+                alternatives.push(words::weak(place.chosen.id, &held_here));
+            }
+            continue;
+        }
         // A rival must pass the held-out test too.
         let mut rival_fits = Vec::new();
         for ((rival, values), distance) in std::mem::take(&mut place.rivals) {
@@ -300,24 +310,16 @@ fn write(
             continue;
         }
         let same: Vec<String> = place.rivals.iter().map(|r| r.0.0.id.to_string()).collect();
-        findings.push(finding(
-            search,
-            &outcome.last,
-            &std_last,
-            place,
-            i,
-            held_here,
-            odds[0],
-            same.clone(),
-            &located,
-        ));
+        let first = finding(&outcome.last, &std_last, place, i, held_here, odds[0], same.clone(), &located);
+        findings.push((place.gain, first));
         for (k, (((rival, _), distance), (fit, held_rival))) in
             place.rivals.iter().zip(rival_fits).enumerate()
         {
             let others: Vec<String> = std::iter::once(place.chosen.id.to_string())
                 .chain(same.iter().filter(|s| *s != rival.id).cloned())
                 .collect();
-            findings.push(rival_finding(search, fit, rival, *distance, held_rival, odds[k + 1], others));
+            let other = rival_finding(search, fit, rival, *distance, held_rival, odds[k + 1], others);
+            findings.push((place.gain, other));
         }
         for (effect, distance) in place.aside.iter().filter(|a| !is_term(a.0)) {
             alternatives.push(Alternative {
@@ -327,6 +329,7 @@ fn write(
             });
         }
     }
+    outcome.places.retain(|p| !weak.contains(&p.chosen.id));
     if let Some((effect, gain, why)) = outcome.doubt
         && !is_term(effect)
     {
@@ -348,14 +351,16 @@ fn write(
             100.0 * everything
         ));
     }
-    findings.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    // Best first: what explains most, and of its rivals the likeliest.
+    findings.sort_by(|a, b| b.0.total_cmp(&a.0).then(b.1.probability.total_cmp(&a.1.probability)));
+    let mut findings: Vec<Finding> = findings.into_iter().map(|f| f.1).collect();
     let verdict = verdict(&outcome, &findings, thin.is_some());
     if outcome.excess.is_some() && verdict == Verdict::Unexplained {
         // Much is left: a name that hardly removes anything of it is no finding.
         let (kept, weak): (Vec<Finding>, Vec<Finding>) =
             findings.into_iter().partition(|f| f.heldout.excess_error_removed > LEAST_OF_A_FINDING);
         findings = kept;
-        alternatives.extend(weak.into_iter().map(words::weak));
+        alternatives.extend(weak.iter().map(|f| words::weak(&f.effect, &f.heldout)));
     }
     if let (Some(why), Verdict::InsufficientData) = (&thin, verdict) {
         notes.insert(0, why.clone());
@@ -364,6 +369,7 @@ fn write(
         let gain = outcome.places.first().map_or(0.0, |p| p.gain);
         notes.push(words::elsewhere(other, distance, gain));
     }
+    notes.extend(words::strained(&outcome.baseline));
     notes.extend(words::unused(series, &search.problem, search.driver.as_deref()));
     let baseline = Baseline {
         model: options.model.name().into(),
@@ -476,7 +482,6 @@ pub fn parameters(fit: &Fit, std: &[f64], effect: Option<usize>) -> Vec<Paramete
 
 #[expect(clippy::too_many_arguments, reason = "one call, every argument a part of the finding")]
 fn finding(
-    search: &Search,
     last: &Fit,
     std: &[f64],
     place: &judge::Place,
@@ -486,7 +491,6 @@ fn finding(
     confounded_with: Vec<String>,
     located: &crate::locate::Place,
 ) -> Finding {
-    let _ = search;
     Finding {
         effect: place.chosen.id.into(),
         path: place.chosen.path.name().into(),

@@ -84,6 +84,9 @@ pub struct Problem<'a> {
 /// Residuals and responses of all channels: `[recording][channel][sample]`.
 pub type Stack = Vec<Vec<Vec<f64>>>;
 
+/// Derivative columns of a fit, one a free parameter, as far as they are known.
+pub type Columns = Vec<Option<Arc<Stack>>>;
+
 /// A fitted hypothesis.
 #[derive(Clone)]
 pub struct Fit {
@@ -98,7 +101,7 @@ pub struct Fit {
     /// Whitened residual, all channels joined.
     pub residual: DVector<f64>,
     /// Derivative of the response by free parameter, where it is known; perhaps from nearby.
-    pub columns: Vec<Option<Arc<Stack>>>,
+    pub columns: Columns,
     /// Parameters held at a bound.
     pub at_bound: Vec<bool>,
 }
@@ -470,7 +473,8 @@ fn near_bound(free: &Free, value: f64) -> bool {
     value <= free.low + slack || value >= free.high - slack
 }
 
-/// The damped step in scaled parameters; a parameter at its bound that wants out is frozen.
+/// The damped step in scaled parameters. A parameter that it would take out of its bounds goes to the
+/// bound, and the others are solved for again: cut off alone, the step would no longer be a good one.
 fn damped_step(
     normal: &DMatrix<f64>,
     gradient: &DVector<f64>,
@@ -479,26 +483,35 @@ fn damped_step(
     values: &[f64],
 ) -> DVector<f64> {
     let n = free.len();
-    let frozen: Vec<bool> = (0..n)
-        .map(|k| {
-            values[k] <= free[k].low && gradient[k] < 0.0 || values[k] >= free[k].high && gradient[k] > 0.0
-        })
-        .collect();
-    let mut a = normal.clone();
-    let mut b = gradient.clone();
-    for k in 0..n {
-        a[(k, k)] += damping * a[(k, k)] + 1e-12;
-        if frozen[k] {
+    let mut held: Vec<Option<f64>> = vec![None; n];
+    loop {
+        let mut a = normal.clone();
+        let mut b = gradient.clone();
+        for k in 0..n {
+            a[(k, k)] += damping * a[(k, k)] + 1e-12;
+        }
+        for k in 0..n {
+            let Some(at) = held[k] else { continue };
             for j in 0..n {
-                a[(k, j)] = 0.0;
+                b[j] -= a[(j, k)] * at;
                 a[(j, k)] = 0.0;
+                a[(k, j)] = 0.0;
             }
             a[(k, k)] = 1.0;
-            b[k] = 0.0;
+            b[k] = at;
         }
-    }
-    match a.cholesky() {
-        Some(c) => c.solve(&b),
-        None => DVector::zeros(n),
+        let Some(cholesky) = a.cholesky() else { return DVector::zeros(n) };
+        let step = cholesky.solve(&b);
+        let room =
+            |k: usize| ((free[k].low - values[k]) / free[k].size, (free[k].high - values[k]) / free[k].size);
+        let beyond = |k: usize| {
+            let (low, high) = room(k);
+            (low - step[k]).max(step[k] - high) / (high - low).max(1e-300)
+        };
+        let worst = (0..n).filter(|k| held[*k].is_none()).max_by(|i, j| beyond(*i).total_cmp(&beyond(*j)));
+        match worst.filter(|k| beyond(*k) > 1e-12) {
+            Some(k) => held[k] = Some(step[k].clamp(room(k).0.min(0.0), room(k).1.max(0.0))),
+            None => return step,
+        }
     }
 }

@@ -3,13 +3,15 @@
 use std::collections::BTreeMap;
 
 use kort_thruster::effects::Descriptor;
+use rayon::prelude::*;
 
 use crate::baseline::{Member, members, recompose};
 use crate::changes;
 use crate::data::{Driving, Series, available};
 use crate::errors;
-use crate::fit::{Fit, Problem};
+use crate::fit::{Columns, Fit, Hypothesis, Problem};
 use crate::library::is_term;
+use crate::refit::{TIMING, amends, cost, unscreened};
 use crate::search::{Candidate, Search, criterion, rules};
 
 /// One place in the explanation: an effect, and those that would do as well.
@@ -238,8 +240,11 @@ fn leaves_too_much(search: &Search, baseline: &Fit, current: &Fit, places: &[Pla
     let after = excesses(&search.problem, current, &floor);
     let sum = |list: &[(&'static str, f64)]| list.iter().map(|e| e.1).sum::<f64>();
     let real = after.iter().any(|e| e.1.sqrt() > rules::REAL_EXCESS);
+    let lead = places.iter().max_by(|a, b| a.gain.total_cmp(&b.gain));
+    if lead.is_some_and(|p| search.free_in_time(p.chosen)) {
+        return false;
+    }
     let may_leave = match places {
-        [only] if search.free_in_time(only.chosen) => return false,
         [_] => rules::MAY_LEAVE,
         _ => rules::SEVERAL_MAY_LEAVE,
     };
@@ -374,54 +379,84 @@ fn prune(search: &Search, current: &mut Fit, rounds: &mut Vec<Vec<Candidate>>, g
     }
 }
 
+/// What may stand in a place instead of its leader: what competed in its round, with the fit it had,
+/// and whatever the catalogue says the two are confused with, from the best of its starts.
+fn contenders(
+    search: &Search,
+    current: &Fit,
+    place: usize,
+    candidates: &[Candidate],
+) -> Vec<(Member, Option<Fit>)> {
+    let all = members(&search.problem, current);
+    let leader = all[place].0;
+    let free = |id: &str| all.iter().all(|m| m.0.id != id);
+    let own = |c: &Candidate| members(&search.problem, &c.fit).into_iter().find(|m| m.0.id == c.effect.id);
+    let mut list: Vec<(Member, Option<Fit>)> = candidates
+        .iter()
+        .filter(|c| free(c.effect.id))
+        .take(6)
+        .filter_map(|c| Some((own(c)?, (all.len() == 1).then(|| c.fit.clone()))))
+        .collect();
+    for mate in &search.named {
+        let mates = mate.confused_with.contains(&leader.id) || leader.confused_with.contains(&mate.id);
+        if mates && free(mate.id) && list.iter().all(|c| c.0.0.id != mate.id) {
+            let starts = unscreened(mate, &search.scale).into_iter().map(|s| (*mate, s.start));
+            let cost_of =
+                |member: &Member| cost(&search.problem, &in_place(search, current, place, member.clone()).0);
+            let best = starts.map(|m| (cost_of(&m), m)).min_by(|a, b| a.0.total_cmp(&b.0));
+            list.extend(best.filter(|_| !amends(mate, &search.scale)).map(|b| (b.1, None)));
+        }
+    }
+    list
+}
+
+/// The present explanation with another member in one place.
+fn in_place(search: &Search, current: &Fit, place: usize, member: Member) -> (Hypothesis, Columns) {
+    let mut swapped = members(&search.problem, current);
+    swapped[place] = member;
+    recompose(current, &swapped, &search.scale)
+}
+
 /// For every place: do others do as well, now that everything else is known? A better one takes
 /// the place.
 fn settle(search: &Search, current: &mut Fit, rounds: &[Vec<Candidate>]) -> Vec<Place> {
     let mut places: Vec<Place> = Vec::new();
     for (i, candidates) in rounds.iter().enumerate() {
-        let all = members(&search.problem, current);
-        let mut now = criterion(current);
-        let mut tried: Vec<(Member, f64)> = Vec::new();
-        let alone = rounds.len() == 1;
-        let leader = all[i].0;
-        for candidate in candidates.iter().filter(|c| c.effect.id != leader.id).take(6) {
-            if all.iter().any(|m| m.0.id == candidate.effect.id) {
-                continue;
-            }
-            let own = members(&search.problem, &candidate.fit);
-            let Some(member) = own.into_iter().find(|m| m.0.id == candidate.effect.id) else { continue };
-            let fit = if alone {
-                candidate.fit.clone()
-            } else {
-                let mut swapped = all.clone();
-                swapped[i] = member.clone();
-                let (hypothesis, columns) = recompose(current, &swapped, &search.scale);
-                search.problem.fit(&hypothesis, &columns, 6)
-            };
-            let distance = criterion(&fit) - now;
-            if distance < -5.0 && !is_term(candidate.effect) && !alone {
-                // The rival takes the place; distances count from it.
-                let old = members(&search.problem, current)[i].clone();
-                tried.iter_mut().for_each(|t| t.1 -= distance);
-                tried.push((old, -distance));
-                *current = fit;
-                now = criterion(current);
-            } else {
-                let refit =
-                    members(&search.problem, &fit).into_iter().find(|m| m.0.id == candidate.effect.id);
-                tried.push((refit.unwrap_or(member), distance));
-            }
+        // Each is fitted from where the leader stands: rivals that cannot be told apart lie beside it, in
+        // a valley that is long where the rig states little.
+        let mut tried: Vec<(Member, Fit)> = contenders(search, current, i, candidates)
+            .into_par_iter()
+            .map(|(member, own)| {
+                let (hypothesis, columns) = in_place(search, current, i, member.clone());
+                let mut fit = search.problem.fit(&hypothesis, &columns, 10);
+                if TIMING.contains(&member.0.id) && rounds.len() == 1 {
+                    fit = search.with_own_edges(&fit, &[1.0]);
+                }
+                let best = own.filter(|own| criterion(own) < criterion(&fit)).unwrap_or(fit);
+                let found = members(&search.problem, &best).into_iter().find(|m| m.0.id == member.0.id);
+                (found.unwrap_or(member), best)
+            })
+            .collect();
+        tried.sort_by(|a, b| criterion(&a.1).total_cmp(&criterion(&b.1)));
+        let better =
+            tried.first().is_some_and(|(m, fit)| criterion(fit) < criterion(current) - 5.0 && !is_term(m.0));
+        if better {
+            let (_, fit) = tried.remove(0);
+            let old = members(&search.problem, current).swap_remove(i);
+            tried.insert(0, (old, std::mem::replace(current, fit)));
         }
-        tried.sort_by(|a, b| a.1.total_cmp(&b.1));
-        let chosen = members(&search.problem, current)[i].0;
-        let rest: Vec<Member> =
-            members(&search.problem, current).into_iter().filter(|m| m.0.id != chosen.id).collect();
+        let now = criterion(current);
+        let all = members(&search.problem, current);
+        let chosen = all[i].0;
+        let rest: Vec<Member> = all.into_iter().filter(|m| m.0.id != chosen.id).collect();
         let (hypothesis, columns) = recompose(current, &rest, &search.scale);
         let without = search.problem.fit(&hypothesis, &columns, 6);
-        let gain = criterion(&without) - criterion(current);
+        let gain = criterion(&without) - now;
         let mut place = Place { chosen, rivals: Vec::new(), aside: Vec::new(), gain };
-        let (rivals, aside): (Vec<_>, Vec<_>) =
-            tried.into_iter().partition(|t| t.1 < near(&place, t.0.0) && !is_term(t.0.0) && !is_term(chosen));
+        let (rivals, aside): (Vec<_>, Vec<_>) = tried
+            .into_iter()
+            .map(|(member, fit)| (member, criterion(&fit) - now))
+            .partition(|t| t.1 < near(&place, t.0.0) && !is_term(t.0.0) && !is_term(chosen));
         place.rivals = rivals;
         place.aside = aside.into_iter().map(|t| (t.0.0, t.1)).collect();
         places.push(place);

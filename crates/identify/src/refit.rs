@@ -35,7 +35,7 @@ impl Search<'_> {
                 let part = weaken(s.effect, &self.scale, &s.start);
                 let hypothesis = [at(&s.start), at(&s.origin), at(&part)]
                     .into_iter()
-                    .map(|h| (self.cost(&h), h))
+                    .map(|h| (cost(&self.problem, &h), h))
                     .min_by(|a, b| a.0.total_cmp(&b.0))
                     .map_or_else(|| at(&s.start), |best| best.1);
                 // Derivatives carry over, unless the equations are others.
@@ -65,10 +65,6 @@ impl Search<'_> {
         self.problem.fit(&hypothesis, &fit.columns, 6)
     }
 
-    fn cost(&self, hypothesis: &Hypothesis) -> f64 {
-        cost(&self.problem, hypothesis)
-    }
-
     /// Like [`Search::again`], with the command's edges where this hypothesis wants them: a lag or
     /// a delay judged on edges that were placed without it would never win.
     pub(crate) fn with_own_edges(&self, fit: &Fit, sizes: &[f64]) -> Fit {
@@ -93,7 +89,7 @@ impl Search<'_> {
             sizes.iter().map(|factor| from(&|k, _| factor * fit.values[k])).collect();
         if sizes.len() > 1 {
             let far = (fit.hypothesis.effects[slot].starts)(&self.scale).into_iter();
-            let far = far.map(|start| from(&|_, j| start[j])).map(|h| (self.cost(&h), h));
+            let far = far.map(|start| from(&|_, j| start[j])).map(|h| (cost(&self.problem, &h), h));
             starts.extend(far.min_by(|a, b| a.0.total_cmp(&b.0)).map(|f| f.1));
         }
         starts
@@ -136,7 +132,7 @@ pub(crate) fn left(problem: &Problem, fit: &Fit) -> f64 {
 }
 
 /// Misfit of a hypothesis where it starts; infinite where the simulation breaks down.
-fn cost(problem: &Problem, hypothesis: &Hypothesis) -> f64 {
+pub(crate) fn cost(problem: &Problem, hypothesis: &Hypothesis) -> f64 {
     let residual = problem.residual(&problem.respond(hypothesis, &hypothesis.start));
     let cost = problem.whiten(&residual).norm_squared();
     if cost.is_finite() { cost } else { f64::INFINITY }

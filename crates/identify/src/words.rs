@@ -4,7 +4,7 @@ use kort_thruster::effects::{Descriptor, Path};
 
 use crate::changes;
 use crate::data::Series;
-use crate::fit::Problem;
+use crate::fit::{Fit, Problem, Target};
 use crate::judge::{Outcome, Place, margin, near};
 use crate::library::is_term;
 use crate::locate;
@@ -30,6 +30,9 @@ pub fn odds(place: &Place) -> Vec<f64> {
 pub fn small_odds(distance: f64, gain: f64) -> f64 {
     (0.5 * (-distance / (0.5 * margin(gain))).exp()).min(0.2)
 }
+
+/// Standard deviations from what is stated beyond which a coefficient is spoken of.
+const STRAINED: f64 = 2.6;
 
 /// One sentence on an effect.
 pub fn statement(effect: &Descriptor) -> String {
@@ -73,14 +76,43 @@ pub fn why_not(leader: &str, distance: f64, gain: f64) -> String {
     }
 }
 
-/// A name that was fitted and removes next to nothing of a large error.
-pub fn weak(finding: Finding) -> Alternative {
+/// Coefficients that the baseline's fit needs far from what the rig states: a symptom even where the fit
+/// is good.
+pub fn strained(baseline: &Fit) -> Option<String> {
+    let far: Vec<String> = baseline
+        .hypothesis
+        .free
+        .iter()
+        .zip(&baseline.values)
+        .filter_map(|(free, value)| {
+            let (stated, sigma) = free.prior.filter(|_| matches!(free.target, Target::Base(_)))?;
+            let strain = (value - stated) / sigma;
+            (strain.abs() > STRAINED).then(|| {
+                format!(
+                    "{} {:+.0} % (stated to {:.0} %)",
+                    free.name,
+                    100.0 * (value / stated - 1.0),
+                    200.0 * (sigma / stated).abs()
+                )
+            })
+        })
+        .collect();
+    (!far.is_empty()).then(|| {
+        format!(
+            "the baseline fits only with coefficients far from what the rig states: {}. Check what is stated: they may hide physics that the model leaves out",
+            far.join(", ")
+        )
+    })
+}
+
+/// A name that was fitted and removes next to nothing of the error on held-out data.
+pub fn weak(effect: &str, heldout: &HeldOut) -> Alternative {
     Alternative {
-        effect: finding.effect,
-        probability: 0.1 * finding.probability,
+        effect: effect.into(),
+        probability: 0.05,
         why_not: format!(
             "fits better within the noise's colour, but removes only {:.0} % of the error above the noise on held-out data",
-            100.0 * finding.heldout.excess_error_removed.max(0.0)
+            100.0 * heldout.excess_error_removed.max(0.0)
         ),
     }
 }

@@ -364,7 +364,7 @@ fn confound(plan: &mut Plan, seed: u64, rng: &mut impl Rng) {
         }
         2 => {
             plan.programme = Programme::OneSided;
-            wanted = rng.random_range(0.008..0.012);
+            wanted = rng.random_range(0.011..0.015);
             (plan.channels.thrust, plan.channels.torque, plan.channels.flow) = (false, false, false);
             // Nothing absolute is measured: all forces and masses may scale together.
             plan.anchors = vec![Stated::Inertia, Stated::AddedMass];
