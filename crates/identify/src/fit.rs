@@ -17,6 +17,11 @@ use crate::data::{Prepared, Response};
 use crate::noise::Whitener;
 use crate::together::{groups, last_acting};
 
+/// First damping of a step. Where nothing absolute is measured, all forces and masses may scale together,
+/// held by what is stated alone: a damping that outweighs that would stop a fit anywhere in this valley.
+const DAMPING: f64 = 1e-8;
+const LEAST_DAMPING: f64 = 1e-12;
+
 /// A fit ends when a step lowers the sum of whitened squares by less than this: far below what
 /// any decision turns on.
 const ENOUGH: f64 = 0.3;
@@ -303,7 +308,7 @@ impl<'a> Problem<'a> {
         let mut residual = self.whiten(&self.residual(&response));
         let mut cost = residual.norm_squared() + penalty(free, &values);
         let iterations = if cost.is_finite() { iterations } else { 0 };
-        let mut damping = 1e-4;
+        let mut damping = DAMPING;
         let mut columns = known.to_vec();
         columns.resize(n, None);
         let mut fresh = columns.iter().all(Option::is_none);
@@ -336,13 +341,13 @@ impl<'a> Problem<'a> {
                     let promised = 2.0 * gradient.dot(&step) - (&normal * &step).dot(&step);
                     outcome = Some((cost - trial_cost, promised));
                     (values, response, residual, cost) = (trial, trial_response, trial_residual, trial_cost);
-                    damping = (damping * 0.1).max(1e-9);
+                    damping = (damping * 0.1).max(LEAST_DAMPING);
                     break;
                 }
                 if !fresh {
                     break;
                 }
-                damping *= 10.0;
+                damping *= 30.0;
             }
             match outcome {
                 Some((gain, promised)) if gain > 0.75 * promised => {

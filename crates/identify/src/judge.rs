@@ -48,13 +48,17 @@ pub fn margin(gain: f64) -> f64 {
     rules::MARGIN.max(rules::MARGIN_SHARE * gain)
 }
 
+/// Whether the catalogue says that two effects are confused.
+fn mates(a: &Descriptor, b: &Descriptor) -> bool {
+    a.confused_with.contains(&b.id) || b.confused_with.contains(&a.id)
+}
+
 /// Distance within which an effect cannot be told from the one chosen: wider for effects that the
 /// catalogue knows to be confused.
 pub fn near(place: &Place, other: &Descriptor) -> f64 {
     let chosen = place.chosen;
-    let mates = other.confused_with.contains(&chosen.id) || chosen.confused_with.contains(&other.id);
     let limit = margin(place.gain);
-    if mates { limit.max(rules::MATES_SHARE * place.gain) } else { limit }
+    if mates(chosen, other) { limit.max(rules::MATES_SHARE * place.gain) } else { limit }
 }
 
 /// Runs the search to its end. `progress` is told what is going on.
@@ -398,8 +402,7 @@ fn contenders(
         .filter_map(|c| Some((own(c)?, (all.len() == 1).then(|| c.fit.clone()))))
         .collect();
     for mate in &search.named {
-        let mates = mate.confused_with.contains(&leader.id) || leader.confused_with.contains(&mate.id);
-        if mates && free(mate.id) && list.iter().all(|c| c.0.0.id != mate.id) {
+        if mates(mate, leader) && free(mate.id) && list.iter().all(|c| c.0.0.id != mate.id) {
             let starts = unscreened(mate, &search.scale).into_iter().map(|s| (*mate, s.start));
             let cost_of =
                 |member: &Member| cost(&search.problem, &in_place(search, current, place, member.clone()).0);
@@ -422,6 +425,14 @@ fn in_place(search: &Search, current: &Fit, place: usize, member: Member) -> (Hy
 fn settle(search: &Search, current: &mut Fit, rounds: &[Vec<Candidate>]) -> Vec<Place> {
     let mut places: Vec<Place> = Vec::new();
     for (i, candidates) in rounds.iter().enumerate() {
+        let all = members(&search.problem, current);
+        let leader = all[i].0;
+        let rest: Vec<Member> = all.into_iter().filter(|m| m.0.id != leader.id).collect();
+        let (hypothesis, columns) = recompose(current, &rest, &search.scale);
+        let without = search.problem.fit(&hypothesis, &columns, 6);
+        let now = criterion(current);
+        let mut place =
+            Place { chosen: leader, rivals: Vec::new(), aside: Vec::new(), gain: criterion(&without) - now };
         // Each is fitted from where the leader stands: rivals that cannot be told apart lie beside it, in
         // a valley that is long where the rig states little.
         let mut tried: Vec<(Member, Fit)> = contenders(search, current, i, candidates)
@@ -432,31 +443,24 @@ fn settle(search: &Search, current: &mut Fit, rounds: &[Vec<Candidate>]) -> Vec<
                 if TIMING.contains(&member.0.id) && rounds.len() == 1 {
                     fit = search.with_own_edges(&fit, &[1.0]);
                 }
-                let best = own.filter(|own| criterion(own) < criterion(&fit)).unwrap_or(fit);
-                let found = members(&search.problem, &best).into_iter().find(|m| m.0.id == member.0.id);
-                (found.unwrap_or(member), best)
+                fit = own.filter(|own| criterion(own) < criterion(&fit)).unwrap_or(fit);
+                let found = members(&search.problem, &fit).into_iter().find(|m| m.0.id == member.0.id);
+                (found.unwrap_or(member), fit)
             })
             .collect();
         tried.sort_by(|a, b| criterion(&a.1).total_cmp(&criterion(&b.1)));
-        let better =
-            tried.first().is_some_and(|(m, fit)| criterion(fit) < criterion(current) - 5.0 && !is_term(m.0));
+        let better = tried.first().is_some_and(|(m, fit)| criterion(fit) < now - 5.0 && !is_term(m.0));
         if better {
-            let (_, fit) = tried.remove(0);
+            let (member, fit) = tried.remove(0);
             let old = members(&search.problem, current).swap_remove(i);
+            (place.chosen, place.gain) = (member.0, place.gain + now - criterion(&fit));
             tried.insert(0, (old, std::mem::replace(current, fit)));
         }
         let now = criterion(current);
-        let all = members(&search.problem, current);
-        let chosen = all[i].0;
-        let rest: Vec<Member> = all.into_iter().filter(|m| m.0.id != chosen.id).collect();
-        let (hypothesis, columns) = recompose(current, &rest, &search.scale);
-        let without = search.problem.fit(&hypothesis, &columns, 6);
-        let gain = criterion(&without) - now;
-        let mut place = Place { chosen, rivals: Vec::new(), aside: Vec::new(), gain };
         let (rivals, aside): (Vec<_>, Vec<_>) = tried
             .into_iter()
             .map(|(member, fit)| (member, criterion(&fit) - now))
-            .partition(|t| t.1 < near(&place, t.0.0) && !is_term(t.0.0) && !is_term(chosen));
+            .partition(|t| t.1 < near(&place, t.0.0) && !is_term(t.0.0) && !is_term(place.chosen));
         place.rivals = rivals;
         place.aside = aside.into_iter().map(|t| (t.0.0, t.1)).collect();
         places.push(place);

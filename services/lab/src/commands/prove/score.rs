@@ -85,7 +85,7 @@ pub fn open(answer: &Answer, report: &Value) -> Scored {
         first_right,
         in_set: truths.first().is_some_and(|ids| ids.iter().any(|id| listed(id))),
         all_named: truths.iter().all(|ids| ids.iter().any(|id| names.contains(id))),
-        rivals_listed: answer.confounded.iter().all(|id| listed(id)),
+        rivals_listed: answer.confounded.iter().all(|id| set.contains(id)),
         flagged_unknown: verdict == "unexplained"
             && answer.effects.first().is_some_and(|e| path(report) == Some(e.path)),
         wrong_unique: verdict == "explained" && names.iter().any(|name| !right(name)),
