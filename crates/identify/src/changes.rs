@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use crate::baseline::{members, with_effect};
 use crate::errors;
 use crate::fit::{Fit, Hypothesis, Problem, Target};
-use crate::heldout::held_out_rows;
+use crate::heldout::{held_out_rows, trained};
 use crate::library::{commanded, thrust_measured};
 use crate::noise::Whitener;
 use crate::screen::Projector;
@@ -238,10 +238,8 @@ pub fn find(search: &mut Search, baseline: &Fit, offered: &Available) -> Option<
     let [recording] = search.problem.recordings.as_slice() else { return None };
     let (from_s, duration_s) = (recording.time_s[0], recording.duration_s());
     let saved = search.problem.whiteners.clone();
-    let mut hypothesis = baseline.hypothesis.clone();
-    hypothesis.start.clone_from(&baseline.values);
     let plain = flat(&search.problem, baseline);
-    let mut start = plain.fit(&hypothesis, &[], 8);
+    let mut start = plain.fit(&baseline.resume(), &[], 8);
     let projector = Projector::new(&plain, &mut start);
     let seeker = Seeker { plain: &plain, start: &start, projector: &projector, scale: &search.scale };
 
@@ -532,17 +530,7 @@ fn prune(search: &Search, effect: &'static Descriptor, fit: &Fit) -> (&'static D
 /// Share of the error above the noise that the changes take away on rows left out of their fit.
 fn held(problem: &Problem, found: &Found) -> f64 {
     let rows = held_out_rows(problem, &[&found.fit], None);
-    let mut training = problem.clone();
-    for (mask, rows) in training.masked.iter_mut().zip(&rows) {
-        mask.iter_mut().zip(rows).for_each(|(m, h)| *m |= *h);
-    }
-    let residual = |fit: &Fit| {
-        let mut h = fit.hypothesis.clone();
-        h.start.clone_from(&fit.values);
-        let fit = training.fit(&h, &fit.columns, 4);
-        problem.residual(&problem.respond(&fit.hypothesis, &fit.values))
-    };
-    let (before, after) = (residual(&found.before), residual(&found.fit));
+    let (before, after) = trained(problem, &rows, &found.before, &found.fit);
     let floor = errors::noise_floor(problem, &after);
     errors::held_out(problem, &rows, &before, &after, &floor, 1).excess_error_removed
 }

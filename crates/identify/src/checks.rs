@@ -179,8 +179,10 @@ pub struct Sag {
     full_v: f64,
     /// Of supply and load.
     correlation: f64,
-    /// What stands for the load, in words.
+    /// What rises, in words.
     load: String,
+    /// What stands for the load, in words.
+    measure: &'static str,
 }
 
 impl Sag {
@@ -194,8 +196,8 @@ impl Sag {
     pub fn words(&self) -> Option<String> {
         (self.share() > 0.01).then(|| {
             format!(
-                "supply_v sags as {}: about {:.2} V at rest, {:.2} V at the largest load (correlation {:.2}); a constant supply would be wrong here",
-                self.load, self.rest_v, self.full_v, self.correlation
+                "supply_v sags as {}: about {:.2} V at rest, {:.2} V at the largest load (correlation {:.2} with {}); a constant supply would be wrong here",
+                self.load, self.rest_v, self.full_v, self.correlation, self.measure
             )
         })
     }
@@ -206,29 +208,34 @@ impl Sag {
 pub fn supply_sag(series: &Series) -> Option<Sag> {
     let supply = series.column("supply_v")?;
     let current = series.column("current_a").or_else(|| series.column("current_cmd_a"));
-    let (load, rows): (String, Vec<(f64, f64)>) = match (current, series.column("shaft_speed_rad_s")) {
-        (Some(current), Some(speed)) => {
-            let power = (0..supply.len()).map(|k| (current[k] * speed[k]).max(0.0));
-            ("current times shaft speed rises".into(), power.zip(supply.iter().copied()).collect())
-        }
-        _ => {
-            let commands: Vec<&[f64]> = series
-                .columns
-                .iter()
-                .filter(|c| {
-                    ["duty_cmd", "speed_cmd_rad_s", "voltage_cmd_v"].iter().any(|n| c.0.starts_with(n))
-                })
-                .filter_map(|c| series.column(&c.0))
-                .collect();
-            let cubes = (0..supply.len()).map(|k| commands.iter().map(|c| c[k].abs().powi(3)).sum());
-            let words = match commands.len() {
-                0 => return None,
-                1 => "the cube of the command rises".into(),
-                n => format!("the cubes of the {n} commands together rise"),
-            };
-            (words, cubes.zip(supply.iter().copied()).collect())
-        }
-    };
+    let (load, measure, rows): (String, &str, Vec<(f64, f64)>) =
+        match (current, series.column("shaft_speed_rad_s")) {
+            (Some(current), Some(speed)) => {
+                let power = (0..supply.len()).map(|k| (current[k] * speed[k]).max(0.0));
+                (
+                    "the load rises".into(),
+                    "current times shaft speed",
+                    power.zip(supply.iter().copied()).collect(),
+                )
+            }
+            _ => {
+                let commands: Vec<&[f64]> = series
+                    .columns
+                    .iter()
+                    .filter(|c| {
+                        ["duty_cmd", "speed_cmd_rad_s", "voltage_cmd_v"].iter().any(|n| c.0.starts_with(n))
+                    })
+                    .filter_map(|c| series.column(&c.0))
+                    .collect();
+                let cubes = (0..supply.len()).map(|k| commands.iter().map(|c| c[k].abs().powi(3)).sum());
+                let words = match commands.len() {
+                    0 => return None,
+                    1 => "the command rises".into(),
+                    n => format!("the {n} commands together rise"),
+                };
+                (words, "the commands cubed", cubes.zip(supply.iter().copied()).collect())
+            }
+        };
     let rows: Vec<(f64, f64)> = rows.into_iter().filter(|r| r.0.is_finite() && r.1.is_finite()).collect();
     let n = rows.len() as f64;
     if rows.len() < 50 {
@@ -248,6 +255,7 @@ pub fn supply_sag(series: &Series) -> Option<Sag> {
         full_v: my + slope * (top - mx),
         correlation: xy / (xx * yy).sqrt().max(1e-300),
         load,
+        measure,
     })
 }
 

@@ -19,12 +19,8 @@ use crate::locate::{locate, since_edge};
 use crate::report::{
     Alternative, Baseline, EmpiricalTerm, Finding, HeldOut, Mismatch, ParameterReport, Report, Verdict,
 };
-use crate::search::Search;
+use crate::search::{Search, rules};
 use crate::words;
-
-/// A rival stands beside the leader if it removes at least this share of what the leader removes on
-/// held-out data.
-const RIVAL_SHARE: f64 = 0.6;
 
 /// How to diagnose.
 #[derive(Clone, Debug)]
@@ -200,38 +196,29 @@ fn write(
     mut notes: Vec<String>,
     thin: Option<String>,
 ) -> Diagnosis {
-    let mut problem = search.problem.clone();
+    let problem = &search.problem;
     let rivals = outcome.places.iter().flat_map(|p| p.rivals.iter().map(|r| &r.0.0));
     let longest_s = longest_block_s(outcome.last.hypothesis.effects.iter().chain(rivals), &search.scale);
-    let held = held_out_rows(&problem, &[&outcome.last], longest_s);
-    let plain =
-        |fit: &Fit, problem: &Problem| problem.residual(&problem.respond(&fit.hypothesis, &fit.values));
-    let baseline_full = plain(&outcome.baseline, &problem);
-    let last_full = plain(&outcome.last, &problem);
-    let floor = errors::noise_floor(&problem, &last_full);
-    let std_baseline = errors::std_errors(&problem, &mut outcome.baseline);
-    let std_last = errors::std_errors(&problem, &mut outcome.last);
+    let held = held_out_rows(problem, &[&outcome.last], longest_s);
+    let baseline_full = problem.residual_of(&outcome.baseline);
+    let last_full = problem.residual_of(&outcome.last);
+    let floor = errors::noise_floor(problem, &last_full);
+    let std_baseline = errors::std_errors(problem, &mut outcome.baseline);
+    let std_last = errors::std_errors(problem, &mut outcome.last);
 
     // Fits on the training rows alone.
-    for (mask, held) in problem.masked.iter_mut().zip(&held) {
-        mask.iter_mut().zip(held).for_each(|(m, h)| *m |= *h);
-    }
-    let train = |fit: &Fit| {
-        let mut hypothesis = fit.hypothesis.clone();
-        hypothesis.start.clone_from(&fit.values);
-        problem.fit(&hypothesis, &fit.columns, 4)
-    };
-    let baseline_train = train(&outcome.baseline);
-    let last_train = if outcome.places.is_empty() { baseline_train.clone() } else { train(&outcome.last) };
+    let training = problem.without(&held);
+    let baseline_train = training.again(&outcome.baseline, 4);
+    let last_train =
+        if outcome.places.is_empty() { baseline_train.clone() } else { training.again(&outcome.last, 4) };
     let with = |list: &[Member]| -> Fit {
         let (hypothesis, columns) = recompose(&last_train, list, &search.scale);
-        problem.fit(&hypothesis, &columns, 6)
+        training.fit(&hypothesis, &columns, 6)
     };
-    let residual_baseline = plain(&baseline_train, &search.problem);
-    let residual_last = plain(&last_train, &search.problem);
-    let score = |before: &Stack, after: &Stack| {
-        errors::held_out(&search.problem, &held, before, after, &floor, options.seed)
-    };
+    let residual_baseline = problem.residual_of(&baseline_train);
+    let residual_last = problem.residual_of(&last_train);
+    let score =
+        |before: &Stack, after: &Stack| errors::held_out(problem, &held, before, after, &floor, options.seed);
 
     let speed: Vec<Vec<f64>> = {
         let (parameters, effects) = search.problem.assemble(&outcome.last.hypothesis, &outcome.last.values);
@@ -259,9 +246,9 @@ fn write(
     for (i, place) in outcome.places.iter_mut().enumerate() {
         let rest: Vec<Member> = all.iter().filter(|m| m.0.id != place.chosen.id).cloned().collect();
         let without =
-            if rest.is_empty() { residual_baseline.clone() } else { plain(&with(&rest), &search.problem) };
+            if rest.is_empty() { residual_baseline.clone() } else { problem.residual_of(&with(&rest)) };
         let held_here = score(&without, &residual_last);
-        if place.gain < top_gain && held_here.excess_error_removed < LEAST_OF_A_FINDING {
+        if place.gain < top_gain && held_here.excess_error_removed < rules::LEAST_OF_A_FINDING {
             // Beside a larger find, a name that hardly removes anything on new data is none.
             weak.push(place.chosen.id);
             if !is_term(place.chosen) {
@@ -277,8 +264,8 @@ fn write(
                 swapped[slot] = (rival, values.clone());
             }
             let fit = with(&swapped);
-            let held_rival = score(&without, &plain(&fit, &search.problem));
-            if held_rival.excess_error_removed > RIVAL_SHARE * held_here.excess_error_removed {
+            let held_rival = score(&without, &problem.residual_of(&fit));
+            if held_rival.excess_error_removed > rules::RIVAL_SHARE * held_here.excess_error_removed {
                 place.rivals.push(((rival, values), distance));
                 rival_fits.push((fit, held_rival));
             } else {
@@ -358,7 +345,7 @@ fn write(
     if outcome.excess.is_some() && verdict == Verdict::Unexplained {
         // Much is left: a name that hardly removes anything of it is no finding.
         let (kept, weak): (Vec<Finding>, Vec<Finding>) =
-            findings.into_iter().partition(|f| f.heldout.excess_error_removed > LEAST_OF_A_FINDING);
+            findings.into_iter().partition(|f| f.heldout.excess_error_removed > rules::LEAST_OF_A_FINDING);
         findings = kept;
         alternatives.extend(weak.iter().map(|f| words::weak(&f.effect, &f.heldout)));
     }
@@ -406,12 +393,6 @@ fn write(
     Diagnosis { report, traces: traces(&search.problem, &baseline_full, &last_full, &speed) }
 }
 
-/// Share of the held-out error above the noise that names must remove where much is left beside them.
-const LEAST_REMOVED: f64 = 0.5;
-
-/// Share below which a name is set aside where much is left.
-const LEAST_OF_A_FINDING: f64 = 0.2;
-
 fn verdict(outcome: &Outcome, findings: &[Finding], thin: bool) -> Verdict {
     let removed = findings.iter().map(|f| f.heldout.excess_error_removed).fold(0.0, f64::max);
     let total: f64 = outcome.places.iter().map(|p| p.gain).sum();
@@ -420,7 +401,9 @@ fn verdict(outcome: &Outcome, findings: &[Finding], thin: bool) -> Verdict {
         Verdict::Unexplained
     } else if outcome.places.is_empty() {
         if thin { Verdict::InsufficientData } else { Verdict::NoMismatch }
-    } else if unnamed > 0.15 * total || outcome.excess.is_some() && removed < LEAST_REMOVED {
+    } else if unnamed > rules::UNNAMED_SHARE * total
+        || outcome.excess.is_some() && removed < rules::LEAST_REMOVED
+    {
         Verdict::Unexplained
     } else if outcome.places.iter().any(|p| !p.rivals.is_empty()) {
         Verdict::Ambiguous

@@ -111,6 +111,13 @@ pub struct Fit {
     pub at_bound: Vec<bool>,
 }
 
+impl Fit {
+    /// The hypothesis, to start from where this fit ended.
+    pub fn resume(&self) -> Hypothesis {
+        Hypothesis { start: self.values.clone(), ..self.hypothesis.clone() }
+    }
+}
+
 impl<'a> Problem<'a> {
     /// The response of a hypothesis at values of its free parameters.
     pub fn respond(&self, hypothesis: &Hypothesis, values: &[f64]) -> Stack {
@@ -382,6 +389,25 @@ impl<'a> Problem<'a> {
             residual,
             columns,
         }
+    }
+
+    /// A fit taken further under the present noise, edges and masks.
+    pub fn again(&self, fit: &Fit, iterations: usize) -> Fit {
+        self.fit(&fit.resume(), &fit.columns, iterations)
+    }
+
+    /// Residual of a fit on every row.
+    pub fn residual_of(&self, fit: &Fit) -> Stack {
+        self.residual(&self.respond(&fit.hypothesis, &fit.values))
+    }
+
+    /// The problem without some rows: its training part.
+    pub fn without(&self, held: &[Vec<bool>]) -> Self {
+        let mut training = self.clone();
+        for (mask, held) in training.masked.iter_mut().zip(held) {
+            mask.iter_mut().zip(held).for_each(|(m, h)| *m |= *h);
+        }
+        training
     }
 
     /// The whitened derivative at a fit, every column computed anew.

@@ -7,7 +7,7 @@
 use kort_thruster::effects::{Descriptor, Scale};
 use nalgebra::{DMatrix, DVector};
 
-use crate::fit::{Fit, Problem};
+use crate::fit::{Fit, Problem, Stack};
 
 /// Length of a block, s: long against the noise's memory, short against the recording.
 const BLOCK_S: f64 = 2.0;
@@ -91,6 +91,13 @@ fn left_out_of(problem: &Problem, fit: &mut Fit, block_s: f64) -> Vec<f64> {
         }
     }
     losses
+}
+
+/// Residuals, on every row, of two fits taken further on the rows that are not held out.
+pub fn trained(problem: &Problem, held: &[Vec<bool>], before: &Fit, after: &Fit) -> (Stack, Stack) {
+    let training = problem.without(held);
+    let residual = |fit: &Fit| problem.residual_of(&training.again(fit, 4));
+    rayon::join(|| residual(before), || residual(after))
 }
 
 /// Sum of paired differences and its standard error: positive if `after` is better.

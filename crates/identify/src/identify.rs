@@ -144,17 +144,10 @@ pub fn identify(
     progress("scoring on held-out data");
     let projector = Projector::new(problem, &mut best);
     let std = projector.std_errors();
-    let full = problem.residual(&problem.respond(&best.hypothesis, &best.values));
+    let full = problem.residual_of(&best);
     let floor = errors::noise_floor(problem, &full);
     let held = held_out_rows(problem, &[], None);
-    let mut training = problem.clone();
-    for (mask, held) in training.masked.iter_mut().zip(&held) {
-        mask.iter_mut().zip(held).for_each(|(m, h)| *m |= *h);
-    }
-    let mut from = best.hypothesis.clone();
-    from.start.clone_from(&best.values);
-    let train = training.fit(&from, &best.columns, 6);
-    let train_residual = problem.residual(&problem.respond(&train.hypothesis, &train.values));
+    let train_residual = problem.residual_of(&problem.without(&held).again(&best, 6));
     let parameters = parameters(&best, &std, None);
     Ok(FitReport {
         schema: "kort.fit/1".into(),

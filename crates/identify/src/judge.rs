@@ -88,7 +88,7 @@ pub fn run(
     let saved = (search.problem.recordings.clone(), search.problem.whiteners.clone());
     if let Some(found) = changes::find(search, &named.baseline, &offered) {
         let now = excess(&search.problem, &found.fit).1;
-        let may_leave = if switched { 1.1 } else { rules::CHANGE_LEAVES };
+        let may_leave = if switched { rules::CHANGE_FOR_SWITCH } else { rules::CHANGE_LEAVES };
         if now * now < may_leave * left * left {
             let gain = criterion(&found.before) - criterion(&found.fit);
             let change = Candidate {
@@ -204,7 +204,7 @@ fn names(
 
 /// Error above the noise on every channel: mean square over full scale squared.
 fn excesses(problem: &Problem, fit: &Fit, floor: &BTreeMap<&'static str, f64>) -> Vec<(&'static str, f64)> {
-    let residual = problem.residual(&problem.respond(&fit.hypothesis, &fit.values));
+    let residual = problem.residual_of(fit);
     let full = errors::full_scales(problem);
     errors::sums(problem, &residual, |r, row| !problem.masked[r][row])
         .into_iter()
@@ -218,7 +218,7 @@ fn excesses(problem: &Problem, fit: &Fit, floor: &BTreeMap<&'static str, f64>) -
 }
 
 fn floor(problem: &Problem, fit: &Fit) -> BTreeMap<&'static str, f64> {
-    errors::noise_floor(problem, &problem.residual(&problem.respond(&fit.hypothesis, &fit.values)))
+    errors::noise_floor(problem, &problem.residual_of(fit))
 }
 
 /// The channel with most error above its noise: root mean square over full scale.
@@ -274,9 +274,7 @@ fn switched(search: &mut Search, current: &mut Fit) -> Option<Candidate> {
 
 /// The outcome where no name explains enough: from the baseline anew, the best term without a name.
 fn nameless(search: &mut Search, baseline: &Fit, names: Vec<Place>) -> Outcome {
-    let mut start = baseline.hypothesis.clone();
-    start.start.clone_from(&baseline.values);
-    let mut current = search.baseline(&start);
+    let mut current = search.baseline(&baseline.resume());
     let term = switched(search, &mut current);
     let aside = |gain: f64| names.iter().map(|p| (p.chosen, (gain - p.gain).max(0.0))).collect();
     let (last, places) = match term {

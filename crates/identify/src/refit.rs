@@ -60,9 +60,7 @@ impl Search<'_> {
 
     /// The same hypothesis fitted again from where it was, under the present noise and edges.
     pub fn again(&self, fit: &Fit) -> Fit {
-        let mut hypothesis = fit.hypothesis.clone();
-        hypothesis.start.clone_from(&fit.values);
-        self.problem.fit(&hypothesis, &fit.columns, 6)
+        self.problem.again(fit, 6)
     }
 
     /// Like [`Search::again`], with the command's edges where this hypothesis wants them: a lag or
@@ -115,8 +113,7 @@ impl Search<'_> {
         }
         let mut own = self.problem.clone();
         own.flat_noise();
-        let start = Hypothesis { start: fit.values.clone(), ..fit.hypothesis.clone() };
-        let first = own.fit(&start, &[], 8);
+        let first = own.fit(&fit.resume(), &[], 8);
         let afresh = in_turn(&mut own, first);
         own.learn_noise(&afresh.hypothesis, &afresh.values);
         let there = left(&own, &afresh);

@@ -62,6 +62,17 @@ pub mod rules {
     pub const MAY_LEAVE: f64 = 0.10;
     /// ... several names together.
     pub const SEVERAL_MAY_LEAVE: f64 = 0.05;
+    /// A change in mid-run that names took for a switched term may leave this much more than they did.
+    pub const CHANGE_FOR_SWITCH: f64 = 1.1;
+    /// A rival stands beside the leader if it removes at least this share of what the leader removes on
+    /// held-out data.
+    pub const RIVAL_SHARE: f64 = 0.6;
+    /// Share of the held-out error above the noise that names must remove where much is left beside them.
+    pub const LEAST_REMOVED: f64 = 0.5;
+    /// Share below which a name is set aside where much is left, or where another explains more.
+    pub const LEAST_OF_A_FINDING: f64 = 0.2;
+    /// Share of the gain that terms without a name may hold beside names.
+    pub const UNNAMED_SHARE: f64 = 0.15;
     /// How much more names may leave where a measured column drives.
     pub const DRIVER_LEAVES: f64 = 4.0;
     /// A name must explain at least this share of what the best term explains to be followed.
@@ -95,8 +106,6 @@ pub struct Round {
     pub before: Fit,
     /// Candidates, best first, under the same noise.
     pub candidates: Vec<Candidate>,
-    /// Fall of the criterion by the best.
-    pub gain: f64,
     /// The best's gain holds on left-out blocks.
     pub holds: bool,
     /// Root mean square of the best's response over full scale, largest channel.
@@ -266,13 +275,7 @@ impl<'a> Search<'a> {
             candidates.remove(0);
         }
         let best = &candidates[0];
-        Some(Round {
-            gain: criterion(&before) - best.criterion,
-            holds,
-            size: self.size(&before, &best.fit),
-            before,
-            candidates,
-        })
+        Some(Round { holds, size: self.size(&before, &best.fit), before, candidates })
     }
 
     /// Share of the squared error above the noise that a fit removes on rows it was not fitted to: the
@@ -280,16 +283,7 @@ impl<'a> Search<'a> {
     fn removed_on_held_out(&self, before: &Fit, after: &Fit) -> f64 {
         let longest_s = heldout::longest_block_s(after.hypothesis.effects.iter(), &self.scale);
         let held = heldout::held_out_rows(&self.problem, &[after], longest_s);
-        let mut train = self.problem.clone();
-        for (mask, held) in train.masked.iter_mut().zip(&held) {
-            mask.iter_mut().zip(held).for_each(|(m, h)| *m |= *h);
-        }
-        let residual = |fit: &Fit| {
-            let start = Hypothesis { start: fit.values.clone(), ..fit.hypothesis.clone() };
-            let fit = train.fit(&start, &fit.columns, 4);
-            self.problem.residual(&self.problem.respond(&fit.hypothesis, &fit.values))
-        };
-        let (before, after) = rayon::join(|| residual(before), || residual(after));
+        let (before, after) = heldout::trained(&self.problem, &held, before, after);
         let (floor, full) = (errors::noise_floor(&self.problem, &after), errors::full_scales(&self.problem));
         let above = |residual: &Stack| -> f64 {
             errors::sums(&self.problem, residual, |r, row| !self.problem.masked[r][row] && held[r][row])
