@@ -37,6 +37,7 @@ pub fn check(series: &Series, rig: &Rig) -> Checked {
     unsigned_speed(series, &mut out);
     rest_bias(series, &mut out);
     gaps(series, &mut out);
+    sparse_commands(series, &mut out);
     out.notes
         .extend(supply_sag(series).and_then(|sag| sag.words()).map(|sag| format!("{}: {sag}", series.name)));
     out
@@ -257,6 +258,21 @@ pub fn supply_sag(series: &Series) -> Option<Sag> {
         load,
         measure,
     })
+}
+
+/// A command logged less often than the rows: it is held, and when it changed is known coarsely only.
+fn sparse_commands(series: &Series, out: &mut Checked) {
+    for name in ["current_cmd_a", "voltage_cmd_v", "duty_cmd", "speed_cmd_rad_s"] {
+        let Some(column) = series.column(name) else { continue };
+        let empty = column.iter().filter(|v| !v.is_finite()).count();
+        if empty * 20 > column.len() {
+            out.notes.push(format!(
+                "{}: {empty} of {} cells of {name} are empty; the value before is taken to stand. A change may have come anywhere between two samples, so delays and lags shorter than that cannot be told",
+                series.name,
+                column.len()
+            ));
+        }
+    }
 }
 
 fn gaps(series: &Series, out: &mut Checked) {

@@ -259,7 +259,9 @@ impl Prepared {
             _ => row_s / (row_s / COARSEST_TICK_S).ceil().max(1.0),
         };
         refuse::too_long(series, tick_s)?;
-        let recorded = filled(series.column(driving.column()).unwrap_or(&[]));
+        let column = series.column(driving.column()).unwrap_or(&[]);
+        // A command stands until the next; a response moves on between its samples.
+        let recorded = if let Driving::Command(_) = driving { held(column) } else { filled(column) };
         let mut prepared = Self {
             name: recording,
             time_s: series.time_s.clone(),
@@ -696,6 +698,20 @@ fn median_step(time_s: &[f64]) -> f64 {
     steps[steps.len() / 2]
 }
 
+/// The column with empty cells filled by the value before; the first known one stands before it too.
+fn held(column: &[f64]) -> Vec<f64> {
+    let mut at = column.iter().copied().find(|v| v.is_finite()).unwrap_or(0.0);
+    column
+        .iter()
+        .map(|v| {
+            if v.is_finite() {
+                at = *v;
+            }
+            at
+        })
+        .collect()
+}
+
 /// The column with empty cells filled: straight between samples, held at the ends.
 fn filled(column: &[f64]) -> Vec<f64> {
     let mut out = column.to_vec();
@@ -727,4 +743,16 @@ fn catmull_rom(p0: f64, p1: f64, p2: f64, p3: f64, u: f64) -> f64 {
         + (p2 - p0) * u
         + (2.0 * p0 - 5.0 * p1 + 4.0 * p2 - p3) * u * u
         + (3.0 * p1 - p0 - 3.0 * p2 + p3) * u * u * u)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_command_with_empty_cells_is_held_and_a_response_joined() {
+        let column = [f64::NAN, 2.0, f64::NAN, f64::NAN, 8.0, f64::NAN];
+        assert_eq!(held(&column), [2.0, 2.0, 2.0, 2.0, 8.0, 8.0]);
+        assert_eq!(filled(&column), [2.0, 2.0, 4.0, 6.0, 8.0, 8.0]);
+    }
 }
