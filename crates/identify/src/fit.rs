@@ -15,6 +15,7 @@ use std::sync::Arc;
 
 use crate::data::{Prepared, Response};
 use crate::noise::Whitener;
+use crate::step::damped_step;
 use crate::together::{groups, last_acting};
 
 /// First damping of a step. Where nothing absolute is measured, all forces and masses may scale together,
@@ -502,47 +503,4 @@ pub fn penalty(free: &[Free], values: &[f64]) -> f64 {
 fn near_bound(free: &Free, value: f64) -> bool {
     let slack = 1e-6 * (free.high - free.low);
     value <= free.low + slack || value >= free.high - slack
-}
-
-/// The damped step in scaled parameters. A parameter that it would take out of its bounds goes to the
-/// bound, and the others are solved for again: cut off alone, the step would no longer be a good one.
-fn damped_step(
-    normal: &DMatrix<f64>,
-    gradient: &DVector<f64>,
-    damping: f64,
-    free: &[Free],
-    values: &[f64],
-) -> DVector<f64> {
-    let n = free.len();
-    let mut held: Vec<Option<f64>> = vec![None; n];
-    loop {
-        let mut a = normal.clone();
-        let mut b = gradient.clone();
-        for k in 0..n {
-            a[(k, k)] += damping * a[(k, k)] + 1e-12;
-        }
-        for k in 0..n {
-            let Some(at) = held[k] else { continue };
-            for j in 0..n {
-                b[j] -= a[(j, k)] * at;
-                a[(j, k)] = 0.0;
-                a[(k, j)] = 0.0;
-            }
-            a[(k, k)] = 1.0;
-            b[k] = at;
-        }
-        let Some(cholesky) = a.cholesky() else { return DVector::zeros(n) };
-        let step = cholesky.solve(&b);
-        let room =
-            |k: usize| ((free[k].low - values[k]) / free[k].size, (free[k].high - values[k]) / free[k].size);
-        let beyond = |k: usize| {
-            let (low, high) = room(k);
-            (low - step[k]).max(step[k] - high) / (high - low).max(1e-300)
-        };
-        let worst = (0..n).filter(|k| held[*k].is_none()).max_by(|i, j| beyond(*i).total_cmp(&beyond(*j)));
-        match worst.filter(|k| beyond(*k) > 1e-12) {
-            Some(k) => held[k] = Some(step[k].clamp(room(k).0.min(0.0), room(k).1.max(0.0))),
-            None => return step,
-        }
-    }
 }

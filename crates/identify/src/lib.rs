@@ -21,5 +21,6 @@ pub mod refuse;
 pub mod report;
 pub mod screen;
 pub mod search;
+mod step;
 mod together;
 pub mod words;
