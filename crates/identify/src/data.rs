@@ -335,6 +335,7 @@ impl Prepared {
                 depth_m: depth.as_deref().map(|d| at(d, time_s)),
                 temperature_c: temperature.as_deref().map(|d| at(d, time_s)),
                 extra: 0.0,
+                smooth: false,
             });
         }
         self.stimulus.ticks = ticks;

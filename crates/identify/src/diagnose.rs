@@ -103,7 +103,7 @@ impl<'a> Setup<'a> {
     /// # Errors
     /// [`DataError`] if a recording cannot be compared with a model at all.
     pub fn new(series: &[Series], rig: &'a Rig, model: ModelName) -> Result<Self, DataError> {
-        let recordings: Vec<Prepared> = series
+        let mut recordings: Vec<Prepared> = series
             .iter()
             .map(|s| Prepared::new(s, rig, model == ModelName::Model3))
             .collect::<Result<_, _>>()?;
@@ -138,14 +138,9 @@ impl<'a> Setup<'a> {
             .any(|p| p.channels.iter().any(|c| c.response == crate::data::Response::Current));
         let hypothesis = baseline::hypothesis(model, rig, prescribed, current);
         let thin = too_thin(&recordings);
-        let mut problem = Problem {
-            model,
-            rig,
-            stated: Parameters::stated(rig),
-            recordings,
-            whiteners: Vec::new(),
-            masked,
-        };
+        let stated = Parameters::stated(rig);
+        recordings.iter_mut().for_each(|r| r.mark_smooth(model, rig, &stated));
+        let mut problem = Problem { model, rig, stated, recordings, whiteners: Vec::new(), masked };
         problem.flat_noise();
         Ok(Self { problem, hypothesis, notes, thin })
     }

@@ -21,6 +21,7 @@ pub mod refuse;
 pub mod report;
 pub mod screen;
 pub mod search;
+mod smooth;
 mod step;
 mod together;
 pub mod words;

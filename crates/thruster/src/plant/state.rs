@@ -22,6 +22,10 @@ pub struct Tick {
     pub temperature_c: Option<f64>,
     /// Another recorded signal (a neighbour's speed, an unknown column), standardised.
     pub extra: f64,
+    /// Nothing jumps or moves fast about this tick: the rates at its ends and those a tick before tell its
+    /// course. Known beforehand, and not found on the way, so that a response stays smooth in the
+    /// parameters. False costs time only.
+    pub smooth: bool,
 }
 
 /// A recorded signal that drives the model instead of the command, at start and end of the tick.
@@ -97,8 +101,6 @@ pub struct Local {
     pub depth_m: Option<f64>,
     /// Temperature, deg C, if known.
     pub temperature_c: Option<f64>,
-    /// Supply, V.
-    pub supply_v: f64,
     /// Thrust on the water (only in [`super::Plant::truth`]), N.
     pub thrust_n: f64,
     /// Blade torque (only in [`super::Plant::truth`]), N m.
@@ -107,8 +109,8 @@ pub struct Local {
 
 impl Local {
     /// Whether nothing that acts on the rates jumps from `before` to here; the end of one tick and
-    /// the start of the next may differ in rounding. Without effects (`HOOKED` false) depth,
-    /// temperature and supply do not act.
+    /// the start of the next may differ in rounding. Without effects (`HOOKED` false) depth
+    /// and temperature do not act.
     #[inline(always)]
     pub(super) fn continues<const HOOKED: bool>(&self, before: &Self) -> bool {
         let near = |a: f64, b: f64| (a - b).abs() <= 1e-12 * (a.abs() + b.abs());
@@ -118,8 +120,7 @@ impl Local {
             && (!HOOKED
                 || near(self.shaft_angle_rad, before.shaft_angle_rad)
                     && self.depth_m == before.depth_m
-                    && self.temperature_c == before.temperature_c
-                    && (self.supply_v == before.supply_v || near(self.supply_v, before.supply_v)))
+                    && self.temperature_c == before.temperature_c)
     }
 }
 

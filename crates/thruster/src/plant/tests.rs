@@ -73,3 +73,15 @@ fn a_jump_of_the_ambient_flow_costs_no_accuracy() {
     });
     assert!(e < 5e-3, "{e}");
 }
+
+/// Where nothing moves fast the cheaper step does as well; at a jump it would not.
+#[test]
+fn a_smooth_tick_costs_no_accuracy() {
+    let slow = |i: usize| 6.0 + 0.5 * (0.1 * i as f64).sin();
+    let driven = |i: usize| Driven::Current(slow(i), slow(i + 1));
+    let cheap = error(0.0, |i| Tick { driven: driven(i), smooth: i > 40, ..Tick::default() });
+    assert!(cheap < 2e-3, "{cheap} rad/s");
+    let plain = error(0.0, |i| Tick { command: level(i), ..Tick::default() });
+    let wrong = error(0.0, |i| Tick { command: level(i), smooth: true, ..Tick::default() });
+    assert!(wrong > 1.05 * plain, "{wrong} {plain}");
+}

@@ -1,0 +1,76 @@
+//! Ticks about which nothing jumps or moves fast: simulated there at half the cost.
+//!
+//! Most of a recording is settled or settling. Which ticks those are is read off one simulation with
+//! the stated coefficients and kept for every later one: a choice made anew in each simulation would
+//! jump with the parameters, and differences of simulations are the derivatives of a fit.
+
+use kort_thruster::models::ModelName;
+use kort_thruster::parameters::Parameters;
+use kort_thruster::plant::Plant;
+use kort_thruster::rig::Rig;
+
+use crate::data::Prepared;
+
+/// Change of curvature over a tick, as a share of the largest state, below which a tick is smooth. The error
+/// of a step is some hundredth of it.
+const CURVES: f64 = 1e-4;
+/// The same for the bow of the current within a tick.
+const BOWS: f64 = 1e-4;
+
+impl Prepared {
+    /// Marks the smooth ticks of the stimulus.
+    pub fn mark_smooth(&mut self, model: ModelName, rig: &Rig, stated: &Parameters) {
+        let mut plant = Plant::new(model, rig, stated, &[], self.tick_s);
+        let [speed, flow, current, angle] = self.start;
+        plant.start(self.time_s[0], speed, flow, current, angle);
+        let mut course = vec![[speed, flow, current]];
+        for tick in &self.stimulus.ticks {
+            plant.step(tick);
+            let truth = plant.truth();
+            course.push([truth.shaft_speed_rad_s, truth.axial_m_s, truth.current_a]);
+        }
+        let smooth = smooth(&course, self.ticks_per_row + 2);
+        for (tick, smooth) in self.stimulus.ticks.iter_mut().zip(smooth) {
+            tick.smooth = smooth;
+        }
+    }
+}
+
+/// Which ticks of a course (shaft speed, axial flow, current at every tick's start and the last one's end)
+/// are smooth, and have nothing else within `reach` ticks before them or beginning in the next: the
+/// command's jumps may yet be moved within a log interval.
+fn smooth(course: &[[f64; 3]], reach: usize) -> Vec<bool> {
+    let ticks = course.len().saturating_sub(1);
+    let top = |k: usize| course.iter().fold(1e-9_f64, |m, x| m.max(x[k].abs()));
+    let tops = [top(0), top(1), top(2)];
+    let curves = |n: usize, k: usize| {
+        let at = |back: usize| course[n + 1 - back][k];
+        (at(0) - 3.0 * at(1) + 3.0 * at(2) - at(3)).abs() / tops[k]
+    };
+    let bows = |n: usize| (course[n + 1][2] - 2.0 * course[n][2] + course[n - 1][2]).abs() / (8.0 * tops[2]);
+    let calm: Vec<bool> = (0..ticks)
+        .map(|n| n >= 2 && curves(n, 0) < CURVES && curves(n, 1) < CURVES && bows(n) < BOWS)
+        .collect();
+    (0..ticks).map(|n| (n.saturating_sub(reach)..(n + reach + 1).min(ticks)).all(|m| calm[m])).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::smooth;
+
+    #[test]
+    fn a_jump_is_not_smooth_and_what_has_settled_is() {
+        // The current steps at tick 50; shaft speed follows within 20 ticks.
+        let course: Vec<[f64; 3]> = (0..400)
+            .map(|n| {
+                let since = f64::from(n - 50).max(0.0);
+                [50.0 * (1.0 - (-since / 20.0).exp()), 0.0, if n > 50 { 6.0 } else { 0.0 }]
+            })
+            .collect();
+        let smooth = smooth(&course, 7);
+        assert_eq!(smooth.len(), 399);
+        assert!(smooth[20..40].iter().all(|s| *s), "at rest");
+        assert!(smooth[44..58].iter().all(|s| !s), "about the jump");
+        assert!(smooth[350..].iter().all(|s| *s), "settled");
+    }
+}
