@@ -90,6 +90,9 @@ impl Drop for Failures {
     }
 }
 
+/// Length of one of the programme's levels, s.
+const LEVEL_S: f64 = 1.0;
+
 /// A rig with a programme that uses all of it: steps both ways, a ramp through zero, reversals.
 struct Bench {
     name: &'static str,
@@ -110,7 +113,7 @@ fn bench(name: &'static str, text: &str) -> Bench {
         .map(|k| {
             let time_s = k as f64 * TICK_S;
             let share = if time_s < 10.0 {
-                levels[time_s as usize]
+                levels[(time_s / LEVEL_S) as usize]
             } else {
                 ((time_s - 10.0) / 2.0 - 1.0).clamp(-1.0, 1.0)
             };
@@ -288,7 +291,9 @@ fn each_strength_alone_is_visible() {
     for bench in benches() {
         for effect in ALL {
             let specs = (effect.parameters)(&bench.scale);
-            for (k, spec) in specs.iter().enumerate().filter(|(_, s)| !s.shape) {
+            // The first level is rest: what acts then alone is not seen.
+            let at_rest = |s: &Spec| s.acts.is_some_and(|a| a.from_s + a.length_s <= LEVEL_S);
+            for (k, spec) in specs.iter().enumerate().filter(|(_, s)| !s.shape && !at_rest(s)) {
                 let values: Vec<f64> = specs
                     .iter()
                     .enumerate()

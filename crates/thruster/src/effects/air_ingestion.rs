@@ -9,8 +9,9 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     id: "air_ingestion",
     path: Path::Blade,
     what: "bubbly water: air stirred in from the surface, a wake or a leak makes the mixture lighter, now more, now less",
-    equation: "rho (1 - f(t)); f(t) straight between knots [1], counted from its mean where the coefficients are free to take \
-               that. A share that does not change is an error of density (water_density)",
+    equation: "rho (1 - f(t)) at the blades, rho (1 - k f(t)) in the column ahead and behind; f(t) straight between knots [1], \
+               counted from its mean where the coefficients are free to take that; k from 0, bubbles at the disc only, to 1. A \
+               share that does not change is an error of density (water_density)",
     signature: "thrust and torque fall by the same fraction and come back, without a command and unlike an inflow: the shaft \
                 speeds up while thrust falls, nothing shows at rest",
     confused_with: &["ventilation", "water_density", "cavitation", "ambient_flow_unsteady"],
@@ -19,14 +20,17 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: one_start,
     needs: wet,
-    build: |values, _| Box::new(AirIngestion { fraction: Knots::new(values) }),
+    build: |values, _| Box::new(AirIngestion { column_share: values[0], fraction: Knots::new(&values[1..]) }),
 };
 
 fn parameters(scale: &Scale) -> Vec<Spec> {
-    knots::specs(scale, &knots::SHARE, "1", 0.05, -0.5, 0.7)
+    let mut specs = knots::specs(scale, &knots::SHARE, "1", 0.05, -0.5, 0.7);
+    specs.insert(0, Spec::shape("column_share", "1", 0.5, 0.0, 1.0));
+    specs
 }
 
 struct AirIngestion {
+    column_share: f64,
     fraction: Knots,
 }
 
@@ -39,9 +43,9 @@ impl Effect for AirIngestion {
         foil.density_kg_m3 *= 1.0 - self.fraction.at(at.time_s);
     }
 
-    /// The water ahead of and behind the blades is the same mixture.
+    /// Bubbles drawn in at the disc leave the column its mass; bubbles that come with the water do not.
     fn balance(&self, at: &Local, _: &[f64], balance: &mut Balance, _: &mut [f64]) {
-        let left = 1.0 - self.fraction.at(at.time_s);
+        let left = 1.0 - self.column_share * self.fraction.at(at.time_s);
         balance.flux_kg_m *= left;
         balance.added_mass_kg *= left;
     }
