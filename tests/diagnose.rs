@@ -6,6 +6,7 @@ mod lab;
 
 use std::sync::OnceLock;
 
+use kort_truth::{CaseKind, Selection};
 use lab::{STAND, Table, clean, dry_rig, effect, json, kort, path, random_levels, simulate, stderr, swirl};
 use serde_json::Value;
 
@@ -173,6 +174,19 @@ fn what_one_excitation_cannot_part_is_ambiguous_and_the_next_one_runs() {
     let output = kort(&["simulate", "--rig", STAND, "--scenario", &file, "-o", &out]);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     assert!(Table::read(&out).rows.len() > 1000);
+}
+
+/// Bubbles at the blades change by the second; a model of density alone, or of inflow, would bend to them.
+#[test]
+fn bubbles_that_come_and_go_are_told_from_an_unsteady_inflow() {
+    let selection =
+        Selection { effect: Some("air_ingestion".into()), strength: Some(0.03), ..Selection::default() };
+    let case = kort_truth::case(CaseKind::Single, 877, &selection);
+    let recording = lab::write("bubbles.csv", &case.recording_csv);
+    let rig = lab::write("bubbles.toml", &case.rig_toml);
+    let report = diagnose(&[&recording], &rig, &[]);
+    assert_eq!(report["verdict"], "explained", "{}", report["summary"]);
+    assert_eq!(found(&report), ["air_ingestion"]);
 }
 
 #[test]

@@ -13,7 +13,7 @@ use crate::errors;
 use crate::experiment;
 use crate::fit::{Fit, Problem, Stack, Target};
 use crate::heldout::{held_out_rows, longest_block_s};
-use crate::judge::{self, Outcome};
+use crate::judge::{self, Outcome, margin, mates};
 use crate::library::is_term;
 use crate::locate::{locate, since_edge};
 use crate::report::{
@@ -260,7 +260,12 @@ fn write(
             }
             let fit = with(&swapped);
             let held_rival = score(&without, &problem.residual_of(&fit));
-            if held_rival.excess_error_removed > rules::RIVAL_SHARE * held_here.excess_error_removed {
+            // What is known to be confused and comes as near as this on all the data stays a rival, though
+            // the part it is fitted to for the test may lead it astray.
+            let alike =
+                mates(rival, place.chosen) && distance < margin(place.gain) && !search.free_in_time(rival);
+            let removes = held_rival.excess_error_removed;
+            if alike || removes > rules::RIVAL_SHARE * held_here.excess_error_removed {
                 place.rivals.push(((rival, values), distance));
                 rival_fits.push((fit, held_rival));
             } else {

@@ -327,7 +327,8 @@ impl<'a> Problem<'a> {
             for k in 0..n {
                 scaled.column_mut(k).scale_mut(size[k]);
             }
-            let mut normal = scaled.tr_mul(&scaled);
+            // Blocked, which `tr_mul` is not: with eighty knots that counts.
+            let mut normal = scaled.transpose() * &scaled;
             let mut gradient = scaled.tr_mul(&residual);
             for k in 0..n {
                 if let Some((mean, sigma)) = free[k].prior {
@@ -355,7 +356,7 @@ impl<'a> Problem<'a> {
                 if !fresh {
                     break;
                 }
-                damping *= 30.0;
+                damping *= 100.0;
             }
             match outcome {
                 Some((gain, promised)) if gain > 0.75 * promised => {

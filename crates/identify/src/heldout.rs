@@ -71,7 +71,7 @@ fn left_out_of(problem: &Problem, fit: &mut Fit, block_s: f64) -> Vec<f64> {
     for f in 0..FOLDS {
         let part = j.select_rows(&rows_of[f]);
         let r = DVector::from_iterator(rows_of[f].len(), rows_of[f].iter().map(|i| fit.residual[*i]));
-        normals[f] = part.tr_mul(&part);
+        normals[f] = part.transpose() * &part;
         gradients[f] = part.tr_mul(&r);
     }
     let mut total: DMatrix<f64> = normals.iter().sum();

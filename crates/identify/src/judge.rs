@@ -49,7 +49,7 @@ pub fn margin(gain: f64) -> f64 {
 }
 
 /// Whether the catalogue says that two effects are confused.
-fn mates(a: &Descriptor, b: &Descriptor) -> bool {
+pub fn mates(a: &Descriptor, b: &Descriptor) -> bool {
     a.confused_with.contains(&b.id) || b.confused_with.contains(&a.id)
 }
 
@@ -258,7 +258,7 @@ fn leaves_too_much(search: &Search, baseline: &Fit, current: &Fit, places: &[Pla
 
 /// The best term of the whole library on the baseline, under the noise it leaves.
 fn switched(search: &mut Search, current: &mut Fit) -> Option<Candidate> {
-    let best = search.best_term(current)?;
+    let best = search.best_term(current, rules::TERM_LEAST)?;
     let saved = (search.problem.recordings.clone(), search.problem.whiteners.clone());
     search.problem.learn_noise(&best.fit.hypothesis, &best.fit.values);
     let before = search.again(current);
@@ -306,7 +306,7 @@ fn unnamed(
     let mut best = current.clone();
     let mut added = None;
     if !places.is_empty()
-        && let Some(top) = search.best_term(current)
+        && let Some(top) = search.best_term(current, needed)
         && criterion(current) - top.criterion > needed
         && search.size(current, &top.fit) > 2.0 * rules::LEAST_SIZE
     {
@@ -319,8 +319,11 @@ fn unnamed(
             let fit = search.again(&t.fit);
             Candidate { criterion: criterion(&fit), fit, ..t }
         });
-        let second =
-            if places.len() > 1 || added.is_some() { search.best_term(&mut baseline.clone()) } else { None };
+        let second = if places.len() > 1 || added.is_some() {
+            search.best_term(&mut baseline.clone(), rules::TERM_LEAST)
+        } else {
+            None
+        };
         first.into_iter().chain(second).min_by(|a, b| a.criterion.total_cmp(&b.criterion))
     } else {
         None
@@ -328,10 +331,14 @@ fn unnamed(
     if let Some(alone) = alone {
         let gain = base - alone.criterion;
         let all = base - criterion(&best);
-        let single = members(&search.problem, current)
-            .into_iter()
+        let all_found = members(&search.problem, current);
+        let single = all_found
+            .iter()
             .map(|m| {
-                let (hypothesis, columns) = recompose(current, &[m], &search.scale);
+                if all_found.len() == 1 {
+                    return named_gain;
+                }
+                let (hypothesis, columns) = recompose(current, std::slice::from_ref(m), &search.scale);
                 base - criterion(&search.problem.fit(&hypothesis, &columns, 5))
             })
             .fold(0.0_f64, f64::max);
@@ -400,13 +407,15 @@ fn contenders(
         .filter_map(|c| Some((own(c)?, (all.len() == 1).then(|| c.fit.clone()))))
         .collect();
     for mate in &search.named {
-        if mates(mate, leader) && free(mate.id) && list.iter().all(|c| c.0.0.id != mate.id) {
-            let starts = unscreened(mate, &search.scale).into_iter().map(|s| (*mate, s.start));
-            let cost_of =
-                |member: &Member| cost(&search.problem, &in_place(search, current, place, member.clone()).0);
-            let best = starts.map(|m| (cost_of(&m), m)).min_by(|a, b| a.0.total_cmp(&b.0));
-            list.extend(best.filter(|_| !amends(mate, &search.scale)).map(|b| (b.1, None)));
+        let strange = !mates(mate, leader) || amends(mate, &search.scale);
+        if strange || !free(mate.id) || list.iter().any(|c| c.0.0.id == mate.id) {
+            continue;
         }
+        let starts = unscreened(mate, &search.scale).into_iter().map(|s| (*mate, s.start));
+        let cost_of =
+            |member: &Member| cost(&search.problem, &in_place(search, current, place, member.clone()).0);
+        let best = starts.map(|m| (cost_of(&m), m)).min_by(|a, b| a.0.total_cmp(&b.0));
+        list.extend(best.map(|b| (b.1, None)));
     }
     list
 }
@@ -436,8 +445,17 @@ fn settle(search: &Search, current: &mut Fit, rounds: &[Vec<Candidate>]) -> Vec<
         let mut tried: Vec<(Member, Fit)> = contenders(search, current, i, candidates)
             .into_par_iter()
             .map(|(member, own)| {
+                // What stayed far behind in its round, under the same noise, is no rival.
+                if let Some(own) =
+                    own.as_ref().filter(|own| criterion(own) - now > rules::OUT_OF_THE_RACE * place.gain)
+                {
+                    return (member, own.clone());
+                }
                 let (hypothesis, columns) = in_place(search, current, i, member.clone());
-                let mut fit = search.problem.fit(&hypothesis, &columns, 10);
+                let mut fit = search.problem.fit(&hypothesis, &columns, 4);
+                if criterion(&fit) - now < rules::OUT_OF_THE_RACE * place.gain {
+                    fit = search.problem.again(&fit, 8);
+                }
                 if TIMING.contains(&member.0.id) && rounds.len() == 1 {
                     fit = search.with_own_edges(&fit, &[1.0]);
                 }
@@ -452,7 +470,8 @@ fn settle(search: &Search, current: &mut Fit, rounds: &[Vec<Candidate>]) -> Vec<
             let (member, fit) = tried.remove(0);
             let old = members(&search.problem, current).swap_remove(i);
             (place.chosen, place.gain) = (member.0, place.gain + now - criterion(&fit));
-            tried.insert(0, (old, std::mem::replace(current, fit)));
+            tried.push((old, std::mem::replace(current, fit)));
+            tried.sort_by(|a, b| criterion(&a.1).total_cmp(&criterion(&b.1)));
         }
         let now = criterion(current);
         let (rivals, aside): (Vec<_>, Vec<_>) = tried

@@ -17,7 +17,7 @@ pub(crate) const TIMING: [&str; 5] =
 impl Search<'_> {
     /// Re-fits chosen effects on top of a fit, best first.
     pub(crate) fn refit(&self, current: &Fit, chosen: &[Screened]) -> Vec<Candidate> {
-        let mut all: Vec<Candidate> = chosen
+        let first: Vec<Fit> = chosen
             .par_iter()
             .map(|s| {
                 // Under other equations what was fitted is no place to start from: what is stated is.
@@ -40,9 +40,20 @@ impl Search<'_> {
                     .map_or_else(|| at(&s.start), |best| best.1);
                 // Derivatives carry over, unless the equations are others.
                 let known = if amends(s.effect, &self.scale) { &[][..] } else { &current.columns };
-                let mut fit = self.problem.fit(&hypothesis, known, if known.is_empty() { 8 } else { 4 });
+                self.problem.fit(&hypothesis, known, if known.is_empty() { 8 } else { 3 })
+            })
+            .collect();
+        // Whoever trails far after the first steps is left there.
+        let base = criterion(current);
+        let best = first.iter().map(|fit| base - criterion(fit)).fold(0.0, f64::max);
+        let mut all: Vec<Candidate> = chosen
+            .par_iter()
+            .zip(first)
+            .map(|(s, mut fit)| {
                 if TIMING.contains(&s.effect.id) {
                     fit = self.with_own_edges(&fit, &[1.0, 2.0, 3.0]);
+                } else if base - criterion(&fit) > rules::SLOW_START * best {
+                    fit = self.problem.again(&fit, 4);
                 }
                 Candidate { effect: s.effect, criterion: criterion(&fit), fit, screened: s.gain }
             })

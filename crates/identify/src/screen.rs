@@ -51,7 +51,7 @@ impl Projector {
         for k in 0..n {
             scaled.column_mut(k).scale_mut(scale[k]);
         }
-        let mut normal = scaled.tr_mul(&scaled);
+        let mut normal = scaled.transpose() * &scaled;
         let mut gradient = scaled.tr_mul(&fit.residual);
         for (k, free) in fit.hypothesis.free.iter().enumerate() {
             if let Some((mean, sigma)) = free.prior {
@@ -91,13 +91,13 @@ impl Projector {
     /// Gram matrix and gradient of directions after the projection.
     pub fn project(&self, fit: &Fit, directions: &[DVector<f64>]) -> (DMatrix<f64>, DVector<f64>) {
         let d = DMatrix::from_columns(directions);
-        let mut cross = self.jacobian.tr_mul(&d);
+        let mut cross = self.jacobian.transpose() * &d;
         for (k, s) in self.scale.iter().enumerate() {
             let factor = if fit.at_bound[k] { 0.0 } else { *s };
             cross.row_mut(k).scale_mut(factor);
         }
         let solved = &self.inverse * &cross;
-        let gram = d.tr_mul(&d) - cross.tr_mul(&solved);
+        let gram = d.transpose() * &d - cross.tr_mul(&solved);
         let gradient = d.tr_mul(&fit.residual) - solved.tr_mul(&self.gradient);
         (gram, gradient)
     }

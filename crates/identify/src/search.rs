@@ -42,7 +42,7 @@ pub mod rules {
     /// ... or closer than this share of what the effect gains.
     pub const MARGIN_SHARE: f64 = 0.02;
     /// ... or, for effects that the catalogue knows to be confused, this share.
-    pub const MATES_SHARE: f64 = 0.06;
+    pub const MATES_SHARE: f64 = 0.09;
     /// How much better a term without a name must be than the best name, as a share of its gain.
     pub const TERM_SHARE: f64 = 0.06;
     /// Share of what several names explain together that one term alone must reach to replace them.
@@ -77,6 +77,14 @@ pub mod rules {
     pub const DRIVER_LEAVES: f64 = 4.0;
     /// A name must explain at least this share of what the best term explains to be followed.
     pub const LEAST_OF_TERM: f64 = 0.35;
+    /// Share of what the best gains, short of which a candidate is fitted no further under the best's noise.
+    pub const NEAR_THE_LEADER: f64 = 0.7;
+    /// Share of what a finding gains, by which a candidate may trail it and still be fitted as its rival.
+    pub const OUT_OF_THE_RACE: f64 = 0.3;
+    /// Share of the best gain, after the first steps of a fit, short of which a candidate goes no further.
+    pub const SLOW_START: f64 = 0.2;
+    /// Share of what something free in time gains, above which a name with a form of its own goes before it.
+    pub const FORMED_SHARE: f64 = 0.45;
     /// Most effects found in one recording.
     pub const MOST_FOUND: usize = 3;
     /// Effects re-fitted in a round.
@@ -112,9 +120,14 @@ pub struct Round {
     pub size: f64,
 }
 
-/// Criterion of a fit; infinite where the simulation broke down.
+/// Criterion of a fit; infinite where the simulation broke down. A parameter that moves nothing that was
+/// recorded (the zero of a transducer that is not there) costs nothing.
 pub fn criterion(fit: &Fit) -> f64 {
-    let of_effects = fit.hypothesis.free.iter().filter(|f| matches!(f.target, Target::Effect(..))).count();
+    let moves = |k: usize| {
+        fit.columns[k].as_ref().is_none_or(|stack| stack.iter().flatten().flatten().any(|v| *v != 0.0))
+    };
+    let of_effect = |k: &usize| matches!(fit.hypothesis.free[*k].target, Target::Effect(..));
+    let of_effects = (0..fit.hypothesis.free.len()).filter(of_effect).filter(|k| moves(*k)).count();
     let all = fit.chi2 + fit.penalty + rules::PER_PARAMETER * of_effects as f64;
     if all.is_finite() { all } else { f64::INFINITY }
 }
@@ -220,11 +233,17 @@ impl<'a> Search<'a> {
         let mut chosen = choose(&screened, least);
         chosen.extend(amending.into_iter().flat_map(|e| unscreened(e, &self.scale)));
         let mut candidates = self.refit(current, &chosen);
+        if let Some(best) =
+            candidates.first().filter(|c| criterion(current) - c.criterion > 0.3 * rules::BELIEVE)
+        {
+            *current = self.without_the_last(current, best);
+        }
         let base = criterion(current);
         if candidates.first().is_none_or(|c| base - c.criterion < 0.3 * rules::BELIEVE) {
             return None;
         }
         self.lead_by_own_noise(&mut candidates, base);
+        self.structured_first(&mut candidates, base);
         // Under the noise of the best so far the rivals part more sharply; that may change the best.
         let mut before = current.clone();
         for _ in 0..2 {
@@ -236,11 +255,14 @@ impl<'a> Search<'a> {
             let worth = base - candidates[0].criterion;
             candidates.retain(|c| c.effect.id == leader || base - c.criterion > 0.4 * worth);
             candidates.truncate(6);
-            before = self.again(&before);
+            before = self.without_the_last(&self.again(&before), &best);
             candidates = candidates
                 .into_par_iter()
                 .map(|c| {
-                    let fit = if TIMING.contains(&c.effect.id) {
+                    let far = base - c.criterion < rules::NEAR_THE_LEADER * worth;
+                    let fit = if far {
+                        self.problem.fit(&c.fit.resume(), &c.fit.columns, 0)
+                    } else if TIMING.contains(&c.effect.id) {
                         self.with_own_edges(&c.fit, &[1.0])
                     } else {
                         self.again(&c.fit)
@@ -249,6 +271,7 @@ impl<'a> Search<'a> {
                 })
                 .collect();
             sort(&mut candidates);
+            self.structured_first(&mut candidates, criterion(&before));
             if candidates[0].effect.id == leader {
                 break;
             }
@@ -267,7 +290,10 @@ impl<'a> Search<'a> {
                     && (left_out > gain * rules::HOLDS_KNOTS
                         || self.removed_on_held_out(&before, &leader.fit) > rules::HOLDS_KNOTS)
             } else {
+                // The first-order look fails thresholds and whatever moves far; the full form is for what is clear.
                 size > rules::LEAST_SIZE && left_out > gain * rules::HOLDS
+                    || size > rules::CLEAR_SIZE
+                        && self.removed_on_held_out(&before, &leader.fit) > rules::HOLDS
             };
             if holds || candidates.len() == 1 {
                 break;
@@ -276,6 +302,31 @@ impl<'a> Search<'a> {
         }
         let best = &candidates[0];
         Some(Round { holds, size: self.size(&before, &best.fit), before, candidates })
+    }
+
+    /// The smaller fit, once more from where a candidate has moved what they share, if that is better:
+    /// what a fit stuck on its way would gain there is no merit of the candidate.
+    fn without_the_last(&self, smaller: &Fit, candidate: &Candidate) -> Fit {
+        if amends(candidate.effect, &self.scale) {
+            return smaller.clone();
+        }
+        let start = candidate.fit.values[..smaller.values.len()].to_vec();
+        let from_there = Hypothesis { start, ..smaller.hypothesis.clone() };
+        let fit = self.problem.fit(&from_there, &smaller.columns, 6);
+        if criterion(&fit) < criterion(smaller) { fit } else { smaller.clone() }
+    }
+
+    /// What changes freely with time bends to any physics a little: a name with a form of its own that
+    /// explains nearly half as much goes first, and what it leaves is looked at again.
+    fn structured_first(&self, candidates: &mut Vec<Candidate>, base: f64) {
+        let worth = base - candidates[0].criterion;
+        let formed = |c: &Candidate| !is_term(c.effect) && !self.free_in_time(c.effect);
+        let best =
+            candidates.iter().position(|c| formed(c) && base - c.criterion > rules::FORMED_SHARE * worth);
+        if let Some(best) = best.filter(|_| self.free_in_time(candidates[0].effect)) {
+            let leader = candidates.remove(best);
+            candidates.insert(0, leader);
+        }
     }
 
     /// Share of the squared error above the noise that a fit removes on rows it was not fitted to: the
@@ -313,8 +364,8 @@ impl<'a> Search<'a> {
         (effect.parameters)(&self.scale).iter().any(|p| p.acts.is_some())
     }
 
-    /// The best term without a name on top of a fit, if any promises something.
-    pub fn best_term(&mut self, current: &mut Fit) -> Option<Candidate> {
+    /// The best term without a name on top of a fit, if any promises half of what is needed at `least`.
+    pub fn best_term(&mut self, current: &mut Fit, least: f64) -> Option<Candidate> {
         // Changes in mid-run that were found hold more than one switch could add.
         let changed = current.hypothesis.effects.iter().any(|e| changes::is_change(e));
         let terms: Vec<&'static Descriptor> =
@@ -323,7 +374,7 @@ impl<'a> Search<'a> {
         let mut chosen: Vec<Screened> = Vec::new();
         for s in screened {
             let fresh = chosen.iter().all(|c| c.effect.id != s.effect.id);
-            if fresh && s.gain > 0.5 * rules::TERM_LEAST && s.size > rules::LEAST_SIZE && chosen.len() < 4 {
+            if fresh && s.gain > 0.5 * least && s.size > rules::LEAST_SIZE && chosen.len() < 4 {
                 chosen.push(s);
             }
         }
