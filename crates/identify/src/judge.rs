@@ -134,7 +134,9 @@ fn names(
             let others = best_term.as_ref().map_or(0.0, |t| base - t.criterion);
             let clear = round.size > rules::CLEAR_SIZE && commanded(&search.problem);
             let weighty = gain > rules::SHARE_OF_FIRST * so_far || clear;
-            gain > rules::BELIEVE && weighty && gain > rules::LEAST_OF_TERM * others
+            // What is free in time bends to any physics: it must do better than a term of two numbers.
+            let of_term = if search.free_in_time(best.effect) { 1.0 } else { rules::LEAST_OF_TERM };
+            gain > rules::BELIEVE && weighty && gain > of_term * others
         });
         let holds = round.holds;
         let list: Vec<String> =
