@@ -6,7 +6,7 @@ use kort_thruster::rig::Rig;
 use maud::{Markup, html};
 
 use super::text::error_rows;
-use super::verdict::{badge, gain, percent, plain, scenario, spans};
+use super::verdict::{SHOWN, badge, gain, percent, plain, scenario, spans};
 use super::{Page, curves, facts, note, number, table};
 
 /// The page.
@@ -96,6 +96,7 @@ fn finding(f: &Finding) -> Markup {
     }
 }
 
+/// A finding's values, the first few open.
 fn values(parameters: &[ParameterReport]) -> Markup {
     let rows: Vec<Vec<String>> = parameters
         .iter()
@@ -109,7 +110,14 @@ fn values(parameters: &[ParameterReport]) -> Markup {
             ]
         })
         .collect();
-    table(&["value of", "fitted", "standard error", "unit", ""], &rows)
+    let head = ["value of", "fitted", "standard error", "unit", ""];
+    let (shown, folded) = rows.split_at(rows.len().min(SHOWN));
+    html! {
+        (table(&head, shown))
+        @if !folded.is_empty() {
+            details { summary { "and " (folded.len()) " more" } (table(&head, folded)) }
+        }
+    }
 }
 
 fn empirical(term: &EmpiricalTerm) -> Markup {

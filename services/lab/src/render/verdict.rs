@@ -29,6 +29,9 @@ pub fn percent(x: f64) -> String {
     format!("{:.0} %", 100.0 * x)
 }
 
+/// Values of a finding that are shown at once: what is free in time has eighty.
+pub const SHOWN: usize = 8;
+
 /// `value ± error unit`.
 pub fn value(p: &ParameterReport) -> String {
     let unit = if p.unit == "1" { "" } else { &p.unit };
@@ -157,9 +160,13 @@ fn finding(sheet: &mut Sheet, f: &Finding) {
     sheet.item(&format!("{} ({} path), probability {}", plain(&f.effect), f.path, short(f.probability)));
     sheet.more(&f.statement);
     sheet.more(&f.equation);
-    for p in &f.parameters {
+    let (shown, folded) = f.parameters.split_at(f.parameters.len().min(SHOWN));
+    for p in shown {
         let bound = if p.at_bound == Some(true) { " (at its bound)" } else { "" };
         sheet.more(&format!("{}{bound}", value(p)));
+    }
+    if let (Some(first), Some(last)) = (folded.first(), folded.last()) {
+        sheet.more(&format!("{} to {}: in the JSON and on the page", first.name, last.name));
     }
     sheet.more(&gain(&f.heldout));
     heldout(sheet, &f.heldout);
