@@ -11,8 +11,7 @@ use kort_thruster::rig::Rig;
 
 use crate::data::Prepared;
 
-/// Change of curvature over a tick, as a share of the largest state, below which a tick is smooth. The error
-/// of a step is some hundredth of it.
+/// Change of curvature over a tick, as a share of the largest state, below which a tick is smooth.
 const CURVES: f64 = 1e-4;
 /// The same for the bow of the current within a tick.
 const BOWS: f64 = 1e-4;
@@ -37,8 +36,8 @@ impl Prepared {
 }
 
 /// Which ticks of a course (shaft speed, axial flow, current at every tick's start and the last one's end)
-/// are smooth, and have nothing else within `reach` ticks before them or beginning in the next: the
-/// command's jumps may yet be moved within a log interval.
+/// are smooth, with nothing but smooth ticks within `reach` before and after: the command's jumps may yet
+/// be moved within a log interval.
 fn smooth(course: &[[f64; 3]], reach: usize) -> Vec<bool> {
     let ticks = course.len().saturating_sub(1);
     let top = |k: usize| course.iter().fold(1e-9_f64, |m, x| m.max(x[k].abs()));

@@ -1,6 +1,6 @@
 //! Strengths that act at different times can be moved in one simulation: each sample's change
-//! then belongs to the one that acted last. A spline of forty knots costs a handful of
-//! simulations instead of forty.
+//! then belongs to the one that acted last. A spline of eighty knots costs a handful of
+//! simulations instead of eighty.
 
 use kort_thruster::effects::Stretch;
 
