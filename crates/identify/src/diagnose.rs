@@ -13,7 +13,7 @@ use crate::errors;
 use crate::experiment;
 use crate::fit::{Fit, Problem, Stack, Target};
 use crate::heldout::{held_out_rows, longest_block_s};
-use crate::judge::{self, Outcome, margin, mates};
+use crate::judge::{self, Outcome, Place, margin, mates};
 use crate::library::is_term;
 use crate::locate::{locate, since_edge};
 use crate::report::{
@@ -231,7 +231,7 @@ fn write(
 
     let all = members(&search.problem, &last_train);
     let total_gain: f64 = outcome.places.iter().map(|p| p.gain).sum();
-    let top_gain = outcome.places.iter().map(|p| p.gain).fold(0.0, f64::max);
+    let gains: Vec<(&Descriptor, f64)> = outcome.places.iter().map(|p| (p.chosen, p.gain)).collect();
     let single = outcome.places.len() == 1;
     let mut findings = Vec::new();
     let mut weak: Vec<&str> = Vec::new();
@@ -243,7 +243,7 @@ fn write(
         let without =
             if rest.is_empty() { residual_baseline.clone() } else { problem.residual_of(&with(&rest)) };
         let held_here = score(&without, &residual_last);
-        if place.gain < top_gain && held_here.excess_error_removed < rules::LEAST_OF_A_FINDING {
+        if held_here.excess_error_removed < least_beside_others(search, place, &gains) {
             // Beside a larger find, a name that hardly removes anything on new data is none.
             weak.push(place.chosen.id);
             if !is_term(place.chosen) {
@@ -331,8 +331,8 @@ fn write(
     {
         mismatch.push(bare_mismatch(search, &outcome.baseline, &baseline_full, channel, size, &speed));
     }
+    let everything = score(&residual_baseline, &residual_last).excess_error_removed;
     if findings.len() > 1 {
-        let everything = score(&residual_baseline, &residual_last).excess_error_removed;
         notes.push(format!(
             "everything found together removes {:.0} % of the error above the noise on held-out data",
             100.0 * everything
@@ -341,7 +341,10 @@ fn write(
     // Best first: what explains most, and of its rivals the likeliest.
     findings.sort_by(|a, b| b.0.total_cmp(&a.0).then(b.1.probability.total_cmp(&a.1.probability)));
     let mut findings: Vec<Finding> = findings.into_iter().map(|f| f.1).collect();
-    let verdict = verdict(&outcome, &findings, thin.is_some());
+    let verdict = verdict(&outcome, &findings, everything, thin.is_some());
+    if verdict == Verdict::Unexplained {
+        findings.iter_mut().for_each(|f| f.probability *= rules::BESIDE_UNKNOWN);
+    }
     if outcome.excess.is_some() && verdict == Verdict::Unexplained {
         // Much is left: a name that hardly removes anything of it is no finding.
         let (kept, weak): (Vec<Finding>, Vec<Finding>) =
@@ -393,7 +396,23 @@ fn write(
     Diagnosis { report, traces: traces(&search.problem, &baseline_full, &last_full, &speed) }
 }
 
-fn verdict(outcome: &Outcome, findings: &[Finding], thin: bool) -> Verdict {
+/// Share of the held-out error above the noise that a find must remove beside others.
+fn least_beside_others(search: &Search, place: &Place, gains: &[(&Descriptor, f64)]) -> f64 {
+    let overshadows = |other: &(&Descriptor, f64)| {
+        mates(place.chosen, other.0) && other.1 > rules::RELATIVE_GAIN * place.gain
+    };
+    if gains.len() == 1 {
+        f64::NEG_INFINITY
+    } else if gains.iter().all(|other| other.1 <= place.gain) {
+        rules::LEAST_OF_A_FINDING
+    } else if search.free_in_time(place.chosen) || gains.iter().any(overshadows) {
+        rules::LEAST_OF_A_RELATIVE
+    } else {
+        rules::LEAST_OF_A_LATER_FINDING
+    }
+}
+
+fn verdict(outcome: &Outcome, findings: &[Finding], everything: f64, thin: bool) -> Verdict {
     let removed = findings.iter().map(|f| f.heldout.excess_error_removed).fold(0.0, f64::max);
     let total: f64 = outcome.places.iter().map(|p| p.gain).sum();
     let unnamed: f64 = outcome.places.iter().filter(|p| is_term(p.chosen)).map(|p| p.gain).sum();
@@ -403,6 +422,7 @@ fn verdict(outcome: &Outcome, findings: &[Finding], thin: bool) -> Verdict {
         if thin { Verdict::InsufficientData } else { Verdict::NoMismatch }
     } else if unnamed > rules::UNNAMED_SHARE * total
         || outcome.excess.is_some() && removed < rules::LEAST_REMOVED
+        || everything.max(removed) < rules::LEAST_REMOVED_EVER
     {
         Verdict::Unexplained
     } else if outcome.places.iter().any(|p| !p.rivals.is_empty()) {

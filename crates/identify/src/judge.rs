@@ -260,15 +260,14 @@ fn leaves_too_much(search: &Search, baseline: &Fit, current: &Fit, places: &[Pla
 
 /// The best term of the whole library on the baseline, under the noise it leaves.
 fn switched(search: &mut Search, current: &mut Fit) -> Option<Candidate> {
-    let best = search.best_term(current, rules::TERM_LEAST)?;
     let saved = (search.problem.recordings.clone(), search.problem.whiteners.clone());
-    search.problem.learn_noise(&best.fit.hypothesis, &best.fit.values);
-    let before = search.again(current);
-    let fit = search.again(&best.fit);
-    let gain = criterion(&before) - criterion(&fit);
-    if gain > rules::BELIEVE && search.size(&before, &fit) > rules::LEAST_SIZE {
+    let mut before = current.clone();
+    let best = search.best_term_under_its_noise(&mut before, rules::TERM_LEAST)?;
+    if criterion(&before) - best.criterion > rules::BELIEVE
+        && search.size(&before, &best.fit) > rules::LEAST_SIZE
+    {
         *current = before;
-        return Some(Candidate { criterion: criterion(&fit), fit, ..best });
+        return Some(best);
     }
     (search.problem.recordings, search.problem.whiteners) = saved;
     None
@@ -334,18 +333,26 @@ fn unnamed(
         let gain = base - alone.criterion;
         let all = base - criterion(&best);
         let all_found = members(&search.problem, current);
-        let single = all_found
+        let (free, formed): (Vec<&Member>, Vec<&Member>) =
+            all_found.iter().partition(|m| search.free_in_time(m.0));
+        // Beside a name with a form of its own, what changes freely with time is no measure for a term.
+        let measures = if formed.is_empty() { &free } else { &formed };
+        let single = measures
             .iter()
             .map(|m| {
                 if all_found.len() == 1 {
                     return named_gain;
                 }
-                let (hypothesis, columns) = recompose(current, std::slice::from_ref(m), &search.scale);
+                let (hypothesis, columns) = recompose(current, std::slice::from_ref(*m), &search.scale);
                 base - criterion(&search.problem.fit(&hypothesis, &columns, 5))
             })
             .fold(0.0_f64, f64::max);
         let several = places.len() + usize::from(added.is_some()) > 1;
-        if places.is_empty() || gain > single + needed && (!several || gain > rules::TERM_ALONE * all) {
+        let reach = if free.is_empty() { rules::TERM_ALONE } else { rules::TERM_FOR_KNOTS };
+        let ahead = gain > single + rules::TERM_LEAST.max(rules::TERM_AHEAD * named_gain);
+        let better = ahead && (!several || gain > reach * all);
+        let simpler = places.len() > 1 && gain > all;
+        if places.is_empty() || better || simpler {
             let aside = places.drain(..).map(|p| (p.chosen, (gain - p.gain).max(0.0))).collect();
             *places = vec![Place { aside, ..place(alone.effect, gain) }];
             *current = alone.fit;

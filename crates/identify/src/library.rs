@@ -1,5 +1,5 @@
-//! Terms without a name: signed and even powers of the states on each path, products, and
-//! loads that switch on at some time. They judge whether a named effect is good enough, and say
+//! Terms without a name: signed and even powers of the states on each path, products, steps at some
+//! speed or flow, and loads that switch on at some time. They judge whether a named effect is good enough, and say
 //! what is known where none is.
 
 use kort_thruster::effects::{Descriptor, Effect, Hooks, Path, Scale, Spec, free_shaft, one_start, wet};
@@ -10,12 +10,14 @@ pub const TERMS: &[&Descriptor] = &[
     &SHAFT_ODD,
     &SHAFT_EVEN,
     &SHAFT_FLOW,
+    &SHAFT_STEP,
     &SHAFT_SWITCHED,
     &DRIVE_ODD,
     &DRIVE_SWITCHED,
     &BLADE_THRUST_ODD,
     &BLADE_THRUST_EVEN,
     &BLADE_THRUST_FLOW,
+    &BLADE_THRUST_STEP,
     &BLADE_TORQUE_ODD,
     &FLOW_ODD,
     &FLOW_EVEN,
@@ -94,13 +96,19 @@ fn values(v: &[f64]) -> Values {
 /// `sgn(x) |x/x0|^p`, smooth at zero.
 fn odd(x: f64, v: &Values) -> f64 {
     let u = x / v.reference;
-    u.signum() * (u * u + 1e-6).powf(0.5 * v.shape) * (30.0 * u).tanh().abs()
+    u.signum() * (u * u + 1e-6).powf(0.5 * v.shape) * (100.0 * u).tanh().abs()
 }
 
 /// `|x/x0|^p`, smooth at zero.
 fn even(x: f64, v: &Values) -> f64 {
     let u = x / v.reference;
     (u * u + 1e-6).powf(0.5 * v.shape)
+}
+
+/// 0 below, 1 above a threshold (a share of the reference), on either side of zero.
+fn above(x: f64, v: &Values) -> f64 {
+    let past = ((x / v.reference).abs() - v.shape) / 0.03;
+    0.5 * (1.0 + past.tanh())
 }
 
 /// 0 before, 1 after the time of switching, over a tenth of a second.
@@ -114,6 +122,15 @@ fn power(name: &'static str, unit: &'static str, size: f64, reference: f64) -> V
         Spec::strength(name, unit, size, -reach, reach),
         Spec::shape("reference", "SI", reference, reference, reference),
         Spec::shape("exponent", "1", 0.7, 0.0, 4.0),
+    ]
+}
+
+fn step(name: &'static str, unit: &'static str, size: f64, reference: f64) -> Vec<Spec> {
+    let reach = 20.0 * size;
+    vec![
+        Spec::strength(name, unit, size, -reach, reach),
+        Spec::shape("reference", "SI", reference, reference, reference),
+        Spec::shape("threshold", "1", 0.5, 0.1, 1.0),
     ]
 }
 
@@ -134,6 +151,10 @@ fn switch(name: &'static str, unit: &'static str, size: f64, scale: &Scale) -> V
 
 fn exponents(specs: Vec<Spec>) -> Vec<Vec<f64>> {
     [3.0].into_iter().map(|p| vec![specs[0].start, specs[1].start, p]).collect()
+}
+
+fn thresholds(specs: Vec<Spec>) -> Vec<Vec<f64>> {
+    [0.3, 0.65, 0.8].into_iter().map(|p| vec![specs[0].start, specs[1].start, p]).collect()
 }
 
 fn times(specs: Vec<Spec>, scale: &Scale) -> Vec<Vec<f64>> {
@@ -169,8 +190,14 @@ fn boxed(v: &[f64], act: Act) -> Box<dyn Effect> {
 fn shaft(s: &Scale) -> Vec<Spec> {
     power("shaft_torque_n_m", "N m", 0.02 * s.torque_n_m, s.shaft_speed_rad_s)
 }
+fn shaft_step(s: &Scale) -> Vec<Spec> {
+    step("shaft_torque_n_m", "N m", 0.02 * s.torque_n_m, s.shaft_speed_rad_s)
+}
 fn blade_thrust(s: &Scale) -> Vec<Spec> {
     power("thrust_n", "N", 0.02 * s.thrust_n, s.shaft_speed_rad_s)
+}
+fn blade_thrust_step(s: &Scale) -> Vec<Spec> {
+    step("thrust_n", "N", 0.02 * s.thrust_n, s.flow_m_s)
 }
 fn blade_torque(s: &Scale) -> Vec<Spec> {
     power("blade_torque_n_m", "N m", 0.02 * s.torque_n_m, s.shaft_speed_rad_s)
@@ -227,6 +254,21 @@ term!(
     one_start,
     |v, _| {
         boxed(v, |v, at, b| b.shaft_torque_n_m -= v.size * odd(at.shaft_speed_rad_s, v) * at.axial_m_s.abs())
+    }
+);
+term!(
+    SHAFT_STEP,
+    "term_shaft_step",
+    Path::Shaft,
+    "shaft torque -k sgn(Om) where |Om| > p Om0",
+    free_shaft,
+    shaft_step,
+    |s| thresholds(shaft_step(s)),
+    |v, _| {
+        boxed(v, |v, at, b| {
+            let speed = at.shaft_speed_rad_s;
+            b.shaft_torque_n_m -= v.size * speed.signum() * above(speed, v);
+        })
     }
 );
 term!(
@@ -297,11 +339,23 @@ term!(
     |v, _| { boxed(v, |v, at, b| b.thrust_n += v.size * odd(at.shaft_speed_rad_s, v) * at.axial_m_s.abs()) }
 );
 term!(
+    BLADE_THRUST_STEP,
+    "term_blade_thrust_step",
+    Path::Blade,
+    "thrust + k sgn(Om) where |vp| > p v0",
+    wet,
+    blade_thrust_step,
+    |s| thresholds(blade_thrust_step(s)),
+    |v, _| {
+        boxed(v, |v, at, b| b.thrust_n += v.size * at.shaft_speed_rad_s.signum() * above(at.axial_m_s, v))
+    }
+);
+term!(
     BLADE_TORQUE_ODD,
     "term_blade_torque_odd",
     Path::Blade,
     "blade torque + k sgn(Om) |Om/Om0|^p",
-    wet,
+    torque_measured,
     blade_torque,
     |s| exponents(blade_torque(s)),
     |v, _| { boxed(v, |v, at, b| b.blade_torque_n_m += v.size * odd(at.shaft_speed_rad_s, v)) }
@@ -444,6 +498,15 @@ pub fn thrust_measured(
     available: &kort_thruster::effects::Available,
 ) -> Result<(), &'static str> {
     if available.has("thrust_n") { Ok(()) } else { Err("thrust is not recorded") }
+}
+
+/// Without a torque transducer what the blades ask of the shaft cannot be told from any other load on it.
+fn torque_measured(
+    rig: &kort_thruster::rig::Rig,
+    available: &kort_thruster::effects::Available,
+) -> Result<(), &'static str> {
+    wet(rig, available)?;
+    if available.has("torque_n_m") { Ok(()) } else { Err("torque is not recorded") }
 }
 
 /// A command drives the model.

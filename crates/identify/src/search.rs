@@ -43,10 +43,15 @@ pub mod rules {
     pub const MARGIN_SHARE: f64 = 0.02;
     /// ... or, for effects that the catalogue knows to be confused, this share.
     pub const MATES_SHARE: f64 = 0.09;
-    /// How much better a term without a name must be than the best name, as a share of its gain.
+    /// How much better a term without a name must be than the best name to take its place, as a share of
+    /// what the names gain.
+    pub const TERM_AHEAD: f64 = 0.025;
+    /// What a term must gain on top of names to stand beside them, as a share of what they gain.
     pub const TERM_SHARE: f64 = 0.06;
     /// Share of what several names explain together that one term alone must reach to replace them.
     pub const TERM_ALONE: f64 = 0.85;
+    /// ... where one of the names changes freely with time and so bends to any physics.
+    pub const TERM_FOR_KNOTS: f64 = 0.6;
     /// Least gain of a term.
     pub const TERM_LEAST: f64 = 20.0;
     /// Error above the noise, root mean square over full scale, below which nothing is sought:
@@ -69,8 +74,20 @@ pub mod rules {
     pub const RIVAL_SHARE: f64 = 0.6;
     /// Share of the held-out error above the noise that names must remove where much is left beside them.
     pub const LEAST_REMOVED: f64 = 0.5;
-    /// Share below which a name is set aside where much is left, or where another explains more.
+    /// ... and anywhere.
+    pub const LEAST_REMOVED_EVER: f64 = 0.35;
+    /// Share below which a name is set aside where much is left.
     pub const LEAST_OF_A_FINDING: f64 = 0.2;
+    /// ... where another explains more.
+    pub const LEAST_OF_A_LATER_FINDING: f64 = 0.4;
+    /// ... by something free in time, which bends to anything a little; or by a relative where another has
+    /// several times its gain: the rest of an effect whose true form differs from ours looks like what it is
+    /// known to be confused with.
+    pub const LEAST_OF_A_RELATIVE: f64 = 0.8;
+    /// How many times the gain of its relative that is.
+    pub const RELATIVE_GAIN: f64 = 4.0;
+    /// How much less sure a name is beside physics that has none.
+    pub const BESIDE_UNKNOWN: f64 = 0.3;
     /// Share of the gain that terms without a name may hold beside names.
     pub const UNNAMED_SHARE: f64 = 0.15;
     /// How much more names may leave where a measured column drives.
@@ -366,6 +383,31 @@ impl<'a> Search<'a> {
 
     /// The best term without a name on top of a fit, if any promises half of what is needed at `least`.
     pub fn best_term(&mut self, current: &mut Fit, least: f64) -> Option<Candidate> {
+        let terms = self.terms_on(current, least);
+        likelier(terms, criterion(current))
+    }
+
+    /// The same, with the terms compared under the noise that the best of them leaves.
+    pub fn best_term_under_its_noise(&mut self, current: &mut Fit, least: f64) -> Option<Candidate> {
+        let mut terms = self.terms_on(current, least);
+        terms.first()?;
+        self.lead_by_own_noise(&mut terms, criterion(current));
+        let best = &terms[0];
+        self.problem.learn_noise(&best.fit.hypothesis, &best.fit.values);
+        *current = self.again(current);
+        terms = terms
+            .into_par_iter()
+            .map(|t| {
+                let fit = self.again(&t.fit);
+                Candidate { criterion: criterion(&fit), fit, ..t }
+            })
+            .collect();
+        sort(&mut terms);
+        likelier(terms, criterion(current))
+    }
+
+    /// Terms without a name on top of a fit that promise half of what is needed at `least`, best first.
+    fn terms_on(&mut self, current: &mut Fit, least: f64) -> Vec<Candidate> {
         // Changes in mid-run that were found hold more than one switch could add.
         let changed = current.hypothesis.effects.iter().any(|e| changes::is_change(e));
         let terms: Vec<&'static Descriptor> =
@@ -378,16 +420,7 @@ impl<'a> Search<'a> {
                 chosen.push(s);
             }
         }
-        let mut fitted = self.refit(current, &chosen);
-        // At one speed a load that comes on and a drive that loses gain look alike: the load is
-        // the likelier of the two.
-        let best = fitted.first()?;
-        let doubt = rules::TERM_LEAST.max(rules::TERM_SHARE * (criterion(current) - best.criterion));
-        let load = (best.effect.id == "term_drive_switched")
-            .then(|| fitted.iter().position(|c| c.effect.id == "term_shaft_switched"))
-            .flatten()
-            .filter(|k| fitted[*k].criterion - fitted[0].criterion < doubt);
-        Some(fitted.swap_remove(load.unwrap_or(0)))
+        self.refit(current, &chosen)
     }
 
     /// Largest root mean square difference of two fits' responses over full scale.
@@ -396,6 +429,18 @@ impl<'a> Search<'a> {
         let x = difference(self.problem.respond(&a.hypothesis, &a.values), &y);
         self.problem.size(&x)
     }
+}
+
+/// The first of the terms, but at one speed a load that comes on and a drive that loses gain look alike:
+/// the load is the likelier of the two.
+fn likelier(mut terms: Vec<Candidate>, base: f64) -> Option<Candidate> {
+    let best = terms.first()?;
+    let doubt = rules::TERM_LEAST.max(rules::TERM_SHARE * (base - best.criterion));
+    let load = (best.effect.id == "term_drive_switched")
+        .then(|| terms.iter().position(|c| c.effect.id == "term_shaft_switched"))
+        .flatten()
+        .filter(|k| terms[*k].criterion - terms[0].criterion < doubt);
+    Some(terms.swap_remove(load.unwrap_or(0)))
 }
 
 /// Which screened starts are worth a re-fit: the best by promise, a second start where it

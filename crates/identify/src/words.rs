@@ -18,7 +18,7 @@ const SURE: f64 = 0.94;
 /// Probabilities of the chosen effect and its rivals. A distance in the criterion counts less
 /// than its size in log-likelihood says, because the true form differs a little from ours.
 pub fn odds(place: &Place) -> Vec<f64> {
-    let weight = |other: &Descriptor, distance: f64| (-distance.max(0.0) / (0.25 * near(place, other))).exp();
+    let weight = |other: &Descriptor, distance: f64| (-distance.max(0.0) / (0.1 * near(place, other))).exp();
     let mut weights = vec![1.0];
     weights.extend(place.rivals.iter().map(|r| weight(r.0.0, r.1)));
     let aside: f64 = place.aside.iter().filter(|a| !is_term(a.0)).map(|a| weight(a.0, a.1)).sum();
@@ -136,7 +136,9 @@ pub fn enters(term: &Descriptor) -> (&'static str, &'static [&'static str]) {
         "term_drive_switched" => ("drive command", &["command", "time_s"]),
         id if id.starts_with("term_drive") => ("drive command", &["command"]),
         "term_blade_torque_odd" => ("blade torque [N m]", &["shaft_speed_rad_s"]),
-        "term_blade_thrust_flow" => ("thrust [N]", &["shaft_speed_rad_s", "flow_m_s"]),
+        "term_blade_thrust_flow" | "term_blade_thrust_step" => {
+            ("thrust [N]", &["shaft_speed_rad_s", "flow_m_s"])
+        }
         id if id.starts_with("term_blade") => ("thrust [N]", &["shaft_speed_rad_s"]),
         "term_flow_switched" => ("ambient flow [m/s]", &["time_s"]),
         id if id.starts_with("term_flow") => ("force on the axial flow [N]", &["flow_m_s"]),
@@ -158,6 +160,9 @@ pub fn expression(term: &Descriptor, values: &[f64], driver: Option<&str>) -> St
     );
     if term.id.ends_with("_switched") {
         text = text.replace("from a time on", &format!("from t = {shape:.2} s on"));
+    }
+    for symbol in ["p Om0", "p v0"] {
+        text = text.replace(symbol, &format!("{:.4}", shape * reference));
     }
     for (symbol, value) in [("Om0", reference), ("u0", reference), ("v0", reference), ("T0", reference)] {
         text = text.replace(symbol, &format!("{value:.4}"));
