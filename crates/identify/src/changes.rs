@@ -18,8 +18,9 @@ use crate::fit::{Fit, Hypothesis, Problem, Target};
 use crate::heldout::{held_out_rows, trained};
 use crate::library::{commanded, thrust_measured};
 use crate::noise::Whitener;
+use crate::rules;
 use crate::screen::Projector;
-use crate::search::{Search, criterion, rules};
+use crate::search::{Search, criterion};
 
 /// Most changes in one recording.
 const MOST: usize = 6;

@@ -19,7 +19,8 @@ use crate::locate::{locate, since_edge};
 use crate::report::{
     Alternative, Baseline, EmpiricalTerm, Finding, HeldOut, Mismatch, ParameterReport, Report, Verdict,
 };
-use crate::search::{Search, rules};
+use crate::rules;
+use crate::search::Search;
 use crate::words;
 
 /// How to diagnose.

@@ -12,7 +12,8 @@ use crate::errors;
 use crate::fit::{Columns, Fit, Hypothesis, Problem};
 use crate::library::is_term;
 use crate::refit::{TIMING, amends, cost, unscreened};
-use crate::search::{Candidate, Search, criterion, rules};
+use crate::rules;
+use crate::search::{Candidate, Search, criterion};
 
 /// One place in the explanation: an effect, and those that would do as well.
 #[derive(Clone)]

@@ -19,6 +19,7 @@ pub mod noise;
 mod refit;
 pub mod refuse;
 pub mod report;
+pub mod rules;
 pub mod screen;
 pub mod search;
 mod smooth;

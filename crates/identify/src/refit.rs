@@ -7,8 +7,9 @@ use rayon::prelude::*;
 use crate::baseline::with_effect;
 use crate::fit::{Fit, Hypothesis, Problem, Target};
 use crate::noise::Whitener;
+use crate::rules;
 use crate::screen::Screened;
-use crate::search::{Candidate, Search, criterion, rules};
+use crate::search::{Candidate, Search, criterion};
 
 /// Effects that shift signals in time, and so depend on where the edges of the command lie.
 pub(crate) const TIMING: [&str; 5] =
