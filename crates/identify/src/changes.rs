@@ -5,10 +5,12 @@
 //! instants. Colour learned from a model without them would hide them (a step is slow noise), so
 //! they are sought under flat noise, and judged under the noise that they leave.
 
+use kort_thruster::both;
 use kort_thruster::effects::{
     Available, Descriptor, Effect, Hooks, Path, Scale, Spec, free_shaft, one_start, wet,
 };
 use kort_thruster::plant::{Balance, Drive, Local, Sensed, Tick};
+use kort_thruster::real::Real;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -41,62 +43,63 @@ const LOAD_OR_GAIN: f64 = 0.15;
 const HOLDS: f64 = 0.3;
 
 /// The steps of one term: size and instant each, how long one takes, and the speed that counts as large.
-struct Steps {
-    reference: f64,
-    rise_s: f64,
-    at: Vec<(f64, f64)>,
+struct Steps<T> {
+    reference: T,
+    rise_s: T,
+    at: Vec<(T, T)>,
 }
 
-impl Steps {
-    fn new(v: &[f64]) -> Self {
+impl<T: Real> Steps<T> {
+    fn new(v: &[T]) -> Self {
         let at = v[HEAD..].chunks_exact(2).map(|c| (c[0], c[1])).collect();
         Self { reference: v[0], rise_s: v[1], at }
     }
 
     /// Sum of the steps so far.
-    fn level(&self, time_s: f64) -> f64 {
-        self.at.iter().map(|(size, t)| 0.5 * size * (1.0 + ((time_s - t) / self.rise_s).tanh())).sum()
+    fn level(&self, time_s: f64) -> T {
+        let passed = |t: T| ((T::from(time_s) - t) / self.rise_s).tanh() + 1.0;
+        self.at.iter().map(|(size, t)| *size * 0.5 * passed(*t)).sum()
     }
 }
 
-struct Load(Steps);
-struct Gain(Steps);
-struct Inflow(Steps);
-struct Reading(Steps);
+struct Load<T>(Steps<T>);
+struct Gain<T>(Steps<T>);
+struct Inflow<T>(Steps<T>);
+struct Reading<T>(Steps<T>);
 
-impl Effect for Load {
+impl<T: Real> Effect<T> for Load<T> {
     fn hooks(&self) -> Hooks {
         Hooks::BALANCE
     }
-    fn balance(&self, at: &Local, _: &[f64], balance: &mut Balance, _: &mut [f64]) {
+    fn balance(&self, at: &Local<T>, _: &[T], balance: &mut Balance<T>, _: &mut [T]) {
         balance.shaft_torque_n_m -=
-            self.0.level(at.time_s) * (10.0 * at.shaft_speed_rad_s / self.0.reference).tanh();
+            self.0.level(at.time_s) * (at.shaft_speed_rad_s * 10.0 / self.0.reference).tanh();
     }
 }
 
-impl Effect for Gain {
+impl<T: Real> Effect<T> for Gain<T> {
     fn hooks(&self) -> Hooks {
         Hooks::DRIVE
     }
-    fn drive(&mut self, tick: &Tick, drive: &mut Drive) {
-        drive.command *= 1.0 + self.0.level(tick.time_s);
+    fn drive(&mut self, tick: &Tick, drive: &mut Drive<T>) {
+        drive.command *= self.0.level(tick.time_s) + 1.0;
     }
 }
 
-impl Effect for Inflow {
+impl<T: Real> Effect<T> for Inflow<T> {
     fn hooks(&self) -> Hooks {
         Hooks::BALANCE
     }
-    fn balance(&self, at: &Local, _: &[f64], balance: &mut Balance, _: &mut [f64]) {
+    fn balance(&self, at: &Local<T>, _: &[T], balance: &mut Balance<T>, _: &mut [T]) {
         balance.ambient_m_s += self.0.level(at.time_s);
     }
 }
 
-impl Effect for Reading {
+impl<T: Real> Effect<T> for Reading<T> {
     fn hooks(&self) -> Hooks {
         Hooks::SENSE
     }
-    fn sense(&mut self, tick: &Tick, sensed: &mut Sensed) {
+    fn sense(&mut self, tick: &Tick, sensed: &mut Sensed<T>) {
         sensed.thrust_n += self.0.level(tick.time_s);
     }
 }
@@ -136,7 +139,7 @@ macro_rules! family {
                     parameters: |s| specs(&NAMES[..N], $unit, $typical(s), $reach, s),
                     starts: one_start,
                     needs: $needs,
-                    build: $build,
+                    build: both!($build),
                 }
             }
             [one::<1>(), one::<2>(), one::<3>(), one::<4>(), one::<5>(), one::<6>()]

@@ -38,7 +38,7 @@ impl Response {
     }
 
     /// Its value in a simulated row.
-    pub fn of(self, row: &kort_thruster::plant::Sensed) -> f64 {
+    pub fn of<T: Copy>(self, row: &kort_thruster::plant::Sensed<T>) -> T {
         match self {
             Self::Current => row.current_a,
             Self::ShaftSpeed => row.shaft_speed_rad_s,

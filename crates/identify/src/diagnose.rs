@@ -216,19 +216,9 @@ fn write(
     let score =
         |before: &Stack, after: &Stack| errors::held_out(problem, &held, before, after, &floor, options.seed);
 
-    let speed: Vec<Vec<f64>> = {
-        let (parameters, effects) = search.problem.assemble(&outcome.last.hypothesis, &outcome.last.values);
-        let hooked: Vec<(&Descriptor, &[f64])> =
-            outcome.last.hypothesis.effects.iter().copied().zip(effects.iter().map(Vec::as_slice)).collect();
-        search
-            .problem
-            .recordings
-            .iter()
-            .map(|r| {
-                search.problem.rows_of(r, &parameters, &hooked).iter().map(|s| s.true_speed_rad_s).collect()
-            })
-            .collect()
-    };
+    let rows = search.problem.rows(&outcome.last.hypothesis, &outcome.last.values);
+    let speed: Vec<Vec<f64>> =
+        rows.iter().map(|rows| rows.iter().map(|s| s.true_speed_rad_s).collect()).collect();
 
     let all = members(&search.problem, &last_train);
     let total_gain: f64 = outcome.places.iter().map(|p| p.gain).sum();

@@ -1,13 +1,15 @@
 //! Output-error identification: simulate, compare with every channel, improve the parameters.
 //!
 //! Gauss-Newton with Levenberg-Marquardt damping on whitened residuals, stated values as priors
-//! (sigma = half the stated tolerance), bounds by freezing. The derivative is by differences of
-//! simulations: the plant is smooth in its parameters by construction.
+//! (sigma = half the stated tolerance), bounds by freezing. The derivative is exact: the plant runs on
+//! numbers that carry it along, several free parameters a simulation.
 
+use kort_thruster::dual::{Dual, LANES};
 use kort_thruster::effects::{Descriptor, Stretch};
 use kort_thruster::models::ModelName;
 use kort_thruster::parameters::{Parameter, Parameters};
-use kort_thruster::plant::{Plant, simulate};
+use kort_thruster::plant::{Plant, Sensed, simulate};
+use kort_thruster::real::Real;
 use kort_thruster::rig::Rig;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -51,7 +53,7 @@ pub struct Free {
     pub low: f64,
     /// Bounds.
     pub high: f64,
-    /// A typical size, for the step of differences.
+    /// A typical size.
     pub size: f64,
     /// When it acts, if only for a while.
     pub acts: Option<Stretch>,
@@ -122,42 +124,39 @@ impl Fit {
 impl<'a> Problem<'a> {
     /// The response of a hypothesis at values of its free parameters.
     pub fn respond(&self, hypothesis: &Hypothesis, values: &[f64]) -> Stack {
-        let (parameters, effects) = self.assemble(hypothesis, values);
-        let hooked: Vec<(&Descriptor, &[f64])> =
-            hypothesis.effects.iter().copied().zip(effects.iter().map(Vec::as_slice)).collect();
-        self.recordings
-            .iter()
-            .map(|recording| {
-                let rows = self.rows_of(recording, &parameters, &hooked);
-                recording
-                    .channels
-                    .iter()
-                    .map(|c| c.rows.iter().map(|r| c.response.of(&rows[*r])).collect())
-                    .collect()
-            })
-            .collect()
+        self.stack(&self.rows(hypothesis, values), |v| v)
     }
 
-    /// Simulated rows of one recording.
-    pub fn rows_of(
-        &self,
-        recording: &Prepared,
-        parameters: &Parameters,
-        effects: &[(&Descriptor, &[f64])],
-    ) -> Vec<kort_thruster::plant::Sensed> {
-        let mut plant = Plant::new(self.model, self.rig, parameters, effects, recording.tick_s);
-        let [speed, flow, current, angle] = recording.start;
-        plant.start(recording.time_s[0], speed, flow, current, angle);
-        simulate(&mut plant, &recording.stimulus).rows
+    /// Simulated rows of all recordings.
+    pub fn rows<T: Real>(&self, hypothesis: &Hypothesis, values: &[T]) -> Vec<Vec<Sensed<T>>> {
+        let (parameters, effects) = self.assemble(hypothesis, values);
+        let hooked: Vec<(&Descriptor, &[T])> =
+            hypothesis.effects.iter().copied().zip(effects.iter().map(Vec::as_slice)).collect();
+        let run = |recording: &Prepared| {
+            let mut plant = Plant::new(self.model, self.rig, &parameters, &hooked, recording.tick_s);
+            let [speed, flow, current, angle] = recording.start;
+            plant.start(recording.time_s[0], speed, flow, current, angle);
+            simulate(&mut plant, &recording.stimulus).rows
+        };
+        self.recordings.iter().map(run).collect()
+    }
+
+    /// A number of every sample of every channel.
+    fn stack<T: Copy>(&self, rows: &[Vec<Sensed<T>>], number: impl Fn(T) -> f64) -> Stack {
+        let of = |recording: &Prepared, rows: &[Sensed<T>]| {
+            let channels = recording.channels.iter();
+            channels.map(|c| c.rows.iter().map(|r| number(c.response.of(&rows[*r]))).collect()).collect()
+        };
+        self.recordings.iter().zip(rows).map(|(recording, rows)| of(recording, rows)).collect()
     }
 
     /// Parameters and effect values from the vector of free ones.
-    pub fn assemble(&self, hypothesis: &Hypothesis, values: &[f64]) -> (Parameters, Vec<Vec<f64>>) {
-        let mut parameters = self.stated;
-        let mut effects: Vec<Vec<f64>> = vec![Vec::new(); hypothesis.effects.len()];
-        let mut put = |i: usize, j: usize, value: f64| {
+    pub fn assemble<T: Real>(&self, hypothesis: &Hypothesis, values: &[T]) -> (Parameters<T>, Vec<Vec<T>>) {
+        let mut parameters = Parameters::lift(&self.stated);
+        let mut effects: Vec<Vec<T>> = vec![Vec::new(); hypothesis.effects.len()];
+        let mut put = |i: usize, j: usize, value: T| {
             if effects[i].len() <= j {
-                effects[i].resize(j + 1, 0.0);
+                effects[i].resize(j + 1, T::ZERO);
             }
             effects[i][j] = value;
         };
@@ -168,7 +167,7 @@ impl<'a> Problem<'a> {
             }
         }
         for (i, j, value) in &hypothesis.fixed {
-            put(*i, *j, *value);
+            put(*i, *j, T::from(*value));
         }
         (parameters, effects)
     }
@@ -218,35 +217,27 @@ impl<'a> Problem<'a> {
         DVector::from_vec(joined)
     }
 
-    /// Derivatives of the response to free parameters that do not meet in time, by one-sided
-    /// differences of one simulation.
+    /// Derivatives of the response to free parameters, by one simulation: a lane a group of parameters
+    /// that do not meet in time.
     fn columns(
         &self,
         hypothesis: &Hypothesis,
         values: &[f64],
-        at: &Stack,
-        group: &[(usize, Stretch)],
-    ) -> Vec<Stack> {
-        let mut moved = values.to_vec();
-        let steps: Vec<f64> = group
-            .iter()
-            .map(|(k, _)| {
-                let free = &hypothesis.free[*k];
-                let step = 1e-4 * free.size.max(values[*k].abs());
-                let step = if values[*k] + step > free.high { -step } else { step };
-                moved[*k] += step;
-                step
-            })
-            .collect();
-        let change = difference(self.respond(hypothesis, &moved), at);
-        self.shares(&change, group)
-            .into_iter()
-            .zip(steps)
-            .map(|(mut stack, step)| {
-                stack.iter_mut().flatten().flatten().for_each(|v| *v /= step);
-                stack
-            })
-            .collect()
+        groups: &[Vec<(usize, Stretch)>],
+    ) -> Vec<(usize, Stack)> {
+        let mut moved: Vec<Dual> = values.iter().map(|v| Dual::from(*v)).collect();
+        for (lane, group) in groups.iter().enumerate() {
+            for (k, _) in group {
+                moved[*k] = Dual::parameter(values[*k], lane);
+            }
+        }
+        let rows = self.rows(hypothesis, &moved);
+        let mut columns = Vec::new();
+        for (lane, group) in groups.iter().enumerate() {
+            let change = self.stack(&rows, |v| v.slope(lane));
+            columns.extend(group.iter().map(|(k, _)| *k).zip(self.shares(&change, group)));
+        }
+        columns
     }
 
     /// Splits the change that a group made together: each sample to the member that acted last.
@@ -271,13 +262,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Computes the columns that are missing.
-    fn complete(
-        &self,
-        hypothesis: &Hypothesis,
-        values: &[f64],
-        at: &Stack,
-        columns: &mut [Option<Arc<Stack>>],
-    ) {
+    fn complete(&self, hypothesis: &Hypothesis, values: &[f64], columns: &mut [Option<Arc<Stack>>]) {
         let always = Stretch { from_s: 0.0, length_s: 0.0, period_s: 0.0 };
         let missing = |k: &usize| columns[*k].is_none();
         let (some, all): (Vec<usize>, Vec<usize>) =
@@ -288,11 +273,8 @@ impl<'a> Problem<'a> {
             .chain(groups(some.iter().filter_map(|k| Some((*k, hypothesis.free[*k].acts?))).collect()))
             .collect();
         let done: Vec<(usize, Stack)> = tasks
-            .par_iter()
-            .flat_map_iter(|group| {
-                let stacks = self.columns(hypothesis, values, at, group);
-                group.iter().map(|(k, _)| *k).zip(stacks).collect::<Vec<_>>()
-            })
+            .par_chunks(LANES)
+            .flat_map_iter(|groups| self.columns(hypothesis, values, groups))
             .collect();
         for (k, stack) in done {
             columns[k] = Some(Arc::new(stack));
@@ -312,8 +294,7 @@ impl<'a> Problem<'a> {
         let free = &hypothesis.free;
         let n = free.len();
         let mut values = hypothesis.start.clone();
-        let mut response = self.respond(hypothesis, &values);
-        let mut residual = self.whiten(&self.residual(&response));
+        let mut residual = self.whiten(&self.residual(&self.respond(hypothesis, &values)));
         let mut cost = residual.norm_squared() + penalty(free, &values);
         let iterations = if cost.is_finite() { iterations } else { 0 };
         let mut damping = DAMPING;
@@ -322,7 +303,7 @@ impl<'a> Problem<'a> {
         let mut fresh = columns.iter().all(Option::is_none);
         let size = DVector::from_iterator(n, free.iter().map(|f| f.size));
         for _ in 0..iterations {
-            self.complete(hypothesis, &values, &response, &mut columns);
+            self.complete(hypothesis, &values, &mut columns);
             let mut scaled = self.whiten_columns(&columns, residual.len());
             for k in 0..n {
                 scaled.column_mut(k).scale_mut(size[k]);
@@ -343,13 +324,12 @@ impl<'a> Problem<'a> {
                 let trial: Vec<f64> = (0..n)
                     .map(|k| (values[k] + step[k] * size[k]).clamp(free[k].low, free[k].high))
                     .collect();
-                let trial_response = self.respond(hypothesis, &trial);
-                let trial_residual = self.whiten(&self.residual(&trial_response));
+                let trial_residual = self.whiten(&self.residual(&self.respond(hypothesis, &trial)));
                 let trial_cost = trial_residual.norm_squared() + penalty(free, &trial);
                 if trial_cost < cost {
                     let promised = 2.0 * gradient.dot(&step) - (&normal * &step).dot(&step);
                     outcome = Some((cost - trial_cost, promised));
-                    (values, response, residual, cost) = (trial, trial_response, trial_residual, trial_cost);
+                    (values, residual, cost) = (trial, trial_residual, trial_cost);
                     damping = (damping * 0.1).max(LEAST_DAMPING);
                     break;
                 }
@@ -414,9 +394,8 @@ impl<'a> Problem<'a> {
 
     /// The whitened derivative at a fit, every column computed anew.
     pub fn jacobian(&self, fit: &mut Fit) -> DMatrix<f64> {
-        let at = self.respond(&fit.hypothesis, &fit.values);
         fit.columns = vec![None; fit.values.len()];
-        self.complete(&fit.hypothesis, &fit.values, &at, &mut fit.columns);
+        self.complete(&fit.hypothesis, &fit.values, &mut fit.columns);
         self.whiten_columns(&fit.columns, fit.residual.len())
     }
 
@@ -431,15 +410,13 @@ impl<'a> Problem<'a> {
 
     /// Learns the noise from the residual of a fitted hypothesis.
     pub fn learn_noise(&mut self, hypothesis: &Hypothesis, values: &[f64]) {
-        let (parameters, effects) = self.assemble(hypothesis, values);
-        let hooked: Vec<(&Descriptor, &[f64])> =
-            hypothesis.effects.iter().copied().zip(effects.iter().map(Vec::as_slice)).collect();
+        let rows = self.rows(hypothesis, values);
         let whiteners = self
             .recordings
             .iter()
             .zip(&self.masked)
-            .map(|(recording, masked)| {
-                let rows = self.rows_of(recording, &parameters, &hooked);
+            .zip(&rows)
+            .map(|((recording, masked), rows)| {
                 let top = rows.iter().fold(1e-9_f64, |m, r| m.max(r.true_speed_rad_s.abs()));
                 recording
                     .channels

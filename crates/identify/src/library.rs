@@ -2,8 +2,10 @@
 //! speed or flow, and loads that switch on at some time. They judge whether a named effect is good enough, and say
 //! what is known where none is.
 
+use kort_thruster::both;
 use kort_thruster::effects::{Descriptor, Effect, Hooks, Path, Scale, Spec, free_shaft, one_start, wet};
 use kort_thruster::plant::{Balance, Drive, Local, Sensed, Tick};
+use kort_thruster::real::Real;
 
 /// All terms.
 pub const TERMS: &[&Descriptor] = &[
@@ -26,94 +28,102 @@ pub const TERMS: &[&Descriptor] = &[
     &SENSOR_THRUST_SWITCHED,
 ];
 
-/// Terms that follow a further column of the recording (as [`Tick::extra`], standardised).
-pub const COLUMN_TERMS: &[&Descriptor] = &[&COLUMN_SHAFT, &COLUMN_DRIVE, &COLUMN_AMBIENT, &COLUMN_THRUST];
-
 /// Is this a term of the library rather than a named effect?
 pub fn is_term(effect: &Descriptor) -> bool {
     effect.id.starts_with("term_")
 }
 
-type Act = fn(&Values, &Local, &mut Balance);
+type Act<T> = fn(&Values<T>, &Local<T>, &mut Balance<T>);
+type Change<T> = fn(&Values<T>, &Tick, T) -> T;
 
 /// Values of a term: size, reference, exponent or time.
 #[derive(Clone, Copy)]
-struct Values {
-    size: f64,
-    reference: f64,
-    shape: f64,
+struct Values<T> {
+    size: T,
+    reference: T,
+    shape: T,
 }
 
-struct BalanceTerm {
-    values: Values,
-    act: Act,
+struct BalanceTerm<T> {
+    values: Values<T>,
+    act: Act<T>,
 }
 
-impl Effect for BalanceTerm {
+impl<T: Real> Effect<T> for BalanceTerm<T> {
     fn hooks(&self) -> Hooks {
         Hooks::BALANCE
     }
 
-    fn balance(&self, at: &Local, _: &[f64], balance: &mut Balance, _: &mut [f64]) {
+    fn balance(&self, at: &Local<T>, _: &[T], balance: &mut Balance<T>, _: &mut [T]) {
         (self.act)(&self.values, at, balance);
     }
 }
 
-struct DriveTerm {
-    values: Values,
-    act: fn(&Values, &Tick, f64) -> f64,
+struct DriveTerm<T> {
+    values: Values<T>,
+    act: Change<T>,
 }
 
-impl Effect for DriveTerm {
+impl<T: Real> Effect<T> for DriveTerm<T> {
     fn hooks(&self) -> Hooks {
         Hooks::DRIVE
     }
 
-    fn drive(&mut self, tick: &Tick, drive: &mut Drive) {
+    fn drive(&mut self, tick: &Tick, drive: &mut Drive<T>) {
         drive.command += (self.act)(&self.values, tick, drive.command);
     }
 }
 
-struct ThrustTerm {
-    values: Values,
-    act: fn(&Values, &Tick, f64) -> f64,
+struct ThrustTerm<T> {
+    values: Values<T>,
+    act: Change<T>,
 }
 
-impl Effect for ThrustTerm {
+impl<T: Real> Effect<T> for ThrustTerm<T> {
     fn hooks(&self) -> Hooks {
         Hooks::SENSE
     }
 
-    fn sense(&mut self, tick: &Tick, sensed: &mut Sensed) {
+    fn sense(&mut self, tick: &Tick, sensed: &mut Sensed<T>) {
         sensed.thrust_n += (self.act)(&self.values, tick, sensed.thrust_n);
     }
 }
 
-fn values(v: &[f64]) -> Values {
+fn values<T: Real>(v: &[T]) -> Values<T> {
     Values { size: v[0], reference: v[1], shape: v[2] }
 }
 
 /// `sgn(x) |x/x0|^p`, smooth at zero.
-fn odd(x: f64, v: &Values) -> f64 {
+fn odd<T: Real>(x: T, v: &Values<T>) -> T {
     let u = x / v.reference;
-    u.signum() * (u * u + 1e-6).powf(0.5 * v.shape) * (100.0 * u).tanh().abs()
+    (u * u + 1e-6).powf(v.shape * 0.5) * (u * 100.0).tanh()
+}
+
+/// `sgn(Om) |Om/Om0|^p |vp|`, smooth at zero.
+fn odd_in_flow<T: Real>(at: &Local<T>, v: &Values<T>) -> T {
+    odd(at.shaft_speed_rad_s, v) * at.axial_m_s.abs()
 }
 
 /// `|x/x0|^p`, smooth at zero.
-fn even(x: f64, v: &Values) -> f64 {
+fn even<T: Real>(x: T, v: &Values<T>) -> T {
     let u = x / v.reference;
-    (u * u + 1e-6).powf(0.5 * v.shape)
+    (u * u + 1e-6).powf(v.shape * 0.5)
 }
 
 /// 0 below, 1 above a threshold (a share of the reference), on either side of zero.
-fn above(x: f64, v: &Values) -> f64 {
+fn above<T: Real>(x: T, v: &Values<T>) -> T {
     let past = ((x / v.reference).abs() - v.shape) / 0.03;
-    0.5 * (1.0 + past.tanh())
+    (past.tanh() + 1.0) * 0.5
+}
+
+/// `sgn(x)`
+fn sign<T: Real>(x: T) -> T {
+    T::from(x.re().signum())
 }
 
 /// 0 before, 1 after the time of switching, over a tenth of a second.
-fn switched(time_s: f64, v: &Values) -> f64 {
-    0.5 * (1.0 + ((time_s - v.shape) / 0.05).tanh())
+fn switched<T: Real>(time_s: f64, v: &Values<T>) -> T {
+    (((T::from(time_s) - v.shape) / 0.05).tanh() + 1.0) * 0.5
 }
 
 fn power(name: &'static str, unit: &'static str, size: f64, reference: f64) -> Vec<Spec> {
@@ -178,12 +188,15 @@ macro_rules! term {
             parameters: $parameters,
             starts: $starts,
             needs: $needs,
-            build: $build,
+            build: both!($build),
         };
     };
 }
 
-fn boxed(v: &[f64], act: Act) -> Box<dyn Effect> {
+mod column;
+pub use column::COLUMN_TERMS;
+
+fn boxed<T: Real>(v: &[T], act: Act<T>) -> Box<dyn Effect<T>> {
     Box::new(BalanceTerm { values: values(v), act })
 }
 
@@ -252,9 +265,7 @@ term!(
     free_shaft,
     shaft,
     one_start,
-    |v, _| {
-        boxed(v, |v, at, b| b.shaft_torque_n_m -= v.size * odd(at.shaft_speed_rad_s, v) * at.axial_m_s.abs())
-    }
+    |v, _| { boxed(v, |v, at, b| b.shaft_torque_n_m -= v.size * odd_in_flow(at, v)) }
 );
 term!(
     SHAFT_STEP,
@@ -267,7 +278,7 @@ term!(
     |v, _| {
         boxed(v, |v, at, b| {
             let speed = at.shaft_speed_rad_s;
-            b.shaft_torque_n_m -= v.size * speed.signum() * above(speed, v);
+            b.shaft_torque_n_m -= v.size * sign(speed) * above(speed, v);
         })
     }
 );
@@ -282,7 +293,7 @@ term!(
     |v, _| {
         boxed(v, |v, at, b| {
             b.shaft_torque_n_m -=
-                v.size * switched(at.time_s, v) * (10.0 * at.shaft_speed_rad_s / v.reference).tanh();
+                v.size * switched(at.time_s, v) * (at.shaft_speed_rad_s * 10.0 / v.reference).tanh();
         })
     }
 );
@@ -336,7 +347,7 @@ term!(
     wet,
     blade_thrust,
     one_start,
-    |v, _| { boxed(v, |v, at, b| b.thrust_n += v.size * odd(at.shaft_speed_rad_s, v) * at.axial_m_s.abs()) }
+    |v, _| { boxed(v, |v, at, b| b.thrust_n += v.size * odd_in_flow(at, v)) }
 );
 term!(
     BLADE_THRUST_STEP,
@@ -347,7 +358,7 @@ term!(
     blade_thrust_step,
     |s| thresholds(blade_thrust_step(s)),
     |v, _| {
-        boxed(v, |v, at, b| b.thrust_n += v.size * at.shaft_speed_rad_s.signum() * above(at.axial_m_s, v))
+        boxed(v, |v, at, b| b.thrust_n += v.size * sign(at.shaft_speed_rad_s) * above(at.axial_m_s, v))
     }
 );
 term!(
@@ -411,85 +422,6 @@ term!(
     |v, _| {
         Box::new(ThrustTerm { values: values(v), act: |v, tick, _| v.size * switched(tick.time_s, v) })
     }
-);
-
-/// Column terms read the column once a tick and act at once.
-struct ColumnTerm {
-    values: Values,
-    now: f64,
-    act: Act,
-}
-
-impl Effect for ColumnTerm {
-    fn hooks(&self) -> Hooks {
-        Hooks { drive: true, balance: true, ..Hooks::NONE }
-    }
-
-    fn drive(&mut self, tick: &Tick, _: &mut Drive) {
-        self.now = tick.extra;
-    }
-
-    fn balance(&self, at: &Local, _: &[f64], balance: &mut Balance, _: &mut [f64]) {
-        (self.act)(&Values { size: self.values.size * self.now, ..self.values }, at, balance);
-    }
-}
-
-fn column(name: &'static str, unit: &'static str, size: f64, reference: f64) -> Vec<Spec> {
-    let reach = 20.0 * size;
-    vec![
-        Spec::strength(name, unit, size, -reach, reach),
-        Spec::shape("reference", "SI", reference, reference, reference),
-        Spec::shape("exponent", "1", 1.0, 1.0, 1.0),
-    ]
-}
-
-fn following(v: &[f64], act: Act) -> Box<dyn Effect> {
-    Box::new(ColumnTerm { values: values(v), now: 0.0, act })
-}
-
-term!(
-    COLUMN_SHAFT,
-    "term_column_shaft",
-    Path::Shaft,
-    "shaft torque -k x tanh(10 Om/Om0)",
-    free_shaft,
-    |s| column("load_torque_n_m", "N m", 0.02 * s.torque_n_m, s.shaft_speed_rad_s),
-    one_start,
-    |v, _| {
-        following(v, |v, at, b| {
-            b.shaft_torque_n_m -= v.size * (10.0 * at.shaft_speed_rad_s / v.reference).tanh()
-        })
-    }
-);
-term!(
-    COLUMN_DRIVE,
-    "term_column_drive",
-    Path::Drive,
-    "command (1 + k x)",
-    commanded,
-    |s| column("gain_change", "1", 0.02, s.command),
-    one_start,
-    |v, _| { Box::new(DriveTerm { values: values(v), act: |v, tick, u| v.size * u * tick.extra }) }
-);
-term!(
-    COLUMN_AMBIENT,
-    "term_column_ambient",
-    Path::Flow,
-    "ambient flow + k x",
-    wet,
-    |s| column("ambient_m_s", "m/s", 0.02 * s.flow_m_s, s.flow_m_s),
-    one_start,
-    |v, _| { following(v, |v, _, b| b.ambient_m_s += v.size) }
-);
-term!(
-    COLUMN_THRUST,
-    "term_column_thrust",
-    Path::Sensor,
-    "thrust reading + k x",
-    thrust_measured,
-    |s| column("thrust_reading_n", "N", 0.02 * s.thrust_n, s.thrust_n),
-    one_start,
-    |v, _| { Box::new(ThrustTerm { values: values(v), act: |v, tick, _| v.size * tick.extra }) }
 );
 
 /// Thrust is measured.

@@ -2,7 +2,7 @@
 //!
 //! Most of a recording is settled or settling. Which ticks those are is read off one simulation with
 //! the stated coefficients and kept for every later one: a choice made anew in each simulation would
-//! jump with the parameters, and differences of simulations are the derivatives of a fit.
+//! jump with the parameters, which their derivatives do not show.
 
 use kort_thruster::models::ModelName;
 use kort_thruster::parameters::Parameters;

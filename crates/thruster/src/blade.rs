@@ -35,11 +35,11 @@ pub struct BladeLoad {
 
 /// The speed of the water relative to the chord at 0.7 radius.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Inflow {
+pub struct Inflow<T = f64> {
     /// Tangential speed of the blade through the water, m/s.
-    pub tangential_m_s: f64,
+    pub tangential_m_s: T,
     /// Axial speed of the water through the disc, m/s.
-    pub axial_m_s: f64,
+    pub axial_m_s: T,
 }
 
 impl Inflow {

@@ -7,6 +7,7 @@
 //! bollard ahead; blade torque is positive when it opposes positive shaft speed.
 
 pub mod blade;
+pub mod dual;
 pub mod effects;
 pub mod integrate;
 pub mod models;
@@ -14,5 +15,6 @@ pub mod momentum;
 pub mod motor;
 pub mod parameters;
 pub mod plant;
+pub mod real;
 pub mod rig;
 pub mod scenario;

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::real::Real;
 use crate::rig::{Quantity, Rig};
 
 /// One parameter of the plant.
@@ -120,7 +121,7 @@ impl Parameter {
 
 /// Values of all parameters, SI.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Parameters([f64; P::ALL.len()]);
+pub struct Parameters<T = f64>([T; P::ALL.len()]);
 
 impl Parameters {
     /// The stated values of a rig. `C0`, `C1` and `eta`, which a rig description does not hold,
@@ -168,26 +169,6 @@ impl Parameters {
         }
     }
 
-    /// Value of one parameter.
-    pub fn get(&self, parameter: P) -> f64 {
-        self.0[parameter as usize]
-    }
-
-    /// Sets one parameter.
-    pub fn set(&mut self, parameter: P, value: f64) {
-        self.0[parameter as usize] = value;
-    }
-
-    /// Disc area, m^2.
-    pub fn area_m2(&self) -> f64 {
-        std::f64::consts::PI * self.get(P::RadiusM).powi(2)
-    }
-
-    /// Mass of water in the duct, `rho a l`, kg.
-    pub fn duct_mass_kg(&self) -> f64 {
-        self.get(P::DensityKgM3) * self.area_m2() * self.get(P::DuctLengthM)
-    }
-
     /// `T/Om^2` and `Q/Om^2` of Model 2 in bollard pull, from its one steady inflow angle:
     /// `T = dbeta rho a vp^2` solved for the advance `vp/(0.7 r Om)` by bisection.
     pub fn bollard_coefficients(&self) -> (f64, f64) {
@@ -213,5 +194,32 @@ impl Parameters {
             drag_max: self.get(P::DragMax),
             density_kg_m3: self.get(P::DensityKgM3),
         }
+    }
+}
+
+impl<T: Real> Parameters<T> {
+    /// The same values as other numbers.
+    pub fn lift(plain: &Parameters) -> Self {
+        Self(plain.0.map(T::from))
+    }
+
+    /// Value of one parameter.
+    pub fn get(&self, parameter: P) -> T {
+        self.0[parameter as usize]
+    }
+
+    /// Sets one parameter.
+    pub fn set(&mut self, parameter: P, value: T) {
+        self.0[parameter as usize] = value;
+    }
+
+    /// Disc area, m^2.
+    pub fn area_m2(&self) -> T {
+        self.get(P::RadiusM).squared() * std::f64::consts::PI
+    }
+
+    /// Mass of water in the duct, `rho a l`, kg.
+    pub fn duct_mass_kg(&self) -> T {
+        self.get(P::DensityKgM3) * self.area_m2() * self.get(P::DuctLengthM)
     }
 }

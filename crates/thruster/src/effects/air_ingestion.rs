@@ -3,6 +3,7 @@
 use super::knots::{self, Knots};
 use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, one_start, wet};
 use crate::plant::{Balance, Foil, Local};
+use crate::real::Real;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -20,7 +21,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: one_start,
     needs: wet,
-    build: |values, _| Box::new(AirIngestion { column_share: values[0], fraction: Knots::new(&values[1..]) }),
+    build: both!(|values, _| Box::new(AirIngestion { column_share: values[0], fraction: Knots::new(&values[1..]) })),
 };
 
 fn parameters(scale: &Scale) -> Vec<Spec> {
@@ -29,23 +30,23 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
     specs
 }
 
-struct AirIngestion {
-    column_share: f64,
-    fraction: Knots,
+struct AirIngestion<T> {
+    column_share: T,
+    fraction: Knots<T>,
 }
 
-impl Effect for AirIngestion {
+impl<T: Real> Effect<T> for AirIngestion<T> {
     fn hooks(&self) -> Hooks {
         Hooks { foil: true, balance: true, ..Hooks::NONE }
     }
 
-    fn foil(&self, at: &Local, _: &[f64], foil: &mut Foil) {
-        foil.density_kg_m3 *= 1.0 - self.fraction.at(at.time_s);
+    fn foil(&self, at: &Local<T>, _: &[T], foil: &mut Foil<T>) {
+        foil.density_kg_m3 *= T::ONE - self.fraction.at(at.time_s);
     }
 
     /// Bubbles drawn in at the disc leave the column its mass; bubbles that come with the water do not.
-    fn balance(&self, at: &Local, _: &[f64], balance: &mut Balance, _: &mut [f64]) {
-        let left = 1.0 - self.column_share * self.fraction.at(at.time_s);
+    fn balance(&self, at: &Local<T>, _: &[T], balance: &mut Balance<T>, _: &mut [T]) {
+        let left = T::ONE - self.column_share * self.fraction.at(at.time_s);
         balance.flux_kg_m *= left;
         balance.added_mass_kg *= left;
     }

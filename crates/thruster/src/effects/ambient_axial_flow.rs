@@ -3,6 +3,7 @@
 use super::{Available, Descriptor, Effect, Hooks, Path, Scale, Spec, one_start, wet};
 use crate::plant::{Balance, Local};
 use crate::rig::Rig;
+use crate::real::Real;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -18,7 +19,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: one_start,
     needs,
-    build: |values, _| Box::new(AmbientAxialFlow { ambient_m_s: values[0] }),
+    build: both!(|values, _| Box::new(AmbientAxialFlow { ambient_m_s: values[0] })),
 };
 
 fn parameters(scale: &Scale) -> Vec<Spec> {
@@ -35,16 +36,16 @@ pub(super) fn needs(rig: &Rig, available: &Available) -> Result<(), &'static str
     }
 }
 
-struct AmbientAxialFlow {
-    ambient_m_s: f64,
+struct AmbientAxialFlow<T> {
+    ambient_m_s: T,
 }
 
-impl Effect for AmbientAxialFlow {
+impl<T: Real> Effect<T> for AmbientAxialFlow<T> {
     fn hooks(&self) -> Hooks {
         Hooks::BALANCE
     }
 
-    fn balance(&self, _: &Local, _: &[f64], balance: &mut Balance, _: &mut [f64]) {
+    fn balance(&self, _: &Local<T>, _: &[T], balance: &mut Balance<T>, _: &mut [T]) {
         balance.ambient_m_s += self.ambient_m_s;
     }
 }

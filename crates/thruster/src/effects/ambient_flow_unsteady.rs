@@ -3,6 +3,7 @@
 use super::knots::{self, Knots};
 use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, one_start};
 use crate::plant::{Balance, Local};
+use crate::real::Real;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -17,7 +18,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: one_start,
     needs: super::ambient_axial_flow::needs,
-    build: |values, _| Box::new(AmbientFlowUnsteady { flow_m_s: Knots::new(values) }),
+    build: both!(|values, _| Box::new(AmbientFlowUnsteady { flow_m_s: Knots::new(values) })),
 };
 
 fn parameters(scale: &Scale) -> Vec<Spec> {
@@ -25,16 +26,16 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
     knots::specs(scale, &knots::SPEED, "m/s", 0.03 * full, -full, full)
 }
 
-struct AmbientFlowUnsteady {
-    flow_m_s: Knots,
+struct AmbientFlowUnsteady<T> {
+    flow_m_s: Knots<T>,
 }
 
-impl Effect for AmbientFlowUnsteady {
+impl<T: Real> Effect<T> for AmbientFlowUnsteady<T> {
     fn hooks(&self) -> Hooks {
         Hooks::BALANCE
     }
 
-    fn balance(&self, at: &Local, _: &[f64], balance: &mut Balance, _: &mut [f64]) {
+    fn balance(&self, at: &Local<T>, _: &[T], balance: &mut Balance<T>, _: &mut [T]) {
         balance.ambient_m_s += self.flow_m_s.at(at.time_s);
     }
 }

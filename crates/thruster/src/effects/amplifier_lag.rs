@@ -2,6 +2,7 @@
 
 use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, commanded};
 use crate::plant::{Drive, Tick};
+use crate::real::Real;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -17,7 +18,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: |scale| [0.005_f64, 0.015, 0.05].iter().map(|lag| vec![lag.max(scale.tick_s)]).collect(),
     needs: commanded,
-    build: |values, _| Box::new(AmplifierLag { extra_s: values[0] }),
+    build: both!(|values, _| Box::new(AmplifierLag { extra_s: values[0] })),
 };
 
 /// Negative where the drive is faster than stated; a tenth of the stated lag stays.
@@ -25,16 +26,16 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
     vec![Spec::strength("extra_lag_s", "s", 2.0 * scale.tick_s, -0.9 * scale.tick_s, 0.5)]
 }
 
-struct AmplifierLag {
-    extra_s: f64,
+struct AmplifierLag<T> {
+    extra_s: T,
 }
 
-impl Effect for AmplifierLag {
+impl<T: Real> Effect<T> for AmplifierLag<T> {
     fn hooks(&self) -> Hooks {
         Hooks::DRIVE
     }
 
-    fn drive(&mut self, _: &Tick, drive: &mut Drive) {
-        drive.time_constant_s = (drive.time_constant_s + self.extra_s).max(0.1 * drive.time_constant_s);
+    fn drive(&mut self, _: &Tick, drive: &mut Drive<T>) {
+        drive.time_constant_s = (drive.time_constant_s + self.extra_s).max(drive.time_constant_s * 0.1);
     }
 }

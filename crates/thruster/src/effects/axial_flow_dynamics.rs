@@ -4,6 +4,7 @@ use super::{Available, Descriptor, Effect, Hooks, Path, Scale, Spec, wet};
 use crate::models::ModelName;
 use crate::parameters::{Parameter as P, Parameters};
 use crate::rig::Rig;
+use crate::real::Real;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -21,7 +22,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: |_| vec![vec![1.0, 1.0, 1.0, 2.5, 1.0]],
     needs: static_baseline,
-    build: |values, _| Box::new(AxialFlowDynamics { factors: [values[0], values[1], values[2], values[3], values[4]] }),
+    build: both!(|values, _| Box::new(AxialFlowDynamics { factors: [values[0], values[1], values[2], values[3], values[4]] })),
 };
 
 /// Factors on what the rig states.
@@ -42,17 +43,17 @@ fn static_baseline(rig: &Rig, available: &Available) -> Result<(), &'static str>
     wet(rig, available)
 }
 
-struct AxialFlowDynamics {
-    factors: [f64; 5],
+struct AxialFlowDynamics<T> {
+    factors: [T; 5],
 }
 
-impl Effect for AxialFlowDynamics {
+impl<T: Real> Effect<T> for AxialFlowDynamics<T> {
     fn hooks(&self) -> Hooks {
         Hooks::NONE
     }
 
     /// Models 0 and 1 give way to Model 2; a model that has the flow keeps its equations.
-    fn amend(&self, model: &mut ModelName, parameters: &mut Parameters) {
+    fn amend(&self, model: &mut ModelName, parameters: &mut Parameters<T>) {
         if matches!(model, ModelName::Model0 | ModelName::Model1) {
             *model = ModelName::Model2;
         }

@@ -3,6 +3,7 @@
 use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, wet};
 use crate::parameters::Parameter as P;
 use crate::plant::{Balance, Foil, Local};
+use crate::real::Real;
 
 /// Width of the onset, rad.
 const WIDTH_RAD: f64 = 0.03;
@@ -21,9 +22,9 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: |_| vec![vec![0.1, 0.17, 1.0], vec![0.1, 0.28, 1.0], vec![0.1, 0.35, 1.0], vec![0.1, 0.28, 4.0]],
     needs: wet,
-    build: |values, context| {
+    build: both!(|values, context| {
         Box::new(BladeStall { loss: values[0], stall_rad: values[1], lag_m: values[2] * context.parameters.get(P::RadiusM), tick_s: context.tick_s })
-    },
+    }),
 };
 
 fn parameters(_: &Scale) -> Vec<Spec> {
@@ -34,14 +35,14 @@ fn parameters(_: &Scale) -> Vec<Spec> {
     ]
 }
 
-struct BladeStall {
-    loss: f64,
-    stall_rad: f64,
-    lag_m: f64,
+struct BladeStall<T> {
+    loss: T,
+    stall_rad: T,
+    lag_m: T,
     tick_s: f64,
 }
 
-impl Effect for BladeStall {
+impl<T: Real> Effect<T> for BladeStall<T> {
     fn states(&self) -> usize {
         1
     }
@@ -50,14 +51,14 @@ impl Effect for BladeStall {
         Hooks { foil: true, balance: true, ..Hooks::NONE }
     }
 
-    fn foil(&self, _: &Local, own: &[f64], foil: &mut Foil) {
-        foil.lift *= 1.0 - self.loss * own[0];
+    fn foil(&self, _: &Local<T>, own: &[T], foil: &mut Foil<T>) {
+        foil.lift *= T::ONE - self.loss * own[0];
     }
 
     /// The lag is never shorter than a tick, which the integrator could not follow.
-    fn balance(&self, _: &Local, own: &[f64], balance: &mut Balance, rates: &mut [f64]) {
+    fn balance(&self, _: &Local<T>, own: &[T], balance: &mut Balance<T>, rates: &mut [T]) {
         let past = (balance.foil.attack_rad().abs() - self.stall_rad) / WIDTH_RAD;
         let speed = balance.foil.speed_m_s;
-        rates[0] = speed / (self.lag_m + speed * self.tick_s) * (super::logistic(past) - own[0]);
+        rates[0] = speed / (self.lag_m + speed * self.tick_s) * (past.logistic() - own[0]);
     }
 }

@@ -2,6 +2,7 @@
 
 use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, wet};
 use crate::plant::{Foil, Local};
+use crate::real::Real;
 
 /// Atmospheric less vapour pressure, Pa, at 20 deg C.
 const PRESSURE_PA: f64 = 101_325.0 - 2_339.0;
@@ -26,7 +27,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: |scale| [1.3, 3.0, 5.0].iter().map(|factor| vec![0.1, onset(scale, *factor)]).collect(),
     needs: wet,
-    build: |values, _| Box::new(Cavitation { loss: values[0], onset: values[1] }),
+    build: both!(|values, _| Box::new(Cavitation { loss: values[0], onset: values[1] })),
 };
 
 /// Onset at a multiple of the smallest cavitation number in the recording; the speed through the
@@ -44,23 +45,23 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
     ]
 }
 
-struct Cavitation {
-    loss: f64,
-    onset: f64,
+struct Cavitation<T> {
+    loss: T,
+    onset: T,
 }
 
-impl Effect for Cavitation {
+impl<T: Real> Effect<T> for Cavitation<T> {
     fn hooks(&self) -> Hooks {
         Hooks::FOIL
     }
 
-    fn foil(&self, at: &Local, _: &[f64], foil: &mut Foil) {
-        let pressure = PRESSURE_PA + foil.density_kg_m3 * GRAVITY_M_S2 * at.depth_m.unwrap_or(DEPTH_M);
-        let dynamic = 0.5 * foil.density_kg_m3 * foil.speed_m_s * foil.speed_m_s;
+    fn foil(&self, at: &Local<T>, _: &[T], foil: &mut Foil<T>) {
+        let pressure = foil.density_kg_m3 * GRAVITY_M_S2 * at.depth_m.unwrap_or(DEPTH_M) + PRESSURE_PA;
+        let dynamic = foil.density_kg_m3 * 0.5 * foil.speed_m_s * foil.speed_m_s;
         let past = self.onset * dynamic / pressure - 1.0;
         // A ramp with a rounded foot; no loss at all at rest.
-        let ramp = |x: f64| 0.5 * (x + (x * x + WIDTH * WIDTH).sqrt());
-        let left = 1.0 / (1.0 + self.loss * (ramp(past) - ramp(-1.0)));
+        let ramp = |x: T| (x + (x * x + WIDTH * WIDTH).sqrt()) * 0.5;
+        let left = (self.loss * (ramp(past) - ramp(T::from(-1.0))) + 1.0).recip();
         foil.lift *= left;
         foil.drag *= left;
     }

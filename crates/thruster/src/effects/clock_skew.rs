@@ -4,6 +4,7 @@ use super::memory::History;
 use super::{Available, Descriptor, Effect, Hooks, Path, Scale, Spec};
 use crate::plant::{Sensed, Tick};
 use crate::rig::Rig;
+use crate::real::Real;
 
 /// Longest delay, s.
 const LONGEST_S: f64 = 0.5;
@@ -21,10 +22,10 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: |_| vec![vec![0.04, 0.04, 0.04], vec![0.12, 0.12, 0.12]],
     needs,
-    build: |values, context| {
+    build: both!(|values, context| {
         let past = || History::new(LONGEST_S, context.tick_s);
         Box::new(ClockSkew { delay_s: [values[0], values[1], values[2]], past: [past(), past(), past()] })
-    },
+    }),
 };
 
 /// Screening looks at each channel's delay alone.
@@ -42,17 +43,17 @@ fn needs(_: &Rig, available: &Available) -> Result<(), &'static str> {
     }
 }
 
-struct ClockSkew {
-    delay_s: [f64; 3],
-    past: [History; 3],
+struct ClockSkew<T> {
+    delay_s: [T; 3],
+    past: [History<T>; 3],
 }
 
-impl Effect for ClockSkew {
+impl<T: Real> Effect<T> for ClockSkew<T> {
     fn hooks(&self) -> Hooks {
         Hooks::SENSE
     }
 
-    fn sense(&mut self, _: &Tick, sensed: &mut Sensed) {
+    fn sense(&mut self, _: &Tick, sensed: &mut Sensed<T>) {
         let channels = [&mut sensed.thrust_n, &mut sensed.shaft_speed_rad_s, &mut sensed.flow_m_s];
         for ((channel, past), delay) in channels.into_iter().zip(&mut self.past).zip(self.delay_s) {
             past.push(*channel);

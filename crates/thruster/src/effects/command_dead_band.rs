@@ -2,6 +2,7 @@
 
 use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, commanded};
 use crate::plant::{Drive, Tick};
+use crate::real::Real;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -21,7 +22,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
         [(0.02, 1.0), (0.06, 0.0), (0.06, 1.0), (0.15, 1.0)].iter().map(|(d, kept)| vec![d * full, 0.0, *kept]).collect()
     },
     needs: commanded,
-    build: |values, _| Box::new(CommandDeadBand { half_width: values[0], centre: values[1], kept: values[2] }),
+    build: both!(|values, _| Box::new(CommandDeadBand { half_width: values[0], centre: values[1], kept: values[2] })),
 };
 
 fn parameters(scale: &Scale) -> Vec<Spec> {
@@ -33,26 +34,24 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
     ]
 }
 
-struct CommandDeadBand {
-    half_width: f64,
-    centre: f64,
-    kept: f64,
+struct CommandDeadBand<T> {
+    half_width: T,
+    centre: T,
+    kept: T,
 }
 
-impl Effect for CommandDeadBand {
+impl<T: Real> Effect<T> for CommandDeadBand<T> {
     fn hooks(&self) -> Hooks {
         Hooks::DRIVE
     }
 
     /// Beyond the band the passed-on form returns to the command over a quarter of the band.
-    fn drive(&mut self, _: &Tick, drive: &mut Drive) {
-        let d = self.half_width;
-        if d <= 0.0 {
-            return;
-        }
-        let u = drive.command - self.centre;
-        let out = ((u.abs() - d) / (0.25 * d)).clamp(0.0, 1.0);
-        let smooth = out * out * (3.0 - 2.0 * out);
-        drive.command -= u.clamp(-d, d) * (1.0 - self.kept * smooth);
+    fn drive(&mut self, _: &Tick, drive: &mut Drive<T>) {
+        let (d, u) = (self.half_width, drive.command - self.centre);
+        let out = if d > 0.0 { ((u.abs() - d) / (d * 0.25)).clamp(T::ZERO, T::ONE) } else { T::ONE };
+        let smooth = out * out * (T::from(3.0) - out * 2.0);
+        let side = if u == T::ZERO { 0.0 } else { u.re().signum() };
+        let held_back = if u.abs() < d { u } else { d * side };
+        drive.command -= held_back * (T::ONE - self.kept * smooth);
     }
 }

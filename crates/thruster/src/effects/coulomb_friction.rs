@@ -1,7 +1,8 @@
 //! Dry friction of bearings and seals, with a Stribeck rise near standstill.
 
-use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, free_shaft};
+use super::{Context, Descriptor, Effect, Hooks, Path, Scale, Spec, free_shaft};
 use crate::plant::{Balance, Local};
+use crate::real::Real;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -21,18 +22,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
         vec![vec![0.02 * torque, 0.7, 0.015 * speed], vec![0.02 * torque, 0.7, 0.08 * speed]]
     },
     needs: free_shaft,
-    build: |values, context| {
-        Box::new(CoulombFriction {
-            level_n_m: values[0],
-            rise: values[1],
-            stribeck_rad_s: values[2],
-            // Sharp against the speeds in use, soft enough for the integrator's step:
-            // level / (eps I) stays below 1/tick.
-            eps_rad_s: (0.02 * values[2])
-                .max(1.2 * values[0].abs() * (1.0 + values[1].max(0.0)) * context.tick_s
-                    / context.parameters.get(crate::parameters::Parameter::InertiaKgM2)),
-        })
-    },
+    build: both!(build),
 };
 
 fn parameters(scale: &Scale) -> Vec<Spec> {
@@ -43,22 +33,35 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
     ]
 }
 
-struct CoulombFriction {
-    level_n_m: f64,
-    rise: f64,
-    stribeck_rad_s: f64,
-    eps_rad_s: f64,
+fn build<T: Real>(values: &[T], context: &Context<T>) -> Box<dyn Effect<T>> {
+    Box::new(CoulombFriction {
+        level_n_m: values[0],
+        rise: values[1],
+        stribeck_rad_s: values[2],
+        // Sharp against the speeds in use, soft enough for the integrator's step:
+        // level / (eps I) stays below 1/tick.
+        eps_rad_s: (values[2] * 0.02)
+            .max(values[0].abs() * 1.2 * (values[1] + 1.0) * context.tick_s
+                / context.parameters.get(crate::parameters::Parameter::InertiaKgM2)),
+    })
 }
 
-impl Effect for CoulombFriction {
+struct CoulombFriction<T> {
+    level_n_m: T,
+    rise: T,
+    stribeck_rad_s: T,
+    eps_rad_s: T,
+}
+
+impl<T: Real> Effect<T> for CoulombFriction<T> {
     fn hooks(&self) -> Hooks {
         Hooks::BALANCE
     }
 
-    fn balance(&self, at: &Local, _: &[f64], balance: &mut Balance, _: &mut [f64]) {
+    fn balance(&self, at: &Local<T>, _: &[T], balance: &mut Balance<T>, _: &mut [T]) {
         let speed = at.shaft_speed_rad_s;
-        let stribeck = (-(speed / self.stribeck_rad_s).powi(2)).exp();
-        let torque = self.level_n_m * (1.0 + self.rise * stribeck);
+        let stribeck = (-(speed / self.stribeck_rad_s).squared()).exp();
+        let torque = self.level_n_m * (self.rise * stribeck + 1.0);
         balance.shaft_torque_n_m -= torque * (speed / self.eps_rad_s).tanh();
     }
 }

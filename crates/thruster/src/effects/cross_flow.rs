@@ -2,6 +2,7 @@
 
 use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, wet};
 use crate::plant::{Balance, Drive, Local, Tick};
+use crate::real::Real;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -22,9 +23,9 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
         vec![start(0.1, 0.1), start(0.1, 0.5), start(0.5, 0.15), start(0.5, 0.3)]
     },
     needs: wet,
-    build: |values, _| {
-        Box::new(CrossFlow { loss: values[0], steady_m_s: values[1], per_signal_m_s: values[2], across_m2_s2: 0.0 })
-    },
+    build: both!(|values, _| {
+        Box::new(CrossFlow { loss: values[0], steady_m_s: values[1], per_signal_m_s: values[2], across_m2_s2: Real::ZERO })
+    }),
 };
 
 fn parameters(scale: &Scale) -> Vec<Spec> {
@@ -36,25 +37,25 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
     ]
 }
 
-struct CrossFlow {
-    loss: f64,
-    steady_m_s: f64,
-    per_signal_m_s: f64,
-    across_m2_s2: f64,
+struct CrossFlow<T> {
+    loss: T,
+    steady_m_s: T,
+    per_signal_m_s: T,
+    across_m2_s2: T,
 }
 
-impl Effect for CrossFlow {
+impl<T: Real> Effect<T> for CrossFlow<T> {
     fn hooks(&self) -> Hooks {
         Hooks { drive: true, balance: true, ..Hooks::NONE }
     }
 
-    fn drive(&mut self, tick: &Tick, _: &mut Drive) {
-        self.across_m2_s2 = (self.steady_m_s + self.per_signal_m_s * tick.extra).powi(2);
+    fn drive(&mut self, tick: &Tick, _: &mut Drive<T>) {
+        self.across_m2_s2 = (self.steady_m_s + self.per_signal_m_s * tick.extra).squared();
     }
 
-    fn balance(&self, at: &Local, _: &[f64], balance: &mut Balance, _: &mut [f64]) {
+    fn balance(&self, at: &Local<T>, _: &[T], balance: &mut Balance<T>, _: &mut [T]) {
         // The small term keeps still water without cross flow from dividing by zero.
         let all = at.axial_m_s * at.axial_m_s + self.across_m2_s2 + 1e-12;
-        balance.thrust_n *= 1.0 - self.loss * self.across_m2_s2 / all;
+        balance.thrust_n *= T::ONE - self.loss * self.across_m2_s2 / all;
     }
 }

@@ -3,6 +3,7 @@
 use super::{Available, Descriptor, Effect, Hooks, Path, Scale, Spec, commanded};
 use crate::plant::{Drive, Tick};
 use crate::rig::Rig;
+use crate::real::Real;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -18,7 +19,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: |_| [0.05, 0.25, 0.4, 0.6].iter().map(|cut| vec![*cut]).collect(),
     needs,
-    build: |values, _| Box::new(CurrentSaturation { cut: values[0] }),
+    build: both!(|values, _| Box::new(CurrentSaturation { cut: values[0] })),
 };
 
 /// The limit is sharp, as a drive's is; a recording's response is still smooth in it, since each
@@ -32,16 +33,16 @@ fn needs(rig: &Rig, available: &Available) -> Result<(), &'static str> {
     if rig.amplifier.current_limit_a.is_finite() { Ok(()) } else { Err("the rig states no current limit") }
 }
 
-struct CurrentSaturation {
-    cut: f64,
+struct CurrentSaturation<T> {
+    cut: T,
 }
 
-impl Effect for CurrentSaturation {
+impl<T: Real> Effect<T> for CurrentSaturation<T> {
     fn hooks(&self) -> Hooks {
         Hooks::DRIVE
     }
 
-    fn drive(&mut self, _: &Tick, drive: &mut Drive) {
-        drive.current_limit_a *= 1.0 - self.cut;
+    fn drive(&mut self, _: &Tick, drive: &mut Drive<T>) {
+        drive.current_limit_a *= T::ONE - self.cut;
     }
 }

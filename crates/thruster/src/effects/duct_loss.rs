@@ -3,6 +3,7 @@
 use super::{Context, Descriptor, Effect, Hooks, Path, Scale, Spec, one_start, wet};
 use crate::parameters::Parameter as P;
 use crate::plant::{Balance, Local};
+use crate::real::Real;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -19,7 +20,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: one_start,
     needs: wet,
-    build,
+    build: both!(build),
 };
 
 fn parameters(_: &Scale) -> Vec<Spec> {
@@ -29,23 +30,23 @@ fn parameters(_: &Scale) -> Vec<Spec> {
     ]
 }
 
-fn build(values: &[f64], context: &Context) -> Box<dyn Effect> {
+fn build<T: Real>(values: &[T], context: &Context<T>) -> Box<dyn Effect<T>> {
     let flux = context.parameters.get(P::DensityKgM3) * context.parameters.area_m2();
-    Box::new(DuctLoss { loss_kg_m: 0.5 * values[0] * flux, stand_kg_m: values[1] * flux })
+    Box::new(DuctLoss { loss_kg_m: values[0] * 0.5 * flux, stand_kg_m: values[1] * flux })
 }
 
-struct DuctLoss {
-    loss_kg_m: f64,
-    stand_kg_m: f64,
+struct DuctLoss<T> {
+    loss_kg_m: T,
+    stand_kg_m: T,
 }
 
-impl Effect for DuctLoss {
+impl<T: Real> Effect<T> for DuctLoss<T> {
     fn hooks(&self) -> Hooks {
         Hooks::BALANCE
     }
 
     /// The loss meets the water in the duct, so ambient flow does not enter.
-    fn balance(&self, at: &Local, _: &[f64], balance: &mut Balance, _: &mut [f64]) {
+    fn balance(&self, at: &Local<T>, _: &[T], balance: &mut Balance<T>, _: &mut [T]) {
         let square = at.axial_m_s * at.axial_m_s.abs();
         balance.momentum_n -= self.loss_kg_m * square;
         balance.stand_n += self.stand_kg_m * square;

@@ -4,6 +4,7 @@ use super::memory::FirstOrder;
 use super::{Available, Descriptor, Effect, Hooks, Path, Scale, Spec, angle_recorded, one_start, speed_measured};
 use crate::plant::{Sensed, Tick};
 use crate::rig::Rig;
+use crate::real::Real;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -18,15 +19,15 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: one_start,
     needs,
-    build: |values, context| {
+    build: both!(|values, context| {
         Box::new(Eccentricity {
             first: [values[0], values[1]],
             second: [values[2], values[3]],
             filter_s: context.rig.sensors.speed_filter_time_constant_s.unwrap_or(0.0),
             tick_s: context.tick_s,
-            filter: FirstOrder::default(),
+            filter: FirstOrder::new(),
         })
-    },
+    }),
 };
 
 fn parameters(_: &Scale) -> Vec<Spec> {
@@ -39,24 +40,24 @@ fn needs(rig: &Rig, available: &Available) -> Result<(), &'static str> {
     angle_recorded(rig, available)
 }
 
-struct Eccentricity {
-    first: [f64; 2],
-    second: [f64; 2],
+struct Eccentricity<T> {
+    first: [T; 2],
+    second: [T; 2],
     filter_s: f64,
     tick_s: f64,
-    filter: FirstOrder,
+    filter: FirstOrder<T>,
 }
 
-impl Effect for Eccentricity {
+impl<T: Real> Effect<T> for Eccentricity<T> {
     fn hooks(&self) -> Hooks {
         Hooks::SENSE
     }
 
-    fn sense(&mut self, tick: &Tick, sensed: &mut Sensed) {
-        let angle = tick.shaft_angle_rad.map_or(sensed.shaft_angle_rad, |(_, end)| end);
+    fn sense(&mut self, tick: &Tick, sensed: &mut Sensed<T>) {
+        let angle = tick.shaft_angle_rad.map_or(sensed.shaft_angle_rad, |(_, end)| T::from(end));
         let (sin, cos) = angle.sin_cos();
-        let (sin_2, cos_2) = (2.0 * sin * cos, 1.0 - 2.0 * sin * sin);
+        let (sin_2, cos_2) = (sin * 2.0 * cos, T::ONE - sin * 2.0 * sin);
         let wave = self.first[0] * sin + self.first[1] * cos + self.second[0] * sin_2 + self.second[1] * cos_2;
-        sensed.shaft_speed_rad_s += self.filter.step(sensed.true_speed_rad_s * wave, self.filter_s, self.tick_s);
+        sensed.shaft_speed_rad_s += self.filter.step(sensed.true_speed_rad_s * wave, T::from(self.filter_s), self.tick_s);
     }
 }

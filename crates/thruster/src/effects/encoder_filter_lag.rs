@@ -3,6 +3,7 @@
 use super::memory::FirstOrder;
 use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, speed_measured};
 use crate::plant::{Sensed, Tick};
+use crate::real::Real;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -17,19 +18,18 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: |_| vec![vec![0.03, 0.03], vec![0.1, 0.1]],
     needs: speed_measured,
-    build: |values, context| {
+    build: both!(|values, context| {
         let tick_s = context.tick_s;
-        let decay = |t: f64| if t > 0.0 { (-tick_s / t).exp() } else { 0.0 };
         let stated_s = context.rig.sensors.speed_filter_time_constant_s.unwrap_or(0.0);
         Box::new(EncoderFilterLag {
-            stated: decay(stated_s),
-            slower: decay(stated_s + values[0]),
+            stated: decay(stated_s, tick_s),
+            slower: decay(values[0] + stated_s, tick_s),
             memory: None,
             lag_s: values[1],
             tick_s,
-            lag: FirstOrder::default(),
+            lag: FirstOrder::new(),
         })
-    },
+    }),
 };
 
 fn parameters(_: &Scale) -> Vec<Spec> {
@@ -39,28 +39,33 @@ fn parameters(_: &Scale) -> Vec<Spec> {
     ]
 }
 
-struct EncoderFilterLag {
-    /// Decay over a tick of the filter as stated, and as it is.
-    stated: f64,
-    slower: f64,
-    /// Last output of the stated filter, and of the one in its place.
-    memory: Option<(f64, f64)>,
-    lag_s: f64,
-    tick_s: f64,
-    lag: FirstOrder,
+/// Decay of a filter over a tick.
+fn decay<T: Real>(time_constant_s: T, tick_s: f64) -> T {
+    if time_constant_s > 0.0 { (T::from(-tick_s) / time_constant_s).exp() } else { T::ZERO }
 }
 
-impl Effect for EncoderFilterLag {
+struct EncoderFilterLag<T> {
+    /// Decay over a tick of the filter as stated, and as it is.
+    stated: f64,
+    slower: T,
+    /// Last output of the stated filter, and of the one in its place.
+    memory: Option<(T, T)>,
+    lag_s: T,
+    tick_s: f64,
+    lag: FirstOrder<T>,
+}
+
+impl<T: Real> Effect<T> for EncoderFilterLag<T> {
     fn hooks(&self) -> Hooks {
         Hooks::SENSE
     }
 
-    fn sense(&mut self, _: &Tick, sensed: &mut Sensed) {
+    fn sense(&mut self, _: &Tick, sensed: &mut Sensed<T>) {
         let seen = sensed.shaft_speed_rad_s;
         let (before, last) = self.memory.unwrap_or((seen, seen));
         // The stated filter undone, and the slower one in its place.
-        let raw = (seen - self.stated * before) / (1.0 - self.stated);
-        let slow = self.slower * last + (1.0 - self.slower) * raw;
+        let raw = (seen - before * self.stated) / (1.0 - self.stated);
+        let slow = self.slower * last + (T::ONE - self.slower) * raw;
         self.memory = Some((seen, slow));
         sensed.shaft_speed_rad_s = self.lag.step(slow, self.lag_s, self.tick_s);
     }

@@ -3,6 +3,7 @@
 use super::{Available, Descriptor, Effect, Hooks, Path, Scale, Spec, free_shaft, one_start, wet};
 use crate::plant::{Balance, Local};
 use crate::rig::Rig;
+use crate::real::Real;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -19,7 +20,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: one_start,
     needs,
-    build: |values, _| Box::new(EntrainedWater { inertia_kg_m2: values[0] }),
+    build: both!(|values, _| Box::new(EntrainedWater { inertia_kg_m2: values[0] })),
 };
 
 fn parameters(scale: &Scale) -> Vec<Spec> {
@@ -32,16 +33,16 @@ fn needs(rig: &Rig, available: &Available) -> Result<(), &'static str> {
     free_shaft(rig, available)
 }
 
-struct EntrainedWater {
-    inertia_kg_m2: f64,
+struct EntrainedWater<T> {
+    inertia_kg_m2: T,
 }
 
-impl Effect for EntrainedWater {
+impl<T: Real> Effect<T> for EntrainedWater<T> {
     fn hooks(&self) -> Hooks {
         Hooks::BALANCE
     }
 
-    fn balance(&self, _: &Local, _: &[f64], balance: &mut Balance, _: &mut [f64]) {
+    fn balance(&self, _: &Local<T>, _: &[T], balance: &mut Balance<T>, _: &mut [T]) {
         balance.inertia_kg_m2 += self.inertia_kg_m2;
     }
 }

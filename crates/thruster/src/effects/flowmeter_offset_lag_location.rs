@@ -3,6 +3,7 @@
 use super::memory::{FirstOrder, History};
 use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, flow_measured};
 use crate::plant::{Sensed, Tick};
+use crate::real::Real;
 
 /// Longest delay of the meter, s.
 const LONGEST_S: f64 = 1.0;
@@ -25,7 +26,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
         [0.06, 0.15].iter().map(|s| vec![s * full, s * full, 0.02, 0.005 * full, 0.08 * full]).collect()
     },
     needs: flow_measured,
-    build: |values, context| {
+    build: both!(|values, context| {
         Box::new(FlowMeter {
             distance_m: values[0],
             mixing_m: values[1],
@@ -34,9 +35,9 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
             drift_m_s: values[4],
             tick_s: context.tick_s,
             past: History::new(LONGEST_S, context.tick_s),
-            mixed: FirstOrder::default(),
+            mixed: FirstOrder::new(),
         })
-    },
+    }),
 };
 
 fn parameters(scale: &Scale) -> Vec<Spec> {
@@ -50,27 +51,27 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
     ]
 }
 
-struct FlowMeter {
-    distance_m: f64,
-    mixing_m: f64,
-    gain_error: f64,
-    offset_m_s: f64,
-    drift_m_s: f64,
+struct FlowMeter<T> {
+    distance_m: T,
+    mixing_m: T,
+    gain_error: T,
+    offset_m_s: T,
+    drift_m_s: T,
     tick_s: f64,
-    past: History,
-    mixed: FirstOrder,
+    past: History<T>,
+    mixed: FirstOrder<T>,
 }
 
-impl Effect for FlowMeter {
+impl<T: Real> Effect<T> for FlowMeter<T> {
     fn hooks(&self) -> Hooks {
         Hooks::SENSE
     }
 
-    fn sense(&mut self, _: &Tick, sensed: &mut Sensed) {
+    fn sense(&mut self, _: &Tick, sensed: &mut Sensed<T>) {
         let carried_m_s = sensed.flow_m_s.abs() + self.drift_m_s;
         self.past.push(sensed.flow_m_s);
-        let arrived = self.past.ago((self.distance_m / carried_m_s).min(LONGEST_S));
+        let arrived = self.past.ago((self.distance_m / carried_m_s).min(T::from(LONGEST_S)));
         let mixed = self.mixed.step(arrived, self.mixing_m / carried_m_s, self.tick_s);
-        sensed.flow_m_s = mixed * (1.0 + self.gain_error) + self.offset_m_s;
+        sensed.flow_m_s = mixed * (self.gain_error + 1.0) + self.offset_m_s;
     }
 }

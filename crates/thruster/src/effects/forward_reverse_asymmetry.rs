@@ -3,6 +3,7 @@
 use super::{Context, Descriptor, Effect, Hooks, Path, Scale, Spec, one_start, wet};
 use crate::parameters::Parameter as P;
 use crate::plant::{Balance, Foil, Local};
+use crate::real::Real;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -17,7 +18,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: one_start,
     needs: wet,
-    build,
+    build: both!(build),
 };
 
 fn parameters(_: &Scale) -> Vec<Spec> {
@@ -28,7 +29,7 @@ fn parameters(_: &Scale) -> Vec<Spec> {
     ]
 }
 
-fn build(values: &[f64], context: &Context) -> Box<dyn Effect> {
+fn build<T: Real>(values: &[T], context: &Context<T>) -> Box<dyn Effect<T>> {
     let p = context.parameters;
     Box::new(Asymmetry {
         lift: values[0],
@@ -37,27 +38,27 @@ fn build(values: &[f64], context: &Context) -> Box<dyn Effect> {
     })
 }
 
-struct Asymmetry {
-    lift: f64,
-    drag: f64,
-    flux_kg_m: f64,
+struct Asymmetry<T> {
+    lift: T,
+    drag: T,
+    flux_kg_m: T,
 }
 
-impl Effect for Asymmetry {
+impl<T: Real> Effect<T> for Asymmetry<T> {
     fn hooks(&self) -> Hooks {
         Hooks { foil: true, balance: true, ..Hooks::NONE }
     }
 
     /// Goes over smoothly as the flow along the chord turns round: 0 ahead, 1 astern.
-    fn foil(&self, _: &Local, _: &[f64], foil: &mut Foil) {
+    fn foil(&self, _: &Local<T>, _: &[T], foil: &mut Foil<T>) {
         let along = foil.chordwise_m_s / foil.speed_m_s;
-        let astern = 0.5 - 0.25 * along * (3.0 - along * along);
-        foil.lift *= 1.0 + self.lift * astern;
-        foil.drag *= 1.0 + self.drag * astern;
+        let astern = T::from(0.5) - along * 0.25 * (T::from(3.0) - along * along);
+        foil.lift *= self.lift * astern + 1.0;
+        foil.drag *= self.drag * astern + 1.0;
     }
 
     /// The flux itself vanishes where the flow turns round.
-    fn balance(&self, at: &Local, _: &[f64], balance: &mut Balance, _: &mut [f64]) {
+    fn balance(&self, at: &Local<T>, _: &[T], balance: &mut Balance<T>, _: &mut [T]) {
         if at.axial_m_s < 0.0 {
             balance.flux_kg_m += self.flux_kg_m;
         }

@@ -4,6 +4,7 @@ use super::{Available, Context, Descriptor, Effect, Hooks, Path, Scale, Spec, fr
 use crate::parameters::Parameter as P;
 use crate::plant::{Balance, Drive, Local, Sensed, Tick};
 use crate::rig::Rig;
+use crate::real::Real;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -19,7 +20,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: one_start,
     needs,
-    build,
+    build: both!(build),
 };
 
 fn parameters(_: &Scale) -> Vec<Spec> {
@@ -34,82 +35,82 @@ fn needs(rig: &Rig, available: &Available) -> Result<(), &'static str> {
     if rig.class.to_lowercase().contains("gear") { Ok(()) } else { Err("the rig is direct drive: its class names no gear") }
 }
 
-fn build(values: &[f64], context: &Context) -> Box<dyn Effect> {
+fn build<T: Real>(values: &[T], context: &Context<T>) -> Box<dyn Effect<T>> {
     Box::new(GearBacklash {
         gap_rad: values[0],
         motor_inertia_kg_m2: values[1] * context.parameters.get(P::InertiaKgM2),
         torque_constant_nm_a: context.parameters.get(P::TorqueConstantNmA),
         tick_s: context.tick_s,
         side: 0.0,
-        crossed_rad: 0.0,
-        relative_rad_s: 0.0,
-        blow_n_m: 0.0,
-        later_n_m: 0.0,
-        passed: 1.0,
+        crossed_rad: T::ZERO,
+        relative_rad_s: T::ZERO,
+        blow_n_m: T::ZERO,
+        later_n_m: T::ZERO,
+        passed: T::ONE,
     })
 }
 
-struct GearBacklash {
-    gap_rad: f64,
-    motor_inertia_kg_m2: f64,
-    torque_constant_nm_a: f64,
+struct GearBacklash<T> {
+    gap_rad: T,
+    motor_inertia_kg_m2: T,
+    torque_constant_nm_a: T,
     tick_s: f64,
     /// Flank in contact: the sign of the torque it carries; 0 before the first torque.
     side: f64,
-    crossed_rad: f64,
-    relative_rad_s: f64,
+    crossed_rad: T,
+    relative_rad_s: T,
     /// Torque of the blow in this tick and what is left of it for the next.
-    blow_n_m: f64,
-    later_n_m: f64,
+    blow_n_m: T,
+    later_n_m: T,
     /// Share of motor torque that reaches the propeller in this tick.
-    passed: f64,
+    passed: T,
 }
 
-impl Effect for GearBacklash {
+impl<T: Real> Effect<T> for GearBacklash<T> {
     fn hooks(&self) -> Hooks {
         Hooks { drive: true, balance: true, sense: true, ..Hooks::NONE }
     }
 
-    fn drive(&mut self, _: &Tick, drive: &mut Drive) {
+    fn drive(&mut self, _: &Tick, drive: &mut Drive<T>) {
         let (dt, torque) = (self.tick_s, self.torque_constant_nm_a * drive.current_a);
-        (self.blow_n_m, self.later_n_m, self.passed) = (self.later_n_m, 0.0, 1.0);
+        (self.blow_n_m, self.later_n_m, self.passed) = (self.later_n_m, T::ZERO, T::ONE);
         if self.side == 0.0 {
-            self.side = if torque == 0.0 { 0.0 } else { torque.signum() };
+            self.side = if torque.re() == 0.0 { 0.0 } else { torque.re().signum() };
         }
         let in_gap = self.crossed_rad > 0.0 || torque * self.side < 0.0;
-        if self.gap_rad <= 0.0 || !in_gap {
+        if !in_gap {
             return;
         }
         // Counted positive away from the flank that was in contact.
         let push = -torque * self.side / self.motor_inertia_kg_m2;
         let before = self.crossed_rad;
         let left_rad_s = self.relative_rad_s;
-        let after = before + dt * (left_rad_s + 0.5 * dt * push);
-        self.relative_rad_s = left_rad_s + dt * push;
-        self.passed = 0.0;
+        let after = before + (left_rad_s + push * (0.5 * dt)) * dt;
+        self.relative_rad_s = left_rad_s + push * dt;
+        self.passed = T::ZERO;
         if after >= self.gap_rad {
             // Strikes a part of the way through the tick: that part of the blow falls into the next.
             let part = (self.gap_rad - before) / (after - before);
             let speed_rad_s = left_rad_s + part * dt * push;
             self.side = -self.side;
-            let blow = self.side * self.motor_inertia_kg_m2 * speed_rad_s / dt;
-            self.blow_n_m += blow * (1.0 - part);
+            let blow = self.motor_inertia_kg_m2 * self.side * speed_rad_s / dt;
+            self.blow_n_m += blow * (T::ONE - part);
             self.later_n_m = blow * part;
-            self.passed = 1.0 - part;
-            (self.crossed_rad, self.relative_rad_s) = (0.0, 0.0);
+            self.passed = T::ONE - part;
+            (self.crossed_rad, self.relative_rad_s) = (T::ZERO, T::ZERO);
         } else if after <= 0.0 {
-            (self.crossed_rad, self.relative_rad_s) = (0.0, 0.0);
+            (self.crossed_rad, self.relative_rad_s) = (T::ZERO, T::ZERO);
         } else {
             self.crossed_rad = after;
         }
     }
 
-    fn balance(&self, _: &Local, _: &[f64], balance: &mut Balance, _: &mut [f64]) {
+    fn balance(&self, _: &Local<T>, _: &[T], balance: &mut Balance<T>, _: &mut [T]) {
         balance.motor_torque_n_m = balance.motor_torque_n_m * self.passed + self.blow_n_m;
     }
 
     /// The encoder sits on the motor.
-    fn sense(&mut self, _: &Tick, sensed: &mut Sensed) {
-        sensed.shaft_speed_rad_s -= self.side * self.relative_rad_s;
+    fn sense(&mut self, _: &Tick, sensed: &mut Sensed<T>) {
+        sensed.shaft_speed_rad_s -= self.relative_rad_s * self.side;
     }
 }

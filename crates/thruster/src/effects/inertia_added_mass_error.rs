@@ -2,6 +2,7 @@
 
 use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, wet};
 use crate::plant::{Balance, Local};
+use crate::real::Real;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -16,23 +17,23 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: |_| vec![vec![-0.3], vec![1.0]],
     needs: wet,
-    build: |values, _| Box::new(AddedMassError { factor: 1.0 + values[0] }),
+    build: both!(|values, _| Box::new(AddedMassError { factor: values[0] + 1.0 })),
 };
 
 fn parameters(_: &Scale) -> Vec<Spec> {
     vec![Spec::strength("added_mass_error", "1", 0.2, -0.8, 6.0)]
 }
 
-struct AddedMassError {
-    factor: f64,
+struct AddedMassError<T> {
+    factor: T,
 }
 
-impl Effect for AddedMassError {
+impl<T: Real> Effect<T> for AddedMassError<T> {
     fn hooks(&self) -> Hooks {
         Hooks::BALANCE
     }
 
-    fn balance(&self, _: &Local, _: &[f64], balance: &mut Balance, _: &mut [f64]) {
+    fn balance(&self, _: &Local<T>, _: &[T], balance: &mut Balance<T>, _: &mut [T]) {
         balance.added_mass_kg *= self.factor;
     }
 }

@@ -1,6 +1,7 @@
 //! Something of the water that changes with time in its own way: straight pieces between knots.
 
 use super::{Scale, Spec, Stretch};
+use crate::real::Real;
 
 /// Names of knots, as many as a recording may need.
 macro_rules! knot_names {
@@ -47,19 +48,19 @@ pub(super) fn specs(
 }
 
 /// Straight pieces; the knots repeat past the last one, so a recording may begin at any time.
-pub(super) struct Knots {
+pub(super) struct Knots<T> {
     spacing_s: f64,
-    values: Vec<f64>,
+    values: Vec<T>,
 }
 
-impl Knots {
+impl<T: Real> Knots<T> {
     /// From an effect's values: the distance, then the knots.
-    pub fn new(values: &[f64]) -> Self {
-        Self { spacing_s: values[0], values: values[1..].to_vec() }
+    pub fn new(values: &[T]) -> Self {
+        Self { spacing_s: values[0].re(), values: values[1..].to_vec() }
     }
 
     /// The value at a time.
-    pub fn at(&self, time_s: f64) -> f64 {
+    pub fn at(&self, time_s: f64) -> T {
         let count = self.values.len();
         let place = (time_s / self.spacing_s).rem_euclid(count as f64);
         let (knot, part) = (place as usize % count, place.fract());

@@ -1,23 +1,25 @@
 //! What effects remember from tick to tick: a past signal, a first-order lag.
 
+use crate::real::Real;
+
 /// The past of a signal sampled once a tick. Before the first sample the signal is taken as
 /// constant.
-pub(super) struct History {
+pub(super) struct History<T> {
     tick_s: f64,
-    ring: Vec<f64>,
+    ring: Vec<T>,
     newest: usize,
     empty: bool,
 }
 
-impl History {
+impl<T: Real> History<T> {
     /// Room for delays up to `longest_s`.
     pub fn new(longest_s: f64, tick_s: f64) -> Self {
         let ticks = (longest_s.max(0.0) / tick_s).ceil() as usize;
-        Self { tick_s, ring: vec![0.0; ticks + 2], newest: 0, empty: true }
+        Self { tick_s, ring: vec![T::ZERO; ticks + 2], newest: 0, empty: true }
     }
 
     /// The sample of this tick.
-    pub fn push(&mut self, sample: f64) {
+    pub fn push(&mut self, sample: T) {
         if self.empty {
             self.ring.fill(sample);
             self.empty = false;
@@ -28,33 +30,43 @@ impl History {
 
     /// The signal `delay_s` before the newest sample; the two neighbouring ticks are mixed, so
     /// that the answer is continuous in the delay.
-    pub fn ago(&self, delay_s: f64) -> f64 {
+    pub fn ago(&self, delay_s: T) -> T {
         let last = self.ring.len() - 1;
-        let ticks = (delay_s / self.tick_s).clamp(0.0, last as f64);
-        let whole = (ticks as usize).min(last - 1);
+        let ticks = (delay_s / self.tick_s).max(T::ZERO).min(T::from(last as f64));
+        let whole = (ticks.re() as usize).min(last - 1);
         let part = ticks - whole as f64;
         let at = |back: usize| self.ring[(self.newest + self.ring.len() - back) % self.ring.len()];
-        at(whole) * (1.0 - part) + at(whole + 1) * part
+        at(whole) * (T::ONE - part) + at(whole + 1) * part
     }
 }
 
 /// Exact first-order lag of a signal that runs straight from sample to sample.
-#[derive(Default)]
-pub(super) struct FirstOrder {
-    input: f64,
-    output: f64,
+pub(super) struct FirstOrder<T> {
+    input: T,
+    output: T,
     started: bool,
 }
 
-impl FirstOrder {
+impl<T: Real> FirstOrder<T> {
+    /// Without a past.
+    pub fn new() -> Self {
+        Self { input: T::ZERO, output: T::ZERO, started: false }
+    }
+
     /// The lagged signal at the end of a tick of `tick_s`, for a lag of `lag_s` (none below 1 ns).
-    pub fn step(&mut self, input: f64, lag_s: f64, tick_s: f64) -> f64 {
-        if !self.started || lag_s <= 1e-9 {
+    pub fn step(&mut self, input: T, lag_s: T, tick_s: f64) -> T {
+        if !self.started {
             *self = Self { input, output: input, started: true };
             return input;
         }
-        let behind = lag_s * (input - self.input) / tick_s;
-        self.output = input - behind + (self.output - self.input + behind) * (-tick_s / lag_s).exp();
+        let step = input - self.input;
+        self.output = if lag_s > 1e-9 {
+            let behind = lag_s * step / tick_s;
+            input - behind + (self.output - self.input + behind) * (T::from(-tick_s) / lag_s).exp()
+        } else {
+            // No lag, but the slope into one: the signal would trail.
+            input - (lag_s - lag_s.re()) * step / tick_s
+        };
         self.input = input;
         self.output
     }
@@ -77,7 +89,7 @@ mod tests {
 
     #[test]
     fn a_ramp_leaves_a_first_order_lag_behind_by_slope_times_lag() {
-        let mut lag = FirstOrder::default();
+        let mut lag = FirstOrder::new();
         let mut y = 0.0;
         for k in 0..2000 {
             y = lag.step(k as f64 * 0.002, 0.05, 0.002);

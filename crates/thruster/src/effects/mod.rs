@@ -1,11 +1,13 @@
 //! Physics a model may leave out: one effect, one file, registered in one list.
 //!
-//! The same code serves the simulated truth and the fit: an effect reads its parameters and acts
-//! at hooks of the [plant](crate::plant). Each file says what the effect is, its equation, what
+//! The same code serves the simulated truth and the fit, on plain numbers and on numbers that carry
+//! their derivatives ([`Real`](crate::real::Real)): an effect reads its parameters and acts at hooks of
+//! the [plant](crate::plant). Each file says what the effect is, its equation, what
 //! the residual looks like, what it is confused with, and what separates it; `kort explain`
 //! prints just that.
 
 use crate::blade::Inflow;
+use crate::dual::Dual;
 use crate::models::ModelName;
 use crate::parameters::Parameters;
 use crate::plant::{Balance, Drive, Foil, Local, Sensed, Tick};
@@ -119,25 +121,25 @@ impl Spec {
 ///
 /// `own` holds the effect's continuous states (as many as [`Effect::states`] says), integrated
 /// with the plant; their rates go to `rates` in [`Effect::balance`].
-pub trait Effect: Send {
+pub trait Effect<T = f64>: Send {
     /// Number of continuous states.
     fn states(&self) -> usize {
         0
     }
     /// Once, before the run: other equations or other values of their parameters.
-    fn amend(&self, _model: &mut ModelName, _parameters: &mut Parameters) {}
+    fn amend(&self, _model: &mut ModelName, _parameters: &mut Parameters<T>) {}
     /// Which hooks are used; the others are never called.
     fn hooks(&self) -> Hooks;
     /// Once a control tick, before the drive acts: command, limits, lag, supply.
-    fn drive(&mut self, _tick: &Tick, _drive: &mut Drive) {}
+    fn drive(&mut self, _tick: &Tick, _drive: &mut Drive<T>) {}
     /// The water that meets the blade.
-    fn inflow(&self, _at: &Local, _own: &[f64], _inflow: &mut Inflow) {}
+    fn inflow(&self, _at: &Local<T>, _own: &[T], _inflow: &mut Inflow<T>) {}
     /// Lift and drag coefficients, density.
-    fn foil(&self, _at: &Local, _own: &[f64], _foil: &mut Foil) {}
+    fn foil(&self, _at: &Local<T>, _own: &[T], _foil: &mut Foil<T>) {}
     /// Torques on the shaft and forces on the water.
-    fn balance(&self, _at: &Local, _own: &[f64], _balance: &mut Balance, _rates: &mut [f64]) {}
+    fn balance(&self, _at: &Local<T>, _own: &[T], _balance: &mut Balance<T>, _rates: &mut [T]) {}
     /// Once a control tick, after the step: what the sensors see.
-    fn sense(&mut self, _tick: &Tick, _sensed: &mut Sensed) {}
+    fn sense(&mut self, _tick: &Tick, _sensed: &mut Sensed<T>) {}
 }
 
 /// Hooks an effect uses.
@@ -217,14 +219,32 @@ pub struct Descriptor {
     /// Why it cannot be fitted from this recording, if so.
     pub needs: fn(&Rig, &Available) -> Result<(), &'static str>,
     /// Builds the effect with values for its parameters.
-    pub build: fn(&[f64], &Context) -> Box<dyn Effect>,
+    pub build: Build,
+}
+
+/// Builds an effect on plain numbers, and on numbers with derivatives. [`both`](crate::both) makes it.
+pub struct Build {
+    /// For a simulation.
+    pub plain: Builder<f64>,
+    /// For a simulation with derivatives.
+    pub dual: Builder<Dual>,
+}
+
+type Builder<T> = fn(&[T], &Context<T>) -> Box<dyn Effect<T>>;
+
+/// A [`Build`] from one function of values and context, compiled for both kinds of number.
+#[macro_export]
+macro_rules! both {
+    ($build:expr) => {
+        $crate::effects::Build { plain: $build, dual: $build }
+    };
 }
 
 /// What an effect may know of the plant when it is built.
 #[derive(Clone, Copy, Debug)]
-pub struct Context<'a> {
+pub struct Context<'a, T = f64> {
     /// The plant's parameters.
-    pub parameters: &'a Parameters,
+    pub parameters: &'a Parameters<T>,
     /// The stated rig.
     pub rig: &'a Rig,
     /// Control period, s.
@@ -233,11 +253,6 @@ pub struct Context<'a> {
 
 /// Name under which [`Available`] lists a recorded signal laid into [`Tick::extra`].
 pub const EXTRA: &str = "extra";
-
-/// A smooth step from 0 to 1 about zero, `1/(1 + exp(-x))`.
-pub fn logistic(x: f64) -> f64 {
-    1.0 / (1.0 + (-x).exp())
-}
 
 /// No further starting points.
 pub fn one_start(_: &Scale) -> Vec<Vec<f64>> {

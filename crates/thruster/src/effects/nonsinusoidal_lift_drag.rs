@@ -2,6 +2,7 @@
 
 use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, one_start, wet};
 use crate::plant::{Foil, Local};
+use crate::real::Real;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -17,7 +18,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: one_start,
     needs: wet,
-    build: |values, _| Box::new(NonsinusoidalLiftDrag { profile_drag: values[0], drag_4: values[1], lift_4: values[2] }),
+    build: both!(|values, _| Box::new(NonsinusoidalLiftDrag { profile_drag: values[0], drag_4: values[1], lift_4: values[2] })),
 };
 
 /// Bounded where the blade would begin to pull energy out of still water.
@@ -29,20 +30,20 @@ fn parameters(_: &Scale) -> Vec<Spec> {
     ]
 }
 
-struct NonsinusoidalLiftDrag {
-    profile_drag: f64,
-    drag_4: f64,
-    lift_4: f64,
+struct NonsinusoidalLiftDrag<T> {
+    profile_drag: T,
+    drag_4: T,
+    lift_4: T,
 }
 
-impl Effect for NonsinusoidalLiftDrag {
+impl<T: Real> Effect<T> for NonsinusoidalLiftDrag<T> {
     fn hooks(&self) -> Hooks {
         Hooks::FOIL
     }
 
     /// sin 4a = 2 sin 2a cos 2a; 1 - cos 4a = 2 sin^2 2a.
-    fn foil(&self, _: &Local, _: &[f64], foil: &mut Foil) {
-        let (sin, cos) = (foil.sin_2a, 1.0 - foil.one_minus_cos_2a);
+    fn foil(&self, _: &Local<T>, _: &[T], foil: &mut Foil<T>) {
+        let (sin, cos) = (foil.sin_2a, T::ONE - foil.one_minus_cos_2a);
         foil.drag += self.profile_drag + self.drag_4 * 2.0 * sin * sin;
         foil.lift += self.lift_4 * 2.0 * sin * cos;
     }

@@ -4,6 +4,7 @@ use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, wet};
 use crate::blade::{Inflow, REFERENCE_RADIUS};
 use crate::parameters::Parameter as P;
 use crate::plant::{Balance, Local};
+use crate::real::Real;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -20,16 +21,16 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: |_| vec![vec![0.1, 0.08], vec![0.1, 1.5]],
     needs: wet,
-    build: |values, context| {
+    build: both!(|values, context| {
         let p = context.parameters;
         Box::new(RotationalFlow {
             share: values[0],
             flux_kg_m: p.get(P::DensityKgM3) * p.area_m2(),
             mass_kg: values[1] * p.duct_mass_kg(),
-            lever_m: REFERENCE_RADIUS * p.get(P::RadiusM),
+            lever_m: p.get(P::RadiusM) * REFERENCE_RADIUS,
             tick_s: context.tick_s,
         })
-    },
+    }),
 };
 
 /// The published pair (`dbr`, `gr`) divided by `dbr`, so that the effect vanishes at zero yield.
@@ -40,15 +41,15 @@ fn parameters(_: &Scale) -> Vec<Spec> {
     ]
 }
 
-struct RotationalFlow {
-    share: f64,
-    flux_kg_m: f64,
-    mass_kg: f64,
-    lever_m: f64,
+struct RotationalFlow<T> {
+    share: T,
+    flux_kg_m: T,
+    mass_kg: T,
+    lever_m: T,
     tick_s: f64,
 }
 
-impl Effect for RotationalFlow {
+impl<T: Real> Effect<T> for RotationalFlow<T> {
     fn states(&self) -> usize {
         1
     }
@@ -57,12 +58,12 @@ impl Effect for RotationalFlow {
         Hooks { inflow: true, balance: true, ..Hooks::NONE }
     }
 
-    fn inflow(&self, _: &Local, own: &[f64], inflow: &mut Inflow) {
+    fn inflow(&self, _: &Local<T>, own: &[T], inflow: &mut Inflow<T>) {
         inflow.tangential_m_s -= own[0];
     }
 
     /// The swirl's lag is never shorter than a tick, which the integrator could not follow.
-    fn balance(&self, at: &Local, own: &[f64], balance: &mut Balance, rates: &mut [f64]) {
+    fn balance(&self, at: &Local<T>, own: &[T], balance: &mut Balance<T>, rates: &mut [T]) {
         let washed = self.flux_kg_m * at.axial_m_s.abs();
         rates[0] = (self.share * balance.blade_torque_n_m / self.lever_m - washed * own[0])
             / (self.mass_kg + washed * self.tick_s);

@@ -2,6 +2,7 @@
 
 use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, free_shaft, one_start};
 use crate::plant::{Balance, Local};
+use crate::real::Real;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -17,23 +18,23 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: one_start,
     needs: free_shaft,
-    build: |values, _| Box::new(RotorInertiaError { factor: 1.0 + values[0] }),
+    build: both!(|values, _| Box::new(RotorInertiaError { factor: values[0] + 1.0 })),
 };
 
 fn parameters(_: &Scale) -> Vec<Spec> {
     vec![Spec::strength("inertia_error", "1", 0.15, -0.8, 5.0)]
 }
 
-struct RotorInertiaError {
-    factor: f64,
+struct RotorInertiaError<T> {
+    factor: T,
 }
 
-impl Effect for RotorInertiaError {
+impl<T: Real> Effect<T> for RotorInertiaError<T> {
     fn hooks(&self) -> Hooks {
         Hooks::BALANCE
     }
 
-    fn balance(&self, _: &Local, _: &[f64], balance: &mut Balance, _: &mut [f64]) {
+    fn balance(&self, _: &Local<T>, _: &[T], balance: &mut Balance<T>, _: &mut [T]) {
         balance.inertia_kg_m2 *= self.factor;
     }
 }

@@ -2,6 +2,7 @@
 
 use super::{Context, Descriptor, Effect, Hooks, Path, Scale, Spec, thrust_measured};
 use crate::plant::{Sensed, Tick};
+use crate::real::Real;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -18,7 +19,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: |_| [5.0, 7.0, 10.0, 14.0, 28.0, 40.0, 56.0, 80.0].iter().map(|hz| vec![0.5, *hz, 0.03]).collect(),
     needs: thrust_measured,
-    build,
+    build: both!(build),
 };
 
 fn parameters(_: &Scale) -> Vec<Spec> {
@@ -29,45 +30,45 @@ fn parameters(_: &Scale) -> Vec<Spec> {
     ]
 }
 
-fn build(values: &[f64], context: &Context) -> Box<dyn Effect> {
-    let (wn, z, dt) = (std::f64::consts::TAU * values[1], values[2], context.tick_s);
-    let (decay, damped) = (z * wn, wn * (1.0 - z * z).sqrt());
+fn build<T: Real>(values: &[T], context: &Context<T>) -> Box<dyn Effect<T>> {
+    let (wn, z, dt) = (values[1] * std::f64::consts::TAU, values[2], context.tick_s);
+    let (decay, damped) = (z * wn, wn * (T::ONE - z * z).sqrt());
     let ((sin, cos), fall) = ((damped * dt).sin_cos(), (-decay * dt).exp());
     Box::new(StandResonance {
         share: values[0],
-        behind_s: 2.0 * z / wn,
+        behind_s: z * 2.0 / wn,
         tick_s: dt,
         // Free swing over one tick: e(t), e'(t) from e, e' at its start.
         free: [
             [fall * (cos + decay / damped * sin), fall * sin / damped],
             [-fall * wn * wn / damped * sin, fall * (cos - decay / damped * sin)],
         ],
-        thrust_n: 0.0,
+        thrust_n: T::ZERO,
         swing: None,
     })
 }
 
-struct StandResonance {
-    share: f64,
-    behind_s: f64,
+struct StandResonance<T> {
+    share: T,
+    behind_s: T,
     tick_s: f64,
-    free: [[f64; 2]; 2],
-    thrust_n: f64,
+    free: [[T; 2]; 2],
+    thrust_n: T,
     /// Position (as thrust, N) and its rate.
-    swing: Option<[f64; 2]>,
+    swing: Option<[T; 2]>,
 }
 
-impl Effect for StandResonance {
+impl<T: Real> Effect<T> for StandResonance<T> {
     fn hooks(&self) -> Hooks {
         Hooks::SENSE
     }
 
     /// Exact for a thrust that runs straight over the tick: the swing about the forced answer to
     /// a ramp, which trails the ramp by `2 z/wn`.
-    fn sense(&mut self, _: &Tick, sensed: &mut Sensed) {
+    fn sense(&mut self, _: &Tick, sensed: &mut Sensed<T>) {
         let thrust = sensed.thrust_n;
-        let [position, rate] = self.swing.unwrap_or([thrust, 0.0]);
-        let slope = if self.swing.is_some() { (thrust - self.thrust_n) / self.tick_s } else { 0.0 };
+        let [position, rate] = self.swing.unwrap_or([thrust, T::ZERO]);
+        let slope = if self.swing.is_some() { (thrust - self.thrust_n) / self.tick_s } else { T::ZERO };
         let before = if self.swing.is_some() { self.thrust_n } else { thrust };
         let (e, de) = (position - (before - self.behind_s * slope), rate - slope);
         let [[a, b], [c, d]] = self.free;

@@ -5,6 +5,7 @@ use super::voltage_limit_backemf::{self, emf_share};
 use super::{Available, Descriptor, Effect, Hooks, Path, Scale, Spec};
 use crate::plant::{Drive, Tick};
 use crate::rig::Rig;
+use crate::real::Real;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -21,16 +22,16 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts,
     needs,
-    build: |values, context| {
+    build: both!(|values, context| {
         Box::new(SupplySag {
             source_ohm: values[0],
             recovery_s: values[1],
             supply_factor: values[2],
             voltage_drive: context.rig.amplifier.kind == crate::rig::AmplifierKind::Voltage,
             tick_s: context.tick_s,
-            sag: FirstOrder::default(),
+            sag: FirstOrder::new(),
         })
-    },
+    }),
 };
 
 /// The source resistance that would take the whole supply at full power.
@@ -75,27 +76,27 @@ pub(super) fn recorded(available: &Available) -> bool {
     available.supply_sag_share.is_some_and(|share| share > 2.0 * LEAST_SHARE)
 }
 
-struct SupplySag {
-    source_ohm: f64,
-    recovery_s: f64,
-    supply_factor: f64,
+struct SupplySag<T> {
+    source_ohm: T,
+    recovery_s: T,
+    supply_factor: T,
     voltage_drive: bool,
     tick_s: f64,
-    sag: FirstOrder,
+    sag: FirstOrder<T>,
 }
 
-impl Effect for SupplySag {
+impl<T: Real> Effect<T> for SupplySag<T> {
     fn hooks(&self) -> Hooks {
         Hooks::DRIVE
     }
 
-    fn drive(&mut self, _: &Tick, drive: &mut Drive) {
+    fn drive(&mut self, _: &Tick, drive: &mut Drive<T>) {
         drive.supply_v *= self.supply_factor;
         let winding_v = drive.resistance_ohm * drive.current_a + drive.back_emf_v;
         // Bus and winding exchange power; a braking drive does not lift the bus here.
-        let bus_a = (drive.current_a * winding_v).max(0.0) / drive.supply_v;
+        let bus_a = (drive.current_a * winding_v).max(T::ZERO) / drive.supply_v;
         let lost_v = self.sag.step(self.source_ohm * bus_a, self.recovery_s, self.tick_s);
-        let left = 1.0 / (1.0 + lost_v / drive.supply_v);
+        let left = (lost_v / drive.supply_v + 1.0).recip();
         drive.supply_v *= left;
         if self.voltage_drive {
             drive.command *= left;

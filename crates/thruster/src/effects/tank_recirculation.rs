@@ -2,6 +2,7 @@
 
 use super::{Descriptor, Effect, Hooks, Path, Scale, Spec};
 use crate::plant::{Balance, Local};
+use crate::real::Real;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -17,7 +18,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: |_| vec![vec![0.05, 2.0], vec![0.05, 4.0], vec![0.05, 20.0], vec![0.05, 50.0]],
     needs: super::ambient_axial_flow::needs,
-    build: |values, _| Box::new(TankRecirculation { share: values[0], return_s: values[1] }),
+    build: both!(|values, _| Box::new(TankRecirculation { share: values[0], return_s: values[1] })),
 };
 
 fn parameters(_: &Scale) -> Vec<Spec> {
@@ -27,12 +28,12 @@ fn parameters(_: &Scale) -> Vec<Spec> {
     ]
 }
 
-struct TankRecirculation {
-    share: f64,
-    return_s: f64,
+struct TankRecirculation<T> {
+    share: T,
+    return_s: T,
 }
 
-impl Effect for TankRecirculation {
+impl<T: Real> Effect<T> for TankRecirculation<T> {
     fn states(&self) -> usize {
         1
     }
@@ -41,7 +42,7 @@ impl Effect for TankRecirculation {
         Hooks::BALANCE
     }
 
-    fn balance(&self, at: &Local, own: &[f64], balance: &mut Balance, rates: &mut [f64]) {
+    fn balance(&self, at: &Local<T>, own: &[T], balance: &mut Balance<T>, rates: &mut [T]) {
         balance.ambient_m_s += own[0];
         rates[0] = (self.share * at.axial_m_s - own[0]) / self.return_s;
     }

@@ -2,6 +2,7 @@
 
 use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, free_shaft};
 use crate::plant::{Balance, Local};
+use crate::real::Real;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -19,7 +20,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
         [0.1, 1.0, 3.0].iter().map(|share| vec![0.05 * full, (share * scale.duration_s).clamp(4.0, 2000.0)]).collect()
     },
     needs: free_shaft,
-    build: |values, _| Box::new(ThermalDriftKt { loss_per_a2: values[0], lag_s: values[1] }),
+    build: both!(|values, _| Box::new(ThermalDriftKt { loss_per_a2: values[0], lag_s: values[1] })),
 };
 
 fn parameters(scale: &Scale) -> Vec<Spec> {
@@ -30,12 +31,12 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
     ]
 }
 
-struct ThermalDriftKt {
-    loss_per_a2: f64,
-    lag_s: f64,
+struct ThermalDriftKt<T> {
+    loss_per_a2: T,
+    lag_s: T,
 }
 
-impl Effect for ThermalDriftKt {
+impl<T: Real> Effect<T> for ThermalDriftKt<T> {
     fn states(&self) -> usize {
         1
     }
@@ -45,7 +46,7 @@ impl Effect for ThermalDriftKt {
     }
 
     /// The form exp(-c w) is 1 - c w where the loss is small and never turns the torque round.
-    fn balance(&self, at: &Local, own: &[f64], balance: &mut Balance, rates: &mut [f64]) {
+    fn balance(&self, at: &Local<T>, own: &[T], balance: &mut Balance<T>, rates: &mut [T]) {
         balance.motor_torque_n_m *= (-self.loss_per_a2 * own[0]).exp();
         rates[0] = (at.current_a * at.current_a - own[0]) / self.lag_s;
     }

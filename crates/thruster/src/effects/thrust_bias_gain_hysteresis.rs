@@ -2,6 +2,7 @@
 
 use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, one_start, thrust_measured};
 use crate::plant::{Sensed, Tick};
+use crate::real::Real;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -17,7 +18,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: one_start,
     needs: thrust_measured,
-    build: |values, _| Box::new(ThrustSensor { gain_error: values[0], bias_n: values[1], loop_n: values[2], width_n: values[3], anchor_n: 0.0 }),
+    build: both!(|values, _| Box::new(ThrustSensor { gain_error: values[0], bias_n: values[1], loop_n: values[2], width_n: values[3], anchor_n: Real::ZERO })),
 };
 
 fn parameters(scale: &Scale) -> Vec<Spec> {
@@ -30,24 +31,24 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
     ]
 }
 
-struct ThrustSensor {
-    gain_error: f64,
-    bias_n: f64,
-    loop_n: f64,
-    width_n: f64,
-    anchor_n: f64,
+struct ThrustSensor<T> {
+    gain_error: T,
+    bias_n: T,
+    loop_n: T,
+    width_n: T,
+    anchor_n: T,
 }
 
-impl Effect for ThrustSensor {
+impl<T: Real> Effect<T> for ThrustSensor<T> {
     fn hooks(&self) -> Hooks {
         Hooks::SENSE
     }
 
     /// A play operator of half-width `width_n` carries the memory of the loop.
-    fn sense(&mut self, _: &Tick, sensed: &mut Sensed) {
+    fn sense(&mut self, _: &Tick, sensed: &mut Sensed<T>) {
         let t = sensed.thrust_n;
         // Not `clamp`, which panics on the NaN of a simulation that broke down.
         self.anchor_n = self.anchor_n.max(t - self.width_n).min(t + self.width_n);
-        sensed.thrust_n = t * (1.0 + self.gain_error) + self.bias_n + self.loop_n * (self.anchor_n - t) / self.width_n;
+        sensed.thrust_n = t * (self.gain_error + 1.0) + self.bias_n + self.loop_n * (self.anchor_n - t) / self.width_n;
     }
 }

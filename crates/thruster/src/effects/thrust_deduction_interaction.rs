@@ -3,6 +3,7 @@
 use super::{Available, Descriptor, Effect, Hooks, Path, Scale, Spec, one_start, wet};
 use crate::plant::{Balance, Drive, Local, Tick};
 use crate::rig::Rig;
+use crate::real::Real;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -17,7 +18,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: one_start,
     needs,
-    build: |values, _| Box::new(Interaction { flow_m_s: values[0], deduction: values[1], neighbour: 0.0 }),
+    build: both!(|values, _| Box::new(Interaction { flow_m_s: values[0], deduction: values[1], neighbour: 0.0 })),
 };
 
 fn parameters(scale: &Scale) -> Vec<Spec> {
@@ -33,22 +34,22 @@ fn needs(rig: &Rig, available: &Available) -> Result<(), &'static str> {
     if available.has(super::EXTRA) { Ok(()) } else { Err("no signal of a neighbouring thruster is recorded") }
 }
 
-struct Interaction {
-    flow_m_s: f64,
-    deduction: f64,
+struct Interaction<T> {
+    flow_m_s: T,
+    deduction: T,
     neighbour: f64,
 }
 
-impl Effect for Interaction {
+impl<T: Real> Effect<T> for Interaction<T> {
     fn hooks(&self) -> Hooks {
         Hooks { drive: true, balance: true, ..Hooks::NONE }
     }
 
-    fn drive(&mut self, tick: &Tick, _: &mut Drive) {
+    fn drive(&mut self, tick: &Tick, _: &mut Drive<T>) {
         self.neighbour = tick.extra;
     }
 
-    fn balance(&self, _: &Local, _: &[f64], balance: &mut Balance, _: &mut [f64]) {
+    fn balance(&self, _: &Local<T>, _: &[T], balance: &mut Balance<T>, _: &mut [T]) {
         balance.ambient_m_s += self.flow_m_s * self.neighbour;
         balance.stand_n -= self.deduction * balance.thrust_n;
     }

@@ -3,6 +3,7 @@
 use super::memory::FirstOrder;
 use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, thrust_measured};
 use crate::plant::{Sensed, Tick};
+use crate::real::Real;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -17,25 +18,25 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: |_| vec![vec![0.003], vec![0.03], vec![0.1]],
     needs: thrust_measured,
-    build: |values, context| Box::new(ThrustSensorLag { lag_s: values[0], tick_s: context.tick_s, lag: FirstOrder::default() }),
+    build: both!(|values, context| Box::new(ThrustSensorLag { lag_s: values[0], tick_s: context.tick_s, lag: FirstOrder::new() })),
 };
 
 fn parameters(_: &Scale) -> Vec<Spec> {
     vec![Spec::strength("thrust_lag_s", "s", 0.01, 0.0, 1.0)]
 }
 
-struct ThrustSensorLag {
-    lag_s: f64,
+struct ThrustSensorLag<T> {
+    lag_s: T,
     tick_s: f64,
-    lag: FirstOrder,
+    lag: FirstOrder<T>,
 }
 
-impl Effect for ThrustSensorLag {
+impl<T: Real> Effect<T> for ThrustSensorLag<T> {
     fn hooks(&self) -> Hooks {
         Hooks::SENSE
     }
 
-    fn sense(&mut self, _: &Tick, sensed: &mut Sensed) {
+    fn sense(&mut self, _: &Tick, sensed: &mut Sensed<T>) {
         sensed.thrust_n = self.lag.step(sensed.thrust_n, self.lag_s, self.tick_s);
     }
 }

@@ -2,6 +2,7 @@
 
 use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, always, one_start};
 use crate::plant::{Balance, Local, Sensed, Tick};
+use crate::real::Real;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -17,7 +18,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: one_start,
     needs: always,
-    build: |values, _| Box::new(TorqueChannelBias { shaft_n_m: values[0], current_a: values[1], transducer_n_m: values[2] }),
+    build: both!(|values, _| Box::new(TorqueChannelBias { shaft_n_m: values[0], current_a: values[1], transducer_n_m: values[2] })),
 };
 
 fn parameters(scale: &Scale) -> Vec<Spec> {
@@ -29,24 +30,24 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
     ]
 }
 
-struct TorqueChannelBias {
-    shaft_n_m: f64,
-    current_a: f64,
-    transducer_n_m: f64,
+struct TorqueChannelBias<T> {
+    shaft_n_m: T,
+    current_a: T,
+    transducer_n_m: T,
 }
 
-impl Effect for TorqueChannelBias {
+impl<T: Real> Effect<T> for TorqueChannelBias<T> {
     fn hooks(&self) -> Hooks {
         Hooks { balance: true, sense: true, ..Hooks::NONE }
     }
 
     /// A drive that regulates a current measured with a wrong zero does give this torque; where a
     /// recorded current drives the model, its wrong zero appears as one.
-    fn balance(&self, _: &Local, _: &[f64], balance: &mut Balance, _: &mut [f64]) {
+    fn balance(&self, _: &Local<T>, _: &[T], balance: &mut Balance<T>, _: &mut [T]) {
         balance.shaft_torque_n_m += self.shaft_n_m;
     }
 
-    fn sense(&mut self, _: &Tick, sensed: &mut Sensed) {
+    fn sense(&mut self, _: &Tick, sensed: &mut Sensed<T>) {
         sensed.current_a += self.current_a;
         sensed.torque_n_m += self.transducer_n_m;
     }

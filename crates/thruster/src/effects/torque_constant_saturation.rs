@@ -2,6 +2,7 @@
 
 use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, free_shaft, one_start};
 use crate::plant::{Balance, Local};
+use crate::real::Real;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -17,7 +18,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: one_start,
     needs: free_shaft,
-    build: |values, _| Box::new(TorqueConstantSaturation { per_a2: values[0] }),
+    build: both!(|values, _| Box::new(TorqueConstantSaturation { per_a2: values[0] })),
 };
 
 fn parameters(scale: &Scale) -> Vec<Spec> {
@@ -25,16 +26,16 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
     vec![Spec::strength("saturation_per_a2", "1/A^2", 0.04 * full, 0.0, 2.0 * full)]
 }
 
-struct TorqueConstantSaturation {
-    per_a2: f64,
+struct TorqueConstantSaturation<T> {
+    per_a2: T,
 }
 
-impl Effect for TorqueConstantSaturation {
+impl<T: Real> Effect<T> for TorqueConstantSaturation<T> {
     fn hooks(&self) -> Hooks {
         Hooks::BALANCE
     }
 
-    fn balance(&self, at: &Local, _: &[f64], balance: &mut Balance, _: &mut [f64]) {
-        balance.motor_torque_n_m /= 1.0 + self.per_a2 * at.current_a * at.current_a;
+    fn balance(&self, at: &Local<T>, _: &[T], balance: &mut Balance<T>, _: &mut [T]) {
+        balance.motor_torque_n_m /= self.per_a2 * at.current_a * at.current_a + 1.0;
     }
 }

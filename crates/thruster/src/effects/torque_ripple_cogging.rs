@@ -1,8 +1,9 @@
 //! Torque that varies with the angle of the rotor.
 
-use super::{Available, Descriptor, Effect, Hooks, Path, Scale, Spec, angle_recorded, free_shaft};
+use super::{Available, Context, Descriptor, Effect, Hooks, Path, Scale, Spec, angle_recorded, free_shaft};
 use crate::plant::{Balance, Local};
 use crate::rig::Rig;
+use crate::real::Real;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -18,9 +19,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts,
     needs,
-    build: |values, _| {
-        Box::new(TorqueRipple { order: values[0].round(), cogging_n_m: [values[1], values[2]], ripple_nm_a: [values[3], values[4]] })
-    },
+    build: both!(build),
 };
 
 fn parameters(scale: &Scale) -> Vec<Spec> {
@@ -48,19 +47,23 @@ fn needs(rig: &Rig, available: &Available) -> Result<(), &'static str> {
     angle_recorded(rig, available)
 }
 
-struct TorqueRipple {
-    order: f64,
-    cogging_n_m: [f64; 2],
-    ripple_nm_a: [f64; 2],
+fn build<T: Real>(values: &[T], _: &Context<T>) -> Box<dyn Effect<T>> {
+    Box::new(TorqueRipple { order: values[0].re().round(), cogging_n_m: [values[1], values[2]], ripple_nm_a: [values[3], values[4]] })
 }
 
-impl Effect for TorqueRipple {
+struct TorqueRipple<T> {
+    order: f64,
+    cogging_n_m: [T; 2],
+    ripple_nm_a: [T; 2],
+}
+
+impl<T: Real> Effect<T> for TorqueRipple<T> {
     fn hooks(&self) -> Hooks {
         Hooks::BALANCE
     }
 
-    fn balance(&self, at: &Local, _: &[f64], balance: &mut Balance, _: &mut [f64]) {
-        let (sin, cos) = (self.order * at.shaft_angle_rad).sin_cos();
+    fn balance(&self, at: &Local<T>, _: &[T], balance: &mut Balance<T>, _: &mut [T]) {
+        let (sin, cos) = (at.shaft_angle_rad * self.order).sin_cos();
         let amplitude = |i: usize| self.cogging_n_m[i] + self.ripple_nm_a[i] * at.current_a;
         balance.shaft_torque_n_m += amplitude(0) * sin + amplitude(1) * cos;
     }

@@ -1,8 +1,9 @@
 //! A dead time between command and drive: bus, scheduler, serial line.
 
 use super::memory::History;
-use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, commanded};
+use super::{Context, Descriptor, Effect, Hooks, Path, Scale, Spec, commanded};
 use crate::plant::{Drive, Tick};
+use crate::real::Real;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -17,24 +18,28 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: |_| [0.02, 0.05, 0.1].map(|delay| vec![delay]).to_vec(),
     needs: commanded,
-    build: |values, context| Box::new(TransportDelay { delay_s: values[0], past: History::new(values[0], context.tick_s) }),
+    build: both!(build),
 };
 
 fn parameters(scale: &Scale) -> Vec<Spec> {
     vec![Spec::strength("delay_s", "s", 2.0 * scale.tick_s, 0.0, 0.2)]
 }
 
-struct TransportDelay {
-    delay_s: f64,
-    past: History,
+fn build<T: Real>(values: &[T], context: &Context<T>) -> Box<dyn Effect<T>> {
+    Box::new(TransportDelay { delay_s: values[0], past: History::new(values[0].re(), context.tick_s) })
 }
 
-impl Effect for TransportDelay {
+struct TransportDelay<T> {
+    delay_s: T,
+    past: History<T>,
+}
+
+impl<T: Real> Effect<T> for TransportDelay<T> {
     fn hooks(&self) -> Hooks {
         Hooks::DRIVE
     }
 
-    fn drive(&mut self, _: &Tick, drive: &mut Drive) {
+    fn drive(&mut self, _: &Tick, drive: &mut Drive<T>) {
         self.past.push(drive.command);
         drive.command = self.past.ago(self.delay_s);
     }

@@ -1,8 +1,9 @@
 //! Lift builds up over some chords of travel (Wagner).
 
-use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, wet};
+use super::{Context, Descriptor, Effect, Hooks, Path, Scale, Spec, wet};
 use crate::parameters::Parameter as P;
 use crate::plant::{Balance, Foil, Local};
+use crate::real::Real;
 
 /// Wagner's function: phi(s) = 1 - sum A exp(-b s), s in half chords.
 const WAGNER: [(f64, f64); 2] = [(0.165, 0.0455), (0.335, 0.3)];
@@ -21,35 +22,37 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: |_| vec![vec![0.5, 0.2], vec![0.5, 1.5]],
     needs: wet,
-    build: |values, context| {
-        let p = context.parameters;
-        Box::new(UnsteadyLift {
-            share: values[0],
-            per_m: 2.0 / (values[1] * p.get(P::RadiusM)),
-            lift_max: p.get(P::LiftMax),
-            tick_s: context.tick_s,
-        })
-    },
+    build: both!(build),
 };
 
 fn parameters(_: &Scale) -> Vec<Spec> {
     vec![Spec::strength("wagner_share", "1", 0.5, 0.0, 1.9), Spec::shape("chord_radii", "1", 0.5, 0.05, 5.0)]
 }
 
-struct UnsteadyLift {
-    share: f64,
-    per_m: f64,
-    lift_max: f64,
+fn build<T: Real>(values: &[T], context: &Context<T>) -> Box<dyn Effect<T>> {
+    let p = context.parameters;
+    Box::new(UnsteadyLift {
+        share: values[0],
+        per_m: (values[1] * p.get(P::RadiusM)).recip() * 2.0,
+        lift_max: p.get(P::LiftMax),
+        tick_s: context.tick_s,
+    })
+}
+
+struct UnsteadyLift<T> {
+    share: T,
+    per_m: T,
+    lift_max: T,
     tick_s: f64,
 }
 
 /// Which end of the chord leads, going over smoothly where the flow turns round: circulation
 /// keeps its sense when the lift coefficient's axes turn over.
-fn leading(foil: &Foil) -> f64 {
-    (8.0 * foil.chordwise_m_s / foil.speed_m_s).tanh()
+fn leading<T: Real>(foil: &Foil<T>) -> T {
+    (foil.chordwise_m_s * 8.0 / foil.speed_m_s).tanh()
 }
 
-impl Effect for UnsteadyLift {
+impl<T: Real> Effect<T> for UnsteadyLift<T> {
     fn states(&self) -> usize {
         WAGNER.len()
     }
@@ -58,23 +61,23 @@ impl Effect for UnsteadyLift {
         Hooks { foil: true, balance: true, ..Hooks::NONE }
     }
 
-    fn foil(&self, _: &Local, own: &[f64], foil: &mut Foil) {
+    fn foil(&self, _: &Local<T>, own: &[T], foil: &mut Foil<T>) {
         let side = leading(foil);
         let now = side * self.lift_max * foil.sin_2a;
-        let missing: f64 = WAGNER.iter().zip(own).map(|((a, _), y)| a * (now - y)).sum();
+        let missing: T = WAGNER.iter().zip(own).map(|((a, _), y)| (now - *y) * *a).sum();
         foil.lift -= self.share * side * missing;
     }
 
     /// No lag is shorter than a tick, which the integrator could not follow.
-    fn balance(&self, _: &Local, own: &[f64], balance: &mut Balance, rates: &mut [f64]) {
+    fn balance(&self, _: &Local<T>, own: &[T], balance: &mut Balance<T>, rates: &mut [T]) {
         let foil = &balance.foil;
         if foil.speed_m_s == 0.0 {
             return;
         }
         let now = leading(foil) * self.lift_max * foil.sin_2a;
         for (i, (_, b)) in WAGNER.iter().enumerate() {
-            let rate = b * self.per_m * foil.speed_m_s;
-            rates[i] = rate / (1.0 + rate * self.tick_s) * (now - own[i]);
+            let rate = self.per_m * *b * foil.speed_m_s;
+            rates[i] = rate / (rate * self.tick_s + 1.0) * (now - own[i]);
         }
     }
 }

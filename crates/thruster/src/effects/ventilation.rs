@@ -2,6 +2,7 @@
 
 use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, wet};
 use crate::plant::{Balance, Drive, Foil, Local, Tick};
+use crate::real::Real;
 
 /// Width of the onset, as a share of the onset speed.
 const WIDTH: f64 = 0.04;
@@ -24,7 +25,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
         vec![start(0.5, 0.3), start(0.65, 0.3), start(0.65, 2.0), start(0.95, 0.3)]
     },
     needs: wet,
-    build: |values, _| {
+    build: both!(|values, _| {
         Box::new(Ventilation {
             loss: values[0],
             onset_rad_s: values[1],
@@ -34,7 +35,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
             drag_share: values[5],
             first_depth_m: None,
         })
-    },
+    }),
 };
 
 fn parameters(scale: &Scale) -> Vec<Spec> {
@@ -49,17 +50,17 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
     ]
 }
 
-struct Ventilation {
-    loss: f64,
-    onset_rad_s: f64,
-    lag_s: f64,
-    recovery_lag_s: f64,
-    hysteresis: f64,
-    drag_share: f64,
+struct Ventilation<T> {
+    loss: T,
+    onset_rad_s: T,
+    lag_s: T,
+    recovery_lag_s: T,
+    hysteresis: T,
+    drag_share: T,
     first_depth_m: Option<f64>,
 }
 
-impl Effect for Ventilation {
+impl<T: Real> Effect<T> for Ventilation<T> {
     fn states(&self) -> usize {
         1
     }
@@ -68,24 +69,24 @@ impl Effect for Ventilation {
         Hooks { drive: true, foil: true, balance: true, ..Hooks::NONE }
     }
 
-    fn drive(&mut self, tick: &Tick, _: &mut Drive) {
+    fn drive(&mut self, tick: &Tick, _: &mut Drive<T>) {
         self.first_depth_m = self.first_depth_m.or(tick.depth_m);
     }
 
-    fn foil(&self, _: &Local, own: &[f64], foil: &mut Foil) {
-        foil.lift *= 1.0 - self.loss * own[0];
-        foil.drag *= 1.0 - self.drag_share * self.loss * own[0];
+    fn foil(&self, _: &Local<T>, own: &[T], foil: &mut Foil<T>) {
+        foil.lift *= T::ONE - self.loss * own[0];
+        foil.drag *= T::ONE - self.drag_share * self.loss * own[0];
     }
 
-    fn balance(&self, at: &Local, own: &[f64], _: &mut Balance, rates: &mut [f64]) {
+    fn balance(&self, at: &Local<T>, own: &[T], _: &mut Balance<T>, rates: &mut [T]) {
         let deeper = match (at.depth_m, self.first_depth_m) {
             (Some(now), Some(first)) if first > 0.0 => (now / first).clamp(0.05, 20.0).sqrt(),
             _ => 1.0,
         };
         let past = at.shaft_speed_rad_s.abs() / (self.onset_rad_s * deeper) - 1.0 + self.hysteresis * own[0];
-        let wanted = super::logistic(past / WIDTH);
+        let wanted = (past / WIDTH).logistic();
         // One lag passes into the other smoothly, as the integrator wants it.
-        let coming = super::logistic((wanted - own[0]) / 0.05);
-        rates[0] = (wanted - own[0]) * (coming / self.lag_s + (1.0 - coming) / self.recovery_lag_s);
+        let coming = ((wanted - own[0]) / 0.05).logistic();
+        rates[0] = (wanted - own[0]) * (coming / self.lag_s + (T::ONE - coming) / self.recovery_lag_s);
     }
 }

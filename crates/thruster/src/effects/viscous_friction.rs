@@ -2,6 +2,7 @@
 
 use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, free_shaft, one_start};
 use crate::plant::{Balance, Local};
+use crate::real::Real;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -17,7 +18,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: one_start,
     needs: free_shaft,
-    build: |values, _| Box::new(ViscousFriction { viscous_nm_s: values[0] }),
+    build: both!(|values, _| Box::new(ViscousFriction { viscous_nm_s: values[0] })),
 };
 
 /// A negative value says that less friction acts than the rig states.
@@ -26,16 +27,16 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
     vec![Spec::strength("viscous_friction_nm_s", "N m s", 0.02 * full, -0.2 * full, full)]
 }
 
-struct ViscousFriction {
-    viscous_nm_s: f64,
+struct ViscousFriction<T> {
+    viscous_nm_s: T,
 }
 
-impl Effect for ViscousFriction {
+impl<T: Real> Effect<T> for ViscousFriction<T> {
     fn hooks(&self) -> Hooks {
         Hooks::BALANCE
     }
 
-    fn balance(&self, at: &Local, _: &[f64], balance: &mut Balance, _: &mut [f64]) {
+    fn balance(&self, at: &Local<T>, _: &[T], balance: &mut Balance<T>, _: &mut [T]) {
         balance.shaft_torque_n_m -= self.viscous_nm_s * at.shaft_speed_rad_s;
     }
 }

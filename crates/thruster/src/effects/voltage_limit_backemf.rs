@@ -3,6 +3,7 @@
 use super::{Available, Descriptor, Effect, Hooks, Path, Scale, Spec, commanded};
 use crate::plant::{Drive, Tick};
 use crate::rig::Rig;
+use crate::real::Real;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -18,7 +19,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts,
     needs,
-    build: |values, _| Box::new(VoltageLimit { lost_share: values[0], resistance_factor: values[1] }),
+    build: both!(|values, _| Box::new(VoltageLimit { lost_share: values[0], resistance_factor: values[1] })),
 };
 
 /// Back-EMF at the largest speed as a share of the supply; bounded, since both are only stated.
@@ -62,19 +63,19 @@ pub(super) fn supply_known(rig: &Rig, available: &Available) -> Result<(), &'sta
     }
 }
 
-struct VoltageLimit {
-    lost_share: f64,
-    resistance_factor: f64,
+struct VoltageLimit<T> {
+    lost_share: T,
+    resistance_factor: T,
 }
 
-impl Effect for VoltageLimit {
+impl<T: Real> Effect<T> for VoltageLimit<T> {
     fn hooks(&self) -> Hooks {
         Hooks::DRIVE
     }
 
-    fn drive(&mut self, _: &Tick, drive: &mut Drive) {
+    fn drive(&mut self, _: &Tick, drive: &mut Drive<T>) {
         drive.voltage_limited = true;
-        drive.supply_v *= 1.0 - self.lost_share;
+        drive.supply_v *= T::ONE - self.lost_share;
         drive.resistance_ohm *= self.resistance_factor;
     }
 }

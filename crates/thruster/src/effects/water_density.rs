@@ -2,6 +2,7 @@
 
 use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, one_start, wet};
 use crate::plant::{Balance, Foil, Local};
+use crate::real::Real;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -17,27 +18,27 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: one_start,
     needs: wet,
-    build: |values, _| Box::new(WaterDensity { factor: 1.0 + values[0] }),
+    build: both!(|values, _| Box::new(WaterDensity { factor: values[0] + 1.0 })),
 };
 
 fn parameters(_: &Scale) -> Vec<Spec> {
     vec![Spec::strength("density_error", "1", 0.03, -0.6, 0.3)]
 }
 
-struct WaterDensity {
-    factor: f64,
+struct WaterDensity<T> {
+    factor: T,
 }
 
-impl Effect for WaterDensity {
+impl<T: Real> Effect<T> for WaterDensity<T> {
     fn hooks(&self) -> Hooks {
         Hooks { foil: true, balance: true, ..Hooks::NONE }
     }
 
-    fn foil(&self, _: &Local, _: &[f64], foil: &mut Foil) {
+    fn foil(&self, _: &Local<T>, _: &[T], foil: &mut Foil<T>) {
         foil.density_kg_m3 *= self.factor;
     }
 
-    fn balance(&self, _: &Local, _: &[f64], balance: &mut Balance, _: &mut [f64]) {
+    fn balance(&self, _: &Local<T>, _: &[T], balance: &mut Balance<T>, _: &mut [T]) {
         balance.flux_kg_m *= self.factor;
         balance.added_mass_kg *= self.factor;
     }

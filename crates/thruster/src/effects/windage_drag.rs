@@ -2,6 +2,7 @@
 
 use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, free_shaft, one_start};
 use crate::plant::{Balance, Local};
+use crate::real::Real;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -16,7 +17,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: one_start,
     needs: free_shaft,
-    build: |values, _| Box::new(WindageDrag { drag_nm_s2: values[0] }),
+    build: both!(|values, _| Box::new(WindageDrag { drag_nm_s2: values[0] })),
 };
 
 fn parameters(scale: &Scale) -> Vec<Spec> {
@@ -24,16 +25,16 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
     vec![Spec::strength("windage_nm_s2", "N m s^2", 0.03 * full, 0.0, full)]
 }
 
-struct WindageDrag {
-    drag_nm_s2: f64,
+struct WindageDrag<T> {
+    drag_nm_s2: T,
 }
 
-impl Effect for WindageDrag {
+impl<T: Real> Effect<T> for WindageDrag<T> {
     fn hooks(&self) -> Hooks {
         Hooks::BALANCE
     }
 
-    fn balance(&self, at: &Local, _: &[f64], balance: &mut Balance, _: &mut [f64]) {
+    fn balance(&self, at: &Local<T>, _: &[T], balance: &mut Balance<T>, _: &mut [T]) {
         let speed = at.shaft_speed_rad_s;
         balance.shaft_torque_n_m -= self.drag_nm_s2 * speed * speed.abs();
     }

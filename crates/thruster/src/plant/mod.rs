@@ -14,8 +14,12 @@ use crate::blade::Inflow;
 use crate::effects::{Context, Descriptor, Effect};
 use crate::models::ModelName;
 use crate::parameters::{Parameter as P, Parameters};
+use crate::real::Real;
 use crate::rig::{AmplifierKind, Rig, Sensors};
 
+/// Square of the speed through the water below which the blades do nothing, m^2/s^2: its square is still
+/// a number, as the derivative of a quotient wants it.
+const STILL_M2_S2: f64 = 1e-60;
 /// Most continuous states of a plant: speed, flow, angle, swirl and those of the effects.
 const STATES: usize = 12;
 const SPEED: usize = 0;
@@ -24,41 +28,41 @@ const ANGLE: usize = 2;
 const SWIRL: usize = 3;
 const OWN: usize = 4;
 
-type States = [f64; STATES];
-
 /// An effect at work, with the place of its states.
-struct Hooked {
-    effect: Box<dyn Effect>,
+struct Hooked<T> {
+    effect: Box<dyn Effect<T>>,
     own: std::ops::Range<usize>,
 }
 
 /// A thruster on its stand.
-pub struct Plant {
+pub struct Plant<T = f64> {
     model: ModelName,
-    parameters: Parameters,
+    parameters: Parameters<T>,
     sensors: Sensors,
     amplifier: AmplifierKind,
     current_limit_a: f64,
     nominal_supply_v: f64,
     tick_s: f64,
-    effects: Vec<Hooked>,
+    effects: Vec<Hooked<T>>,
     drive_hooks: Vec<usize>,
     inflow_hooks: Vec<usize>,
     foil_hooks: Vec<usize>,
     balance_hooks: Vec<usize>,
     sense_hooks: Vec<usize>,
     used_states: usize,
-    constants: Constants,
-    decays: Decays,
-    x: States,
-    current_a: f64,
+    constants: Constants<T>,
+    decays: Decays<T>,
+    x: [T; STATES],
+    current_a: T,
     time_s: f64,
-    filters: Filters,
-    sensed: Sensed,
-    at: Local,
+    filters: Filters<T>,
+    sensed: Sensed<T>,
+    at: Local<T>,
     /// Rates at the end of the last tick, which the next one starts with where no input jumps, and
     /// at its start.
-    last_rates: Option<(States, States)>,
+    last_rates: [[T; STATES]; 2],
+    /// Whether there was a last tick.
+    moving: bool,
     /// Whether those rates can hold at all: no effect keeps a memory that changes between ticks
     /// and acts on the rates.
     rates_may_hold: bool,
@@ -69,38 +73,38 @@ pub struct Plant {
 
 /// Products of parameters that the inner loop needs.
 #[derive(Clone, Copy)]
-struct Constants {
-    sin_pitch: f64,
-    cos_pitch: f64,
-    lever_m: f64,
-    half_area_m2: f64,
-    density_kg_m3: f64,
-    lift_max: f64,
-    drag_max: f64,
-    added_mass_kg: f64,
-    flux_kg_m: f64,
-    inertia_kg_m2: f64,
-    torque_constant_nm_a: f64,
-    resistance_ohm: f64,
-    viscous_nm_s: f64,
-    swirl_mass_kg: f64,
-    swirl_flux_kg_m: f64,
-    yoerger_slip_m: f64,
+struct Constants<T> {
+    sin_pitch: T,
+    cos_pitch: T,
+    lever_m: T,
+    half_area_m2: T,
+    density_kg_m3: T,
+    lift_max: T,
+    drag_max: T,
+    added_mass_kg: T,
+    flux_kg_m: T,
+    inertia_kg_m2: T,
+    torque_constant_nm_a: T,
+    resistance_ohm: T,
+    viscous_nm_s: T,
+    swirl_mass_kg: T,
+    swirl_flux_kg_m: T,
+    yoerger_slip_m: T,
     dry: bool,
 }
 
 /// Decay factors of the first-order filters over one tick.
 #[derive(Clone, Copy)]
-struct Decays {
+struct Decays<T> {
     /// Stated lag of the drive, and its decay over half a tick and a whole one.
-    drive: (f64, f64, f64),
+    drive: (T, T, T),
     speed: Option<f64>,
     thrust: Option<(f64, f64)>,
     torque: Option<(f64, f64)>,
 }
 
-impl Decays {
-    fn new(time_constant_s: f64, sensors: &Sensors, tick_s: f64) -> Self {
+impl<T: Real> Decays<T> {
+    fn new(time_constant_s: T, sensors: &Sensors, tick_s: f64) -> Self {
         let corner = |hz: Option<f64>| {
             hz.map(|hz| {
                 let tau = 1.0 / (std::f64::consts::TAU * hz);
@@ -110,8 +114,8 @@ impl Decays {
         Self {
             drive: (
                 time_constant_s,
-                (-0.5 * tick_s / time_constant_s).exp(),
-                (-tick_s / time_constant_s).exp(),
+                (T::from(-0.5 * tick_s) / time_constant_s).exp(),
+                (T::from(-tick_s) / time_constant_s).exp(),
             ),
             speed: sensors.speed_filter_time_constant_s.filter(|t| *t > 0.0).map(|t| (-tick_s / t).exp()),
             thrust: corner(sensors.thrust_filter_hz),
@@ -121,17 +125,17 @@ impl Decays {
 }
 
 /// States of the measuring chain.
-#[derive(Clone, Copy, Default)]
-struct Filters {
-    last_angle_rad: f64,
-    speed_rad_s: f64,
-    thrust_n: f64,
-    last_thrust_n: f64,
-    torque_n_m: f64,
-    last_torque_n_m: f64,
+#[derive(Clone, Copy)]
+struct Filters<T> {
+    last_angle_rad: T,
+    speed_rad_s: T,
+    thrust_n: T,
+    last_thrust_n: T,
+    torque_n_m: T,
+    last_torque_n_m: T,
 }
 
-impl Plant {
+impl<T: Real> Plant<T> {
     /// Sets a plant up at rest. `effects` are pairs of a catalogue entry and its parameter values.
     ///
     /// # Panics
@@ -140,16 +144,16 @@ impl Plant {
     pub fn new(
         model: ModelName,
         rig: &Rig,
-        parameters: &Parameters,
-        effects: &[(&Descriptor, &[f64])],
+        parameters: &Parameters<T>,
+        effects: &[(&Descriptor, &[T])],
         tick_s: f64,
     ) -> Self {
         let context = Context { parameters, rig, tick_s };
         let mut next = OWN;
-        let effects: Vec<Hooked> = effects
+        let effects: Vec<Hooked<T>> = effects
             .iter()
             .map(|(descriptor, values)| {
-                let effect = (descriptor.build)(values, &context);
+                let effect = T::build(descriptor, values, &context);
                 let own = next..next + effect.states();
                 next = own.end;
                 assert!(next <= STATES, "too many effect states");
@@ -161,7 +165,7 @@ impl Plant {
         let hooked = |used: fn(&crate::effects::Hooks) -> bool| -> Vec<usize> {
             (0..effects.len()).filter(|i| used(&effects[*i].effect.hooks())).collect()
         };
-        let changes_between_ticks = |e: &Hooked| {
+        let changes_between_ticks = |e: &Hooked<T>| {
             let h = e.effect.hooks();
             (h.drive || h.sense) && (h.inflow || h.foil || h.balance)
         };
@@ -184,13 +188,21 @@ impl Plant {
             used_states: next,
             constants: Constants::new(&parameters, rig.propeller.is_none()),
             decays: Decays::new(parameters.get(P::TimeConstantS), &rig.sensors, tick_s),
-            x: [0.0; STATES],
-            current_a: 0.0,
+            x: [T::ZERO; STATES],
+            current_a: T::ZERO,
             time_s: 0.0,
-            filters: Filters::default(),
+            filters: Filters {
+                last_angle_rad: T::ZERO,
+                speed_rad_s: T::ZERO,
+                thrust_n: T::ZERO,
+                last_thrust_n: T::ZERO,
+                torque_n_m: T::ZERO,
+                last_torque_n_m: T::ZERO,
+            },
             sensed: Sensed::default(),
             at: Local::default(),
-            last_rates: None,
+            last_rates: [[T::ZERO; STATES]; 2],
+            moving: false,
             quantise_encoder: false,
         }
     }
@@ -212,15 +224,15 @@ impl Plant {
         angle_rad: f64,
     ) {
         self.time_s = time_s;
-        self.last_rates = None;
-        self.x[SPEED] = shaft_speed_rad_s;
-        self.x[FLOW] = axial_m_s;
-        self.x[ANGLE] = angle_rad;
-        self.current_a = current_a;
-        self.filters.last_angle_rad = angle_rad - shaft_speed_rad_s * self.tick_s;
-        self.filters.speed_rad_s = shaft_speed_rad_s;
-        self.at = self.local(0.0, &Tick::default());
-        let (_, balance) = self.rates::<true>(&self.x, &self.at);
+        self.moving = false;
+        self.x[SPEED] = T::from(shaft_speed_rad_s);
+        self.x[FLOW] = T::from(axial_m_s);
+        self.x[ANGLE] = T::from(angle_rad);
+        self.current_a = T::from(current_a);
+        self.filters.last_angle_rad = T::from(angle_rad - shaft_speed_rad_s * self.tick_s);
+        self.filters.speed_rad_s = T::from(shaft_speed_rad_s);
+        self.at = self.local(T::ZERO, &Tick::default());
+        let (_, balance) = self.rates::<true, STATES>(&self.x, &self.at);
         self.filters.last_thrust_n = balance.thrust_n + balance.stand_n;
         self.filters.thrust_n = balance.thrust_n + balance.stand_n;
         self.filters.last_torque_n_m = balance.blade_torque_n_m;
@@ -229,12 +241,12 @@ impl Plant {
     }
 
     /// What the sensors show now (without noise).
-    pub fn sensed(&self) -> &Sensed {
+    pub fn sensed(&self) -> &Sensed<T> {
         &self.sensed
     }
 
     /// The true state and loads now.
-    pub fn truth(&self) -> &Local {
+    pub fn truth(&self) -> &Local<T> {
         &self.at
     }
 
@@ -248,21 +260,24 @@ impl Plant {
     /// Runge-Kutta of order 4; over ticks that the caller knows to be smooth Adams' method of order 3, at
     /// half the cost.
     pub fn step(&mut self, tick: &Tick) {
-        // Two copies of the inner loop: the one without hooks keeps everything in registers.
+        // Copies of the inner loop: the one without hooks keeps everything in registers, the others carry no
+        // more states than there are.
         if self.inflow_hooks.is_empty() && self.foil_hooks.is_empty() && self.balance_hooks.is_empty() {
-            self.step_as::<false>(tick);
+            self.step_as::<false, OWN>(tick);
+        } else if self.used_states == OWN {
+            self.step_as::<true, OWN>(tick);
         } else {
-            self.step_as::<true>(tick);
+            self.step_as::<true, STATES>(tick);
         }
     }
 
-    fn step_as<const HOOKED: bool>(&mut self, tick: &Tick) {
+    fn step_as<const HOOKED: bool, const N: usize>(&mut self, tick: &Tick) {
         let dt = self.tick_s;
         let mut drive = Drive {
-            command: tick.command,
-            current_limit_a: self.current_limit_a,
+            command: T::from(tick.command),
+            current_limit_a: T::from(self.current_limit_a),
             time_constant_s: self.parameters.get(P::TimeConstantS),
-            supply_v: tick.supply_v.unwrap_or(self.nominal_supply_v),
+            supply_v: T::from(tick.supply_v.unwrap_or(self.nominal_supply_v)),
             resistance_ohm: self.constants.resistance_ohm,
             back_emf_v: self.constants.torque_constant_nm_a * self.x[SPEED],
             shaft_speed_rad_s: self.x[SPEED],
@@ -277,61 +292,57 @@ impl Plant {
         let speed = match self.amplifier {
             AmplifierKind::Speed if tick.driven == Driven::Command => {
                 let (now, tau) = (self.x[SPEED], drive.time_constant_s);
-                let left = if tau > 0.0 { (-dt / tau).exp() } else { 0.0 };
+                let left = if tau > 0.0 { (T::from(-dt) / tau).exp() } else { T::ZERO };
                 Some((now, drive.command + (now - drive.command) * left))
             }
-            _ => tick.driven_speed(),
+            _ => tick.driven_speed().map(|(a, b)| (T::from(a), T::from(b))),
         };
 
         // Current (and a prescribed speed) are known at each stage.
-        let prescribe = |x: &mut States, at: f64| {
+        let prescribe = |x: &mut [T; N], at: f64| {
             if let Some((a, b)) = speed {
                 x[SPEED] = a + (b - a) * at;
             }
         };
-        let mut start = self.x;
+        let mut start: [T; N] = std::array::from_fn(|i| self.x[i]);
         prescribe(&mut start, 0.0);
         let begin = self.local_at(&start, from, 0.0, tick);
-        let held = self.last_rates.filter(|_| self.rates_may_hold && begin.continues::<HOOKED>(&self.at));
-        let k1 = held.map_or_else(|| self.rates::<HOOKED>(&start, &begin).0, |(end, _)| end);
-        let states = if HOOKED { self.used_states } else { OWN };
-        let foretold = held.filter(|_| tick.smooth && self.slow && speed.is_none()).map(|(_, k0)| {
+        let held = self.moving && self.rates_may_hold && begin.continues::<HOOKED>(&self.at);
+        let k1: [T; N] = if held {
+            std::array::from_fn(|i| self.last_rates[0][i])
+        } else {
+            self.rates::<HOOKED, N>(&start, &begin).0
+        };
+        let mut x = if held && tick.smooth && self.slow && speed.is_none() {
             // Adams' predictor and corrector, with one look ahead.
-            let mut x = start;
-            for i in 0..states {
-                x[i] += dt * (1.5 * k1[i] - 0.5 * k0[i]);
-            }
-            let (k2, _) = self.rates::<HOOKED>(&x, &self.local_at(&x, full, 1.0, tick));
-            x = start;
-            for i in 0..states {
-                x[i] += dt / 12.0 * (5.0 * k2[i] + 8.0 * k1[i] - k0[i]);
-            }
-            x
-        });
-        self.x = foretold.unwrap_or_else(|| {
+            let k0 = &self.last_rates[1];
+            let ahead = std::array::from_fn(|i| start[i] + (k1[i] * 1.5 - k0[i] * 0.5) * dt);
+            let (k2, _) = self.rates::<HOOKED, N>(&ahead, &self.local_at(&ahead, full, 1.0, tick));
+            std::array::from_fn(|i| start[i] + (k2[i] * 5.0 + k1[i] * 8.0 - k0[i]) * (dt / 12.0))
+        } else {
             // Classic Runge-Kutta of order 4.
-            let mut x = self.advance(HOOKED, &start, &k1, 0.5 * dt);
+            let along = |rate: &[T; N], dt: f64| std::array::from_fn(|i| start[i] + rate[i] * dt);
+            let mut x = along(&k1, 0.5 * dt);
             prescribe(&mut x, 0.5);
-            let (k2, _) = self.rates::<HOOKED>(&x, &self.local_at(&x, half, 0.5, tick));
-            x = self.advance(HOOKED, &start, &k2, 0.5 * dt);
+            let (k2, _) = self.rates::<HOOKED, N>(&x, &self.local_at(&x, half, 0.5, tick));
+            x = along(&k2, 0.5 * dt);
             prescribe(&mut x, 0.5);
-            let (k3, _) = self.rates::<HOOKED>(&x, &self.local_at(&x, half, 0.5, tick));
-            x = self.advance(HOOKED, &start, &k3, dt);
+            let (k3, _) = self.rates::<HOOKED, N>(&x, &self.local_at(&x, half, 0.5, tick));
+            x = along(&k3, dt);
             prescribe(&mut x, 1.0);
-            let (k4, _) = self.rates::<HOOKED>(&x, &self.local_at(&x, full, 1.0, tick));
-            let mut x = start;
-            for i in 0..states {
-                x[i] += dt / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]);
-            }
-            x
-        });
-        prescribe(&mut self.x, 1.0);
+            let (k4, _) = self.rates::<HOOKED, N>(&x, &self.local_at(&x, full, 1.0, tick));
+            std::array::from_fn(|i| start[i] + (k1[i] + (k2[i] + k3[i]) * 2.0 + k4[i]) * (dt / 6.0))
+        };
+        prescribe(&mut x, 1.0);
+        self.x[..N].copy_from_slice(&x);
         self.current_a = full;
         self.time_s = tick.time_s + dt;
 
-        let end = self.local_at(&self.x, full, 1.0, tick);
-        let (rates, balance) = self.rates::<HOOKED>(&self.x, &end);
-        self.last_rates = Some((rates, k1));
+        let end = self.local_at(&x, full, 1.0, tick);
+        let (rates, balance) = self.rates::<HOOKED, N>(&x, &end);
+        self.last_rates[0][..N].copy_from_slice(&rates);
+        self.last_rates[1][..N].copy_from_slice(&k1);
+        self.moving = true;
         self.at = end;
         self.at.thrust_n = balance.thrust_n;
         self.at.blade_torque_n_m = balance.blade_torque_n_m;
@@ -340,24 +351,26 @@ impl Plant {
     }
 
     /// Motor current a time `after_s` into this tick.
-    fn current_path(&self, tick: &Tick, drive: &Drive, after_s: f64) -> f64 {
+    fn current_path(&self, tick: &Tick, drive: &Drive<T>, after_s: f64) -> T {
         if let Driven::Current(a, b) = tick.driven {
-            return a + (b - a) * after_s / self.tick_s;
+            return T::from(a + (b - a) * after_s / self.tick_s);
         }
         let target = match self.amplifier {
             AmplifierKind::Current => drive.command,
             // (10)-(12) with the inductance neglected; the lag then stands for L/R and the stage.
-            AmplifierKind::Voltage => (drive.command - drive.back_emf_v) / drive.resistance_ohm.max(1e-9),
+            AmplifierKind::Voltage => {
+                (drive.command - drive.back_emf_v) / drive.resistance_ohm.max(T::from(1e-9))
+            }
             // A speed drive's shaft follows the command through the lag (`step`); no current is modelled.
-            AmplifierKind::Speed => return 0.0,
+            AmplifierKind::Speed => return T::ZERO,
         };
         let mut target = target.clamp(-drive.current_limit_a, drive.current_limit_a);
         if drive.voltage_limited {
             // |R i + ke Om| <= V: what the bus can push through the winding at this speed.
-            let r = drive.resistance_ohm.max(1e-9);
+            let r = drive.resistance_ohm.max(T::from(1e-9));
             target = target.clamp(
-                ((-drive.supply_v - drive.back_emf_v) / r).min(0.0),
-                ((drive.supply_v - drive.back_emf_v) / r).max(0.0),
+                ((-drive.supply_v - drive.back_emf_v) / r).min(T::ZERO),
+                ((drive.supply_v - drive.back_emf_v) / r).max(T::ZERO),
             );
         }
         if drive.time_constant_s <= 0.0 {
@@ -366,10 +379,10 @@ impl Plant {
         if after_s == 0.0 {
             return self.current_a;
         }
-        // The stated lag's decay is at hand; an effect may have changed the lag.
+        // The stated lag's decay is at hand; an effect may have changed the lag, or its derivative alone.
         let (stated, half, full) = self.decays.drive;
-        let left = if drive.time_constant_s != stated {
-            (-after_s / drive.time_constant_s).exp()
+        let left = if drive.time_constant_s != stated || !drive.time_constant_s.same_slopes(stated) {
+            (T::from(-after_s) / drive.time_constant_s).exp()
         } else if after_s < self.tick_s {
             half
         } else {
@@ -378,16 +391,7 @@ impl Plant {
         target + (self.current_a - target) * left
     }
 
-    #[inline(always)]
-    fn advance(&self, hooked: bool, from: &States, rate: &States, dt: f64) -> States {
-        let mut x = *from;
-        for i in 0..if hooked { self.used_states } else { OWN } {
-            x[i] += dt * rate[i];
-        }
-        x
-    }
-
-    fn local(&self, current_a: f64, tick: &Tick) -> Local {
+    fn local(&self, current_a: T, tick: &Tick) -> Local<T> {
         Local {
             time_s: tick.time_s,
             shaft_speed_rad_s: self.x[SPEED],
@@ -400,25 +404,25 @@ impl Plant {
     }
 
     #[inline(always)]
-    fn local_at(&self, x: &States, current_a: f64, part: f64, tick: &Tick) -> Local {
+    fn local_at<const N: usize>(&self, x: &[T; N], current_a: T, part: f64, tick: &Tick) -> Local<T> {
         Local {
             time_s: tick.time_s + part * self.tick_s,
             shaft_speed_rad_s: x[SPEED],
-            shaft_angle_rad: tick.angle_at(part).unwrap_or(x[ANGLE]),
+            shaft_angle_rad: tick.angle_at(part).map_or(x[ANGLE], T::from),
             axial_m_s: x[FLOW],
             swirl_m_s: x[SWIRL],
             current_a,
             ambient_m_s: tick.ambient_at(part),
             depth_m: tick.depth_m,
             temperature_c: tick.temperature_c,
-            thrust_n: 0.0,
-            blade_torque_n_m: 0.0,
+            thrust_n: T::ZERO,
+            blade_torque_n_m: T::ZERO,
         }
     }
 
     /// Rates of all states, and the loads they follow from.
     #[inline(always)]
-    fn rates<const HOOKED: bool>(&self, x: &States, at: &Local) -> (States, Balance) {
+    fn rates<const HOOKED: bool, const N: usize>(&self, x: &[T; N], at: &Local<T>) -> ([T; N], Balance<T>) {
         let c = &self.constants;
         let (speed, flow) = (x[SPEED], x[FLOW]);
         let mut balance = Balance {
@@ -427,7 +431,7 @@ impl Plant {
             inertia_kg_m2: c.inertia_kg_m2,
             added_mass_kg: c.added_mass_kg,
             flux_kg_m: c.flux_kg_m,
-            ambient_m_s: at.ambient_m_s,
+            ambient_m_s: T::from(at.ambient_m_s),
             ..Balance::default()
         };
         match self.model {
@@ -442,14 +446,14 @@ impl Plant {
                 // the shaft's "inertia" of (9), s^2 rho V, is the water's: the fixed point's half
                 // comes from vw = vp in (3).
                 let vp = c.yoerger_slip_m * speed;
-                let force = 2.0 * c.density_kg_m3 * c.half_area_m2 * vp * vp.abs();
+                let force = c.density_kg_m3 * 2.0 * c.half_area_m2 * vp * vp.abs();
                 balance.thrust_n = force;
-                balance.blade_torque_n_m = 0.5 * force * c.yoerger_slip_m;
+                balance.blade_torque_n_m = force * 0.5 * c.yoerger_slip_m;
                 balance.inertia_kg_m2 = c.yoerger_slip_m * c.yoerger_slip_m * c.added_mass_kg;
             }
-            _ => self.blade_loads::<HOOKED>(at, x, flow, speed, &mut balance),
+            _ => self.blade_loads::<HOOKED, N>(at, x, flow, speed, &mut balance),
         }
-        let mut rates = [0.0; STATES];
+        let mut rates = [T::ZERO; N];
         for i in self.balance_hooks.iter().take(if HOOKED { usize::MAX } else { 0 }) {
             let hooked = &self.effects[*i];
             hooked.effect.balance(at, &x[hooked.own.clone()], &mut balance, &mut rates[hooked.own.clone()]);
@@ -478,13 +482,13 @@ impl Plant {
 
     /// (14)-(17) without angles, with the hooks of inflow and foil.
     #[inline(always)]
-    fn blade_loads<const HOOKED: bool>(
+    fn blade_loads<const HOOKED: bool, const N: usize>(
         &self,
-        at: &Local,
-        x: &States,
-        flow: f64,
-        speed: f64,
-        balance: &mut Balance,
+        at: &Local<T>,
+        x: &[T; N],
+        flow: T,
+        speed: T,
+        balance: &mut Balance<T>,
     ) {
         let c = &self.constants;
         let mut inflow = Inflow { tangential_m_s: c.lever_m * speed - x[SWIRL], axial_m_s: flow };
@@ -494,13 +498,13 @@ impl Plant {
         }
         let (ut, vp) = (inflow.tangential_m_s, inflow.axial_m_s);
         let v2 = ut * ut + vp * vp;
-        if v2 == 0.0 {
+        if v2 < STILL_M2_S2 {
             return;
         }
         let wn = ut * c.sin_pitch - vp * c.cos_pitch;
         let wc = ut * c.cos_pitch + vp * c.sin_pitch;
-        let sin_2a = 2.0 * wn * wc / v2;
-        let one_minus_cos_2a = 2.0 * wn * wn / v2;
+        let sin_2a = wn * 2.0 * wc / v2;
+        let one_minus_cos_2a = wn * 2.0 * wn / v2;
         let mut foil = Foil {
             speed_m_s: v2.sqrt(),
             normal_m_s: wn,
@@ -524,14 +528,14 @@ impl Plant {
     }
 
     /// The measuring chain, once a tick.
-    fn observe(&mut self, tick: &Tick, balance: &Balance, filter: bool) {
+    fn observe(&mut self, tick: &Tick, balance: &Balance<T>, filter: bool) {
         let dt = self.tick_s;
         let s = &self.sensors;
         let f = &mut self.filters;
         let mut angle = self.x[ANGLE];
         if let (true, Some(counts)) = (self.quantise_encoder, s.encoder_counts_per_rev) {
             let quantum = std::f64::consts::TAU / counts;
-            angle = (angle / quantum).floor() * quantum;
+            angle = T::from((angle.re() / quantum).floor() * quantum);
         }
         if filter {
             // Angle differenced at the control rate, then a first-order filter.
@@ -561,7 +565,7 @@ impl Plant {
             flow_m_s: axial,
             true_speed_rad_s: self.x[SPEED],
             true_thrust_n: balance.thrust_n,
-            supply_v: tick.supply_v.unwrap_or(self.nominal_supply_v),
+            supply_v: T::from(tick.supply_v.unwrap_or(self.nominal_supply_v)),
         };
         for i in &self.sense_hooks {
             self.effects[*i].effect.sense(tick, &mut sensed);
@@ -571,22 +575,22 @@ impl Plant {
 }
 
 /// Exact first-order low pass over one tick whose input runs straight from `u0` to `u1`.
-fn first_order(y: f64, u0: f64, u1: f64, dt: f64, filter: Option<(f64, f64)>) -> f64 {
+fn first_order<T: Real>(y: T, u0: T, u1: T, dt: f64, filter: Option<(f64, f64)>) -> T {
     let Some((tau, left)) = filter else { return u1 };
     let slope = (u1 - u0) / dt;
-    u1 - tau * slope + (y - u0 + tau * slope) * left
+    u1 - slope * tau + (y - u0 + slope * tau) * left
 }
 
-impl Constants {
-    fn new(p: &Parameters, dry: bool) -> Self {
+impl<T: Real> Constants<T> {
+    fn new(p: &Parameters<T>, dry: bool) -> Self {
         let (sin_pitch, cos_pitch) = p.get(P::PitchRad).sin_cos();
         let area = p.area_m2();
         let density = p.get(P::DensityKgM3);
         Self {
             sin_pitch,
             cos_pitch,
-            lever_m: crate::blade::REFERENCE_RADIUS * p.get(P::RadiusM),
-            half_area_m2: 0.5 * area,
+            lever_m: p.get(P::RadiusM) * crate::blade::REFERENCE_RADIUS,
+            half_area_m2: area * 0.5,
             density_kg_m3: density,
             lift_max: p.get(P::LiftMax),
             drag_max: p.get(P::DragMax),

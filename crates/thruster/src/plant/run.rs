@@ -1,6 +1,7 @@
 //! Runs a plant over prepared inputs and collects the response at log instants.
 
 use super::{Plant, Sensed, Tick};
+use crate::real::Real;
 
 /// Inputs on the control grid and the log instants, as ticks after the start.
 #[derive(Clone, Debug, Default)]
@@ -13,35 +14,32 @@ pub struct Stimulus {
 
 /// What the sensors show at the log instants; a column a channel.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Response {
+pub struct Response<T = f64> {
     /// One entry a log instant.
-    pub rows: Vec<Sensed>,
+    pub rows: Vec<Sensed<T>>,
 }
 
 /// Steps the plant through all ticks.
-pub fn simulate(plant: &mut Plant, stimulus: &Stimulus) -> Response {
+pub fn simulate<T: Real>(plant: &mut Plant<T>, stimulus: &Stimulus) -> Response<T> {
     let mut rows = Vec::with_capacity(stimulus.logs.len());
     let mut next = stimulus.logs.iter().peekable();
-    let mut before = *plant.sensed();
     // An instant on the grid shows the state before that tick's command acts.
-    while let Some((_, part)) = next.next_if(|(tick, part)| *tick == 0 && *part == 0.0) {
-        debug_assert_eq!(*part, 0.0);
-        rows.push(before);
+    while next.next_if(|(tick, part)| *tick == 0 && *part == 0.0).is_some() {
+        rows.push(*plant.sensed());
     }
     for (i, tick) in stimulus.ticks.iter().enumerate() {
-        if next.peek().is_none() {
-            break;
-        }
+        let Some((at, part)) = next.peek() else { break };
+        // Numbers with derivatives are large: copied only where an instant lies within the tick.
+        let before = (*at == i && *part > 0.0).then(|| *plant.sensed());
         plant.step(tick);
-        let after = *plant.sensed();
+        let after = plant.sensed();
         while let Some((_, part)) =
             next.next_if(|(at, part)| *at == i && *part > 0.0 || *at == i + 1 && *part == 0.0)
         {
-            rows.push(if *part == 0.0 { after } else { before.between(&after, *part) });
+            rows.push(before.filter(|_| *part > 0.0).map_or(*after, |before| before.between(after, *part)));
         }
-        before = after;
     }
     // Instants past the last tick see the last state.
-    rows.resize(stimulus.logs.len(), before);
+    rows.resize(stimulus.logs.len(), *plant.sensed());
     Response { rows }
 }

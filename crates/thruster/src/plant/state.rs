@@ -1,5 +1,7 @@
 //! What the plant shows to its effects, and what they may change.
 
+use crate::real::Real;
+
 /// Inputs of one control tick. Quantities that vary within the tick run straight from the first
 /// to the second number.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -59,42 +61,42 @@ impl Tick {
 
 /// The drive during one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Drive {
+pub struct Drive<T = f64> {
     /// Command as it reaches the amplifier.
-    pub command: f64,
+    pub command: T,
     /// Largest current, A.
-    pub current_limit_a: f64,
+    pub current_limit_a: T,
     /// First-order lag, s.
-    pub time_constant_s: f64,
+    pub time_constant_s: T,
     /// Supply at the amplifier, V.
-    pub supply_v: f64,
+    pub supply_v: T,
     /// Winding resistance, ohm.
-    pub resistance_ohm: f64,
+    pub resistance_ohm: T,
     /// Back-EMF at the start of the tick, V.
-    pub back_emf_v: f64,
+    pub back_emf_v: T,
     /// Shaft speed at the start of the tick, rad/s.
-    pub shaft_speed_rad_s: f64,
+    pub shaft_speed_rad_s: T,
     /// Motor current at the start of the tick, A.
-    pub current_a: f64,
+    pub current_a: T,
     /// Whether the supply limits the current against the back-EMF.
     pub voltage_limited: bool,
 }
 
 /// State of the plant at one instant inside a tick.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Local {
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Local<T = f64> {
     /// Time, s.
     pub time_s: f64,
     /// Shaft speed, rad/s.
-    pub shaft_speed_rad_s: f64,
+    pub shaft_speed_rad_s: T,
     /// Shaft angle, rad (the recorded one where there is one).
-    pub shaft_angle_rad: f64,
+    pub shaft_angle_rad: T,
     /// Axial flow at the propeller, m/s.
-    pub axial_m_s: f64,
+    pub axial_m_s: T,
     /// Swirl of the rotational-flow model, m/s.
-    pub swirl_m_s: f64,
+    pub swirl_m_s: T,
     /// Motor current, A.
-    pub current_a: f64,
+    pub current_a: T,
     /// Ambient axial flow, m/s.
     pub ambient_m_s: f64,
     /// Depth, m, if known.
@@ -102,20 +104,21 @@ pub struct Local {
     /// Temperature, deg C, if known.
     pub temperature_c: Option<f64>,
     /// Thrust on the water (only in [`super::Plant::truth`]), N.
-    pub thrust_n: f64,
+    pub thrust_n: T,
     /// Blade torque (only in [`super::Plant::truth`]), N m.
-    pub blade_torque_n_m: f64,
+    pub blade_torque_n_m: T,
 }
 
-impl Local {
+impl<T: Real> Local<T> {
     /// Whether nothing that acts on the rates jumps from `before` to here; the end of one tick and
     /// the start of the next may differ in rounding. Without effects (`HOOKED` false) depth
     /// and temperature do not act.
     #[inline(always)]
     pub(super) fn continues<const HOOKED: bool>(&self, before: &Self) -> bool {
-        let near = |a: f64, b: f64| (a - b).abs() <= 1e-12 * (a.abs() + b.abs());
+        let near =
+            |a: T, b: T| (a.re() - b.re()).abs() <= 1e-12 * (a.re().abs() + b.re().abs()) && a.same_slopes(b);
         near(self.current_a, before.current_a)
-            && near(self.ambient_m_s, before.ambient_m_s)
+            && near(T::from(self.ambient_m_s), T::from(before.ambient_m_s))
             && near(self.shaft_speed_rad_s, before.shaft_speed_rad_s)
             && (!HOOKED
                 || near(self.shaft_angle_rad, before.shaft_angle_rad)
@@ -125,29 +128,29 @@ impl Local {
 }
 
 /// The blade section at work.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Foil {
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Foil<T = f64> {
     /// Resultant speed `V`, m/s.
-    pub speed_m_s: f64,
+    pub speed_m_s: T,
     /// Speed normal to the chord, m/s.
-    pub normal_m_s: f64,
+    pub normal_m_s: T,
     /// Speed along the chord, m/s.
-    pub chordwise_m_s: f64,
+    pub chordwise_m_s: T,
     /// `sin 2 alpha`
-    pub sin_2a: f64,
+    pub sin_2a: T,
     /// `1 - cos 2 alpha`
-    pub one_minus_cos_2a: f64,
+    pub one_minus_cos_2a: T,
     /// Lift coefficient.
-    pub lift: f64,
+    pub lift: T,
     /// Drag coefficient.
-    pub drag: f64,
+    pub drag: T,
     /// Density of the water, kg/m^3.
-    pub density_kg_m3: f64,
+    pub density_kg_m3: T,
 }
 
-impl Foil {
+impl<T: Real> Foil<T> {
     /// Angle of attack in (-pi/2, pi/2], rad.
-    pub fn attack_rad(&self) -> f64 {
+    pub fn attack_rad(&self) -> T {
         if self.chordwise_m_s < 0.0 {
             (-self.normal_m_s).atan2(-self.chordwise_m_s)
         } else {
@@ -157,59 +160,59 @@ impl Foil {
 }
 
 /// Torques on the shaft and forces on the water at one instant.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Balance {
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Balance<T = f64> {
     /// Motor torque, N m.
-    pub motor_torque_n_m: f64,
+    pub motor_torque_n_m: T,
     /// Other torque on the shaft, N m; positive accelerates ahead.
-    pub shaft_torque_n_m: f64,
+    pub shaft_torque_n_m: T,
     /// Blade torque, N m; positive opposes positive speed.
-    pub blade_torque_n_m: f64,
+    pub blade_torque_n_m: T,
     /// Inertia of the shaft, kg m^2.
-    pub inertia_kg_m2: f64,
+    pub inertia_kg_m2: T,
     /// Thrust of the blades, N.
-    pub thrust_n: f64,
+    pub thrust_n: T,
     /// Other force on the axial flow, N.
-    pub momentum_n: f64,
+    pub momentum_n: T,
     /// Accelerated mass `m = rho a l gamma`, kg.
-    pub added_mass_kg: f64,
+    pub added_mass_kg: T,
     /// `dbeta rho a`, kg/m.
-    pub flux_kg_m: f64,
+    pub flux_kg_m: T,
     /// Ambient axial flow, m/s.
-    pub ambient_m_s: f64,
+    pub ambient_m_s: T,
     /// Force on the stand beyond the blades' thrust, N: seen by the force sensor, not by the water.
-    pub stand_n: f64,
+    pub stand_n: T,
     /// The blade section these loads come from; all zero where the model has none or nothing moves.
-    pub foil: Foil,
+    pub foil: Foil<T>,
 }
 
 /// What the sensors show, without noise; names are the recording's columns.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Sensed {
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sensed<T = f64> {
     /// Motor current, A.
-    pub current_a: f64,
+    pub current_a: T,
     /// Shaft angle, rad.
-    pub shaft_angle_rad: f64,
+    pub shaft_angle_rad: T,
     /// Shaft speed after differencing and filter, rad/s.
-    pub shaft_speed_rad_s: f64,
+    pub shaft_speed_rad_s: T,
     /// Thrust after the sensor's filter, N.
-    pub thrust_n: f64,
+    pub thrust_n: T,
     /// Propeller-side torque after its filter, N m.
-    pub torque_n_m: f64,
+    pub torque_n_m: T,
     /// Axial flow, m/s.
-    pub flow_m_s: f64,
+    pub flow_m_s: T,
     /// Shaft speed itself, rad/s, for effects on the sensors.
-    pub true_speed_rad_s: f64,
+    pub true_speed_rad_s: T,
     /// Thrust before the sensor, N, for effects on the sensors.
-    pub true_thrust_n: f64,
+    pub true_thrust_n: T,
     /// Supply, V.
-    pub supply_v: f64,
+    pub supply_v: T,
 }
 
-impl Sensed {
+impl<T: Real> Sensed<T> {
     /// What the sensors show between this instant and a later one, `part` of the way.
     pub fn between(&self, later: &Self, part: f64) -> Self {
-        let mix = |a: f64, b: f64| a + (b - a) * part;
+        let mix = |a: T, b: T| a + (b - a) * part;
         Self {
             current_a: mix(self.current_a, later.current_a),
             shaft_angle_rad: mix(self.shaft_angle_rad, later.shaft_angle_rad),
@@ -221,5 +224,34 @@ impl Sensed {
             true_thrust_n: mix(self.true_thrust_n, later.true_thrust_n),
             supply_v: mix(self.supply_v, later.supply_v),
         }
+    }
+}
+
+/// All zero: at rest.
+macro_rules! at_rest {
+    ($($name:ident { $($field:ident)* $(, $($other:ident)*)? })*) => {
+        $(impl<T: Real> Default for $name<T> {
+            #[inline(always)]
+            fn default() -> Self {
+                Self { $($field: T::ZERO,)* $($($other: Default::default()),*)? }
+            }
+        })*
+    };
+}
+
+at_rest! {
+    Local {
+        shaft_speed_rad_s shaft_angle_rad axial_m_s swirl_m_s current_a thrust_n blade_torque_n_m,
+        time_s ambient_m_s depth_m temperature_c
+    }
+    Foil { speed_m_s normal_m_s chordwise_m_s sin_2a one_minus_cos_2a lift drag density_kg_m3 }
+    Balance {
+        motor_torque_n_m shaft_torque_n_m blade_torque_n_m inertia_kg_m2 thrust_n momentum_n added_mass_kg
+        flux_kg_m ambient_m_s stand_n,
+        foil
+    }
+    Sensed {
+        current_a shaft_angle_rad shaft_speed_rad_s thrust_n torque_n_m flow_m_s true_speed_rad_s true_thrust_n
+        supply_v
     }
 }

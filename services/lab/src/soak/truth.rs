@@ -108,7 +108,7 @@ pub fn effects(scenario: &Scenario, rig: &Rig, model: &ControlModel) -> Result<V
             }
             chosen.push(value);
         }
-        states += (descriptor.build)(&chosen, &context).states();
+        states += (descriptor.build.plain)(&chosen, &context).states();
         hooked.push((descriptor, chosen));
     }
     if states > EFFECT_STATES {
