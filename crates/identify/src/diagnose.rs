@@ -322,8 +322,8 @@ fn write(
     {
         mismatch.push(bare_mismatch(search, &outcome.baseline, &baseline_full, channel, size, &speed));
     }
-    let everything = score(&residual_baseline, &residual_last).excess_error_removed;
     if findings.len() > 1 {
+        let everything = score(&residual_baseline, &residual_last).excess_error_removed;
         notes.push(format!(
             "everything found together removes {:.0} % of the error above the noise on held-out data",
             100.0 * everything
@@ -332,7 +332,7 @@ fn write(
     // Best first: what explains most, and of its rivals the likeliest.
     findings.sort_by(|a, b| b.0.total_cmp(&a.0).then(b.1.probability.total_cmp(&a.1.probability)));
     let mut findings: Vec<Finding> = findings.into_iter().map(|f| f.1).collect();
-    let verdict = verdict(&outcome, &findings, everything, thin.is_some());
+    let verdict = verdict(&outcome, &findings, thin.is_some());
     if verdict == Verdict::Unexplained {
         findings.iter_mut().for_each(|f| f.probability *= rules::BESIDE_UNKNOWN);
     }
@@ -403,7 +403,7 @@ fn least_beside_others(search: &Search, place: &Place, gains: &[(&Descriptor, f6
     }
 }
 
-fn verdict(outcome: &Outcome, findings: &[Finding], everything: f64, thin: bool) -> Verdict {
+fn verdict(outcome: &Outcome, findings: &[Finding], thin: bool) -> Verdict {
     let removed = findings.iter().map(|f| f.heldout.excess_error_removed).fold(0.0, f64::max);
     let total: f64 = outcome.places.iter().map(|p| p.gain).sum();
     let unnamed: f64 = outcome.places.iter().filter(|p| is_term(p.chosen)).map(|p| p.gain).sum();
@@ -413,7 +413,6 @@ fn verdict(outcome: &Outcome, findings: &[Finding], everything: f64, thin: bool)
         if thin { Verdict::InsufficientData } else { Verdict::NoMismatch }
     } else if unnamed > rules::UNNAMED_SHARE * total
         || outcome.excess.is_some() && removed < rules::LEAST_REMOVED
-        || everything.max(removed) < rules::LEAST_REMOVED_EVER
     {
         Verdict::Unexplained
     } else if outcome.places.iter().any(|p| !p.rivals.is_empty()) {

@@ -56,8 +56,6 @@ pub const CHANGE_FOR_SWITCH: f64 = 1.1;
 pub const RIVAL_SHARE: f64 = 0.6;
 /// Share of the held-out error above the noise that names must remove where much is left beside them.
 pub const LEAST_REMOVED: f64 = 0.5;
-/// ... and anywhere.
-pub const LEAST_REMOVED_EVER: f64 = 0.35;
 /// Share below which a name is set aside where much is left.
 pub const LEAST_OF_A_FINDING: f64 = 0.2;
 /// ... where another explains more.

@@ -13,7 +13,7 @@ use crate::report::{
 };
 
 /// How sure a lone name is when nothing comes near it; measured on tuning seeds.
-const SURE: f64 = 0.94;
+const SURE: f64 = 0.96;
 
 /// Probabilities of the chosen effect and its rivals. A distance in the criterion counts less
 /// than its size in log-likelihood says, because the true form differs a little from ours.
