@@ -235,7 +235,7 @@ fn write(
             if rest.is_empty() { residual_baseline.clone() } else { problem.residual_of(&with(&rest)) };
         let held_here = score(&without, &residual_last);
         if held_here.excess_error_removed < least_beside_others(search, place, &gains) {
-            // Beside a larger find, a name that hardly removes anything on new data is none.
+            // Beside others, a name that hardly removes anything on new data is none.
             weak.push(place.chosen.id);
             if !is_term(place.chosen) {
                 alternatives.push(words::weak(place.chosen.id, &held_here));

@@ -126,37 +126,27 @@ fn switched<T: Real>(time_s: f64, v: &Values<T>) -> T {
     (((T::from(time_s) - v.shape) / 0.05).tanh() + 1.0) * 0.5
 }
 
-fn power(name: &'static str, unit: &'static str, size: f64, reference: f64) -> Vec<Spec> {
+/// A size, the reference it is told by, and a shape.
+fn specs(name: &'static str, unit: &'static str, size: f64, reference: f64, shape: Spec) -> Vec<Spec> {
     let reach = 20.0 * size;
     vec![
         Spec::strength(name, unit, size, -reach, reach),
         Spec::shape("reference", "SI", reference, reference, reference),
-        Spec::shape("exponent", "1", 0.7, 0.0, 4.0),
+        shape,
     ]
+}
+
+fn power(name: &'static str, unit: &'static str, size: f64, reference: f64) -> Vec<Spec> {
+    specs(name, unit, size, reference, Spec::shape("exponent", "1", 0.7, 0.0, 4.0))
 }
 
 fn step(name: &'static str, unit: &'static str, size: f64, reference: f64) -> Vec<Spec> {
-    let reach = 20.0 * size;
-    vec![
-        Spec::strength(name, unit, size, -reach, reach),
-        Spec::shape("reference", "SI", reference, reference, reference),
-        Spec::shape("threshold", "1", 0.5, 0.1, 1.0),
-    ]
+    specs(name, unit, size, reference, Spec::shape("threshold", "1", 0.5, 0.1, 1.0))
 }
 
 fn switch(name: &'static str, unit: &'static str, size: f64, scale: &Scale) -> Vec<Spec> {
-    let reach = 20.0 * size;
-    vec![
-        Spec::strength(name, unit, size, -reach, reach),
-        Spec::shape(
-            "reference",
-            "SI",
-            scale.shaft_speed_rad_s,
-            scale.shaft_speed_rad_s,
-            scale.shaft_speed_rad_s,
-        ),
-        Spec::shape("switch_time_s", "s", 0.5 * scale.duration_s, 0.0, scale.duration_s),
-    ]
+    let when = Spec::shape("switch_time_s", "s", 0.5 * scale.duration_s, 0.0, scale.duration_s);
+    specs(name, unit, size, scale.shaft_speed_rad_s, when)
 }
 
 fn exponents(specs: Vec<Spec>) -> Vec<Vec<f64>> {

@@ -365,6 +365,16 @@ mod tests {
     }
 
     #[test]
+    fn a_threshold_is_told_as_a_speed() {
+        let told = |id| {
+            let term = crate::library::TERMS.iter().find(|t| t.id == id).unwrap();
+            expression(term, &[2.0, 1.5, 0.4], None)
+        };
+        assert_eq!(told("term_blade_thrust_step"), "thrust + 2.00000 sgn(Om) where |vp| > 0.6000");
+        assert_eq!(told("term_shaft_step"), "shaft torque -2.00000 sgn(Om) where |Om| > 0.6000");
+    }
+
+    #[test]
     fn a_coefficient_far_from_what_is_stated_is_spoken_of() {
         let fit = |inertia: f64| Fit {
             hypothesis: Hypothesis {

@@ -27,12 +27,7 @@ impl<T: Real> Effect<T> for ColumnTerm<T> {
 }
 
 fn column(name: &'static str, unit: &'static str, size: f64, reference: f64) -> Vec<Spec> {
-    let reach = 20.0 * size;
-    vec![
-        Spec::strength(name, unit, size, -reach, reach),
-        Spec::shape("reference", "SI", reference, reference, reference),
-        Spec::shape("exponent", "1", 1.0, 1.0, 1.0),
-    ]
+    specs(name, unit, size, reference, Spec::shape("exponent", "1", 1.0, 1.0, 1.0))
 }
 
 fn following<T: Real>(v: &[T], act: Act<T>) -> Box<dyn Effect<T>> {
