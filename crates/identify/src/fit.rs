@@ -408,6 +408,19 @@ impl<'a> Problem<'a> {
             .collect();
     }
 
+    /// Takes all that a fit leaves for white noise, on every channel.
+    pub fn white_noise_of(&mut self, fit: &Fit) {
+        let residual = self.residual_of(fit);
+        self.flat_noise();
+        for (whiteners, residual) in self.whiteners.iter_mut().zip(residual) {
+            for (whitener, values) in whiteners.iter_mut().zip(residual) {
+                let mean_square = values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64;
+                let least = 1e-3 * whitener.level()[0];
+                *whitener = Whitener::flat(mean_square.sqrt().max(least), values.len());
+            }
+        }
+    }
+
     /// Learns the noise from the residual of a fitted hypothesis.
     pub fn learn_noise(&mut self, hypothesis: &Hypothesis, values: &[f64]) {
         let rows = self.rows(hypothesis, values);

@@ -11,6 +11,7 @@ use crate::data::{Driving, Series, available};
 use crate::errors;
 use crate::fit::{Columns, Fit, Hypothesis, Problem};
 use crate::library::is_term;
+use crate::look::look;
 use crate::refit::{TIMING, amends, cost, unscreened};
 use crate::rules;
 use crate::search::{Candidate, Search, criterion};
@@ -86,7 +87,7 @@ pub fn run(
     }
     // Much is left: did something change in mid-run? Slow noise learned without it hides it.
     progress("looking for changes in mid-run");
-    let saved = (search.problem.recordings.clone(), search.problem.whiteners.clone());
+    let saved = search.noise();
     if let Some(found) = changes::find(search, &named.baseline, &offered) {
         let now = excess(&search.problem, &found.fit).1;
         let may_leave = if switched { rules::CHANGE_FOR_SWITCH } else { rules::CHANGE_LEAVES };
@@ -103,7 +104,7 @@ pub fn run(
             return Outcome { elsewhere: rival, ..outcome };
         }
     }
-    (search.problem.recordings, search.problem.whiteners) = saved;
+    search.set_noise(saved);
     if poor {
         progress("the names leave too much: looking for a term without a name");
         return nameless(search, &named.baseline, named.places);
@@ -125,49 +126,24 @@ fn names(
     let mut doubt = None;
     while rounds.len() < rules::MOST_FOUND {
         progress(&format!("looking for effect {}", rounds.len() + 1));
-        let saved = (search.problem.recordings.clone(), search.problem.whiteners.clone());
-        let Some(round) = search.round(&mut current, so_far) else { break };
-        let (terms, named): (Vec<_>, Vec<_>) = round.candidates.into_iter().partition(|c| is_term(c.effect));
-        let base = criterion(&round.before);
-        let best_term = terms.into_iter().next().filter(|t| base - t.criterion > rules::BELIEVE);
-        let believed = named.first().is_some_and(|best| {
-            let gain = base - best.criterion;
-            let others = best_term.as_ref().map_or(0.0, |t| base - t.criterion);
-            let clear = round.size > rules::CLEAR_SIZE && commanded(&search.problem);
-            let weighty = gain > rules::SHARE_OF_FIRST * so_far || clear;
-            // What is free in time bends to any physics: it must do better than a term of two numbers.
-            let of_term = if search.free_in_time(best.effect) { 1.0 } else { rules::LEAST_OF_TERM };
-            gain > rules::BELIEVE && weighty && gain > of_term * others
-        });
-        let holds = round.holds;
-        let list: Vec<String> =
-            named.iter().take(4).map(|c| format!("{} {:.0}", c.effect.id, base - c.criterion)).collect();
-        progress(&format!("candidates and what they gain: {}", list.join(", ")));
-        if rounds.is_empty() && holds {
-            term = best_term;
+        let saved = search.noise();
+        let Some(one) = look(search, &mut current, so_far, progress) else { break };
+        if rounds.is_empty() && one.holds {
+            term = one.term;
         }
-        if !(believed && holds) {
-            if let Some(best) = named.first() {
-                let why = if round.size <= rules::LEAST_SIZE {
-                    "it is too small to matter"
-                } else if !holds {
-                    "its gain does not hold on data left out of the fit"
-                } else {
-                    "its gain is within the noise, or far below that of a term without a name"
-                };
-                doubt = Some((best.effect, base - best.criterion, why));
-            }
+        if let Some(why) = one.against {
+            doubt = one.named.first().map(|best| (best.effect, one.gain, why));
             if term.is_none() || !rounds.is_empty() {
-                (search.problem.recordings, search.problem.whiteners) = saved;
+                search.set_noise(saved);
                 current = search.again(&current);
             } else {
-                current = round.before;
+                current = one.before;
             }
             break;
         }
-        so_far += base - named[0].criterion;
-        current = named[0].fit.clone();
-        rounds.push(named);
+        so_far += one.gain;
+        current = one.named[0].fit.clone();
+        rounds.push(one.named);
     }
     let plain = |search: &Search, at: &Fit| {
         let (hypothesis, columns) = recompose(at, &[], &search.scale);
@@ -225,7 +201,7 @@ fn floor(problem: &Problem, fit: &Fit) -> BTreeMap<&'static str, f64> {
 }
 
 /// The channel with most error above its noise: root mean square over full scale.
-fn excess(problem: &Problem, fit: &Fit) -> (&'static str, f64) {
+pub(crate) fn excess(problem: &Problem, fit: &Fit) -> (&'static str, f64) {
     excesses(problem, fit, &floor(problem, fit))
         .into_iter()
         .map(|(name, square)| (name, square.sqrt()))
@@ -235,7 +211,7 @@ fn excess(problem: &Problem, fit: &Fit) -> (&'static str, f64) {
 
 /// Whether commands drive. Between the rows of a measured driver nobody knows what drove: its steps
 /// leave errors of their own.
-fn commanded(problem: &Problem) -> bool {
+pub(crate) fn commanded(problem: &Problem) -> bool {
     problem.recordings.iter().all(|r| matches!(r.driving, Driving::Command(_)))
 }
 
@@ -261,16 +237,17 @@ fn leaves_too_much(search: &Search, baseline: &Fit, current: &Fit, places: &[Pla
 
 /// The best term of the whole library on the baseline, under the noise it leaves.
 fn switched(search: &mut Search, current: &mut Fit) -> Option<Candidate> {
-    let saved = (search.problem.recordings.clone(), search.problem.whiteners.clone());
+    let saved = search.noise();
     let mut before = current.clone();
     let best = search.best_term_under_its_noise(&mut before, rules::TERM_LEAST)?;
-    if criterion(&before) - best.criterion > rules::BELIEVE
-        && search.size(&before, &best.fit) > rules::LEAST_SIZE
-    {
+    // A force sensor drifts: where little is left, a small step of it is no finding.
+    let little = excess(&search.problem, &before).1 < rules::REAL_EXCESS;
+    let least_size = if little { rules::CLEAR_SIZE } else { rules::LEAST_SIZE };
+    if criterion(&before) - best.criterion > rules::BELIEVE && search.size(&before, &best.fit) > least_size {
         *current = before;
         return Some(best);
     }
-    (search.problem.recordings, search.problem.whiteners) = saved;
+    search.set_noise(saved);
     None
 }
 

@@ -15,6 +15,7 @@ pub mod identify;
 pub mod judge;
 pub mod library;
 pub mod locate;
+mod look;
 pub mod noise;
 mod refit;
 pub mod refuse;

@@ -12,7 +12,7 @@ pub const SHARE_OF_FIRST: f64 = 0.02;
 /// Least size: root mean square of its response over full scale, on some channel.
 pub const LEAST_SIZE: f64 = 0.0012;
 /// ... of something that changes freely with time: light turbulence of the inflow is no finding.
-pub const LEAST_SIZE_KNOTS: f64 = 0.006;
+pub const LEAST_SIZE_KNOTS: f64 = 0.004;
 /// An effect this large counts whatever its share.
 pub const CLEAR_SIZE: f64 = 0.004;
 /// Share of the gain that must hold on left-out blocks.

@@ -9,11 +9,12 @@ use rayon::prelude::*;
 
 use crate::baseline;
 use crate::changes;
-use crate::data::{Series, possible_drivers};
+use crate::data::{Prepared, Series, possible_drivers};
 use crate::errors;
 use crate::fit::{Fit, Hypothesis, Problem, Stack, Target, difference};
 use crate::heldout;
 use crate::library::{self, is_term};
+use crate::noise::Whitener;
 use crate::refit::{TIMING, amends, in_turn, left, sort, unscreened};
 use crate::rules;
 use crate::screen::{Known, Screened, screen};
@@ -58,6 +59,10 @@ pub fn criterion(fit: &Fit) -> f64 {
     let all = fit.chi2 + fit.penalty + rules::PER_PARAMETER * of_effects as f64;
     if all.is_finite() { all } else { f64::INFINITY }
 }
+
+/// What is known of the noise: whiteners by recording and channel, and recordings with the command's
+/// edges where a hypothesis wants them.
+pub type Noise = (Vec<Prepared>, Vec<Vec<Whitener>>);
 
 /// What a search works on.
 pub struct Search<'a> {
@@ -139,6 +144,16 @@ impl<'a> Search<'a> {
                 recording.lay_extra(column);
             }
         }
+    }
+
+    /// The noise as it is known now, and where the command's edges lie.
+    pub fn noise(&self) -> Noise {
+        (self.problem.recordings.clone(), self.problem.whiteners.clone())
+    }
+
+    /// Back to what was known of noise and edges.
+    pub fn set_noise(&mut self, noise: Noise) {
+        (self.problem.recordings, self.problem.whiteners) = noise;
     }
 
     /// Looks for one more effect on top of a fit that already gained `so_far`.
