@@ -21,6 +21,14 @@ fn diagnose(recordings: &[&str], rig: &str, more: &[&str]) -> Value {
     report
 }
 
+/// Diagnoses a case of the truth simulation.
+fn blind(kind: CaseKind, seed: u64, selection: &Selection) -> Value {
+    let case = kort_truth::case(kind, seed, selection);
+    let recording = lab::write(&format!("blind-{seed}.csv"), &case.recording_csv);
+    let rig = lab::write(&format!("blind-{seed}.toml"), &case.rig_toml);
+    diagnose(&[&recording], &rig, &[])
+}
+
 /// The effects found, best first.
 fn found(report: &Value) -> Vec<&str> {
     report["findings"].as_array().unwrap().iter().map(|f| f["effect"].as_str().unwrap()).collect()
@@ -181,12 +189,25 @@ fn what_one_excitation_cannot_part_is_ambiguous_and_the_next_one_runs() {
 fn bubbles_that_come_and_go_are_told_from_an_unsteady_inflow() {
     let selection =
         Selection { effect: Some("air_ingestion".into()), strength: Some(0.03), ..Selection::default() };
-    let case = kort_truth::case(CaseKind::Single, 877, &selection);
-    let recording = lab::write("bubbles.csv", &case.recording_csv);
-    let rig = lab::write("bubbles.toml", &case.rig_toml);
-    let report = diagnose(&[&recording], &rig, &[]);
+    let report = blind(CaseKind::Single, 877, &selection);
     assert_eq!(report["verdict"], "explained", "{}", report["summary"]);
     assert_eq!(found(&report), ["air_ingestion"]);
+}
+
+/// Noise learned from a fit that has the lag but not the friction forgives just the friction.
+#[test]
+fn a_second_effect_is_found_though_the_first_ones_noise_hides_it() {
+    let report = blind(CaseKind::Pair, 7000003, &Selection::default());
+    assert_eq!(report["verdict"], "explained", "{}", report["summary"]);
+    assert_eq!(found(&report), ["amplifier_lag", "coulomb_friction"]);
+}
+
+/// A lightly damped stand rings in step with the fit only if the fit starts near its frequency.
+#[test]
+fn a_stand_that_rings_is_named_whatever_its_frequency() {
+    let report = blind(CaseKind::Single, 7000135, &Selection::default());
+    assert_eq!(report["verdict"], "explained", "{}", report["summary"]);
+    assert_eq!(found(&report), ["stand_resonance"]);
 }
 
 #[test]

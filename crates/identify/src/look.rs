@@ -1,5 +1,6 @@
 //! One more look for an effect: a round of the search, and whether its best name is to be believed.
 
+use crate::changes::is_change;
 use crate::fit::Fit;
 use crate::judge::{commanded, excess};
 use crate::library::is_term;
@@ -22,32 +23,32 @@ pub(crate) struct Look {
     pub against: Option<&'static str>,
 }
 
-/// Looks for one more effect. Where much is left and no name is believed, once more under white noise:
-/// noise learned from a fit that misses something forgives just that.
+/// Looks for one more effect. Where much is left and nothing promises to explain it, once more under
+/// white noise: noise learned from a fit that misses something forgives just that.
 pub(crate) fn look(
     search: &mut Search,
     current: &mut Fit,
     so_far: f64,
     progress: &(dyn Fn(&str) + Sync),
 ) -> Option<Look> {
-    let noise = search.noise();
-    let first = search.round(current, so_far).map(|round| weigh(search, round, so_far, progress));
-    let settled = first.as_ref().is_some_and(|l| l.against.is_none() || l.term.is_some());
-    if settled || excess(&search.problem, current).1 < rules::REAL_EXCESS {
-        return first;
+    let first = search.round(current, so_far);
+    // Beside changes in mid-run, what their times do not meet exactly is left.
+    let changed = current.hypothesis.effects.iter().any(|e| is_change(e));
+    let settled = first.is_some() || changed || excess(&search.problem, current).1 < rules::REAL_EXCESS;
+    if settled {
+        return first.map(|round| weigh(search, round, so_far, progress));
     }
     progress("much is left: looking once more under white noise");
-    let after = (search.noise(), current.clone());
-    search.set_noise(noise);
+    let known = (search.noise(), current.clone());
     search.problem.white_noise_of(current);
     *current = search.problem.fit(&current.resume(), &current.columns, 8);
     let second = search.round(current, 0.0).map(|round| weigh(search, round, 0.0, progress));
-    if second.as_ref().is_some_and(|l| l.against.is_none()) {
-        return second;
+    if second.as_ref().is_none_or(|look| look.against.is_some()) {
+        search.set_noise(known.0);
+        *current = known.1;
+        return None;
     }
-    search.set_noise(after.0);
-    *current = after.1;
-    first
+    second
 }
 
 /// Whether the best name of a round is to be believed.

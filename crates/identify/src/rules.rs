@@ -24,7 +24,7 @@ pub const MARGIN: f64 = 12.0;
 /// ... or closer than this share of what the effect gains.
 pub const MARGIN_SHARE: f64 = 0.02;
 /// ... or, for effects that the catalogue knows to be confused, this share.
-pub const MATES_SHARE: f64 = 0.09;
+pub const MATES_SHARE: f64 = 0.12;
 /// How much better a term without a name must be than the best name to take its place, as a share of
 /// what the names gain.
 pub const TERM_AHEAD: f64 = 0.025;
