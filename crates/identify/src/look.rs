@@ -31,24 +31,28 @@ pub(crate) fn look(
     so_far: f64,
     progress: &(dyn Fn(&str) + Sync),
 ) -> Option<Look> {
-    let first = search.round(current, so_far);
-    // Beside changes in mid-run, what their times do not meet exactly is left.
-    let changed = current.hypothesis.effects.iter().any(|e| is_change(e));
-    let settled = first.is_some() || changed || excess(&search.problem, current).1 < rules::REAL_EXCESS;
-    if settled {
-        return first.map(|round| weigh(search, round, so_far, progress));
+    let known = search.noise();
+    let first = search.round(current, so_far).map(|round| weigh(search, round, so_far, progress));
+    let effects = &current.hypothesis.effects;
+    // A poor first name is looked at again as well; later ones are many, and beside changes in mid-run what
+    // their times do not meet exactly is left.
+    let promising = |look: &Look| !effects.is_empty() || look.against.is_none() || look.term.is_some();
+    let settled = first.as_ref().is_some_and(promising) || effects.iter().any(|e| is_change(e));
+    if settled || excess(&search.problem, current).1 < rules::REAL_EXCESS {
+        return first;
     }
     progress("much is left: looking once more under white noise");
-    let known = (search.noise(), current.clone());
+    let after = (search.noise(), current.clone());
+    search.set_noise(known);
     search.problem.white_noise_of(current);
     *current = search.problem.fit(&current.resume(), &current.columns, 8);
     let second = search.round(current, 0.0).map(|round| weigh(search, round, 0.0, progress));
-    if second.as_ref().is_none_or(|look| look.against.is_some()) {
-        search.set_noise(known.0);
-        *current = known.1;
-        return None;
+    if second.as_ref().is_some_and(|look| look.against.is_none()) {
+        return second;
     }
-    second
+    search.set_noise(after.0);
+    *current = after.1;
+    first
 }
 
 /// Whether the best name of a round is to be believed.
