@@ -107,7 +107,15 @@ pub fn run(
     search.set_noise(saved);
     if poor {
         progress("the names leave too much: looking for a term without a name");
-        return nameless(search, &named.baseline, named.places);
+        let known = search.noise();
+        let nameless = nameless(search, &named.baseline, named.places.clone());
+        // Names that explain most stand where no term explains more.
+        let floor = floor(&search.problem, &named.last);
+        let left = |fit: &Fit| excesses(&search.problem, fit, &floor).iter().map(|e| e.1).sum::<f64>();
+        if !nameless.places.is_empty() && left(&nameless.last) < left(&named.last) {
+            return nameless;
+        }
+        search.set_noise(known);
     }
     named
 }
