@@ -5,6 +5,7 @@ default:
 # formatting and lints
 check:
     cargo fmt --check
+    rustfmt --edition 2024 --check crates/thruster/src/effects/*.rs
     cargo clippy --workspace --all-targets -- -D warnings
 
 # every test, with what they need

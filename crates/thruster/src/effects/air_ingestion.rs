@@ -21,7 +21,10 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: one_start,
     needs: wet,
-    build: both!(|values, _| Box::new(AirIngestion { column_share: values[0], fraction: Knots::new(&values[1..]) })),
+    build: both!(|values, _| Box::new(AirIngestion {
+        column_share: values[0],
+        fraction: Knots::new(&values[1..])
+    })),
 };
 
 fn parameters(scale: &Scale) -> Vec<Spec> {

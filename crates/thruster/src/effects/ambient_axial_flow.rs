@@ -2,8 +2,8 @@
 
 use super::{Available, Descriptor, Effect, Hooks, Path, Scale, Spec, one_start, wet};
 use crate::plant::{Balance, Local};
-use crate::rig::Rig;
 use crate::real::Real;
+use crate::rig::Rig;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -13,7 +13,12 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     equation: "T = m vp' + dbeta rho a (vp - va)|vp|; va [m/s], positive when it feeds the propeller ahead",
     signature: "thrust at a given speed is low one way and high the other, the more the lower the thrust: the deviation \
                 falls as 1/Om, while an asymmetry of the blades is a constant percentage",
-    confused_with: &["forward_reverse_asymmetry", "torque_channel_bias", "thrust_bias_gain_hysteresis", "tank_recirculation"],
+    confused_with: &[
+        "forward_reverse_asymmetry",
+        "torque_channel_bias",
+        "thrust_bias_gain_hysteresis",
+        "tank_recirculation",
+    ],
     separated_by: "a staircase in both directions; a towed run; a force bias leaves shaft speed alone",
     reference: "equation (6a), from (4); Blanke, Lindegaard, Fossen 2000 (nonzero advance speed)",
     parameters,

@@ -3,8 +3,8 @@
 use super::{Available, Descriptor, Effect, Hooks, Path, Scale, Spec, wet};
 use crate::models::ModelName;
 use crate::parameters::{Parameter as P, Parameters};
-use crate::rig::Rig;
 use crate::real::Real;
+use crate::rig::Rig;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -22,7 +22,9 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: |_| vec![vec![1.0, 1.0, 1.0, 2.5, 1.0]],
     needs: static_baseline,
-    build: both!(|values, _| Box::new(AxialFlowDynamics { factors: [values[0], values[1], values[2], values[3], values[4]] })),
+    build: both!(|values, _| Box::new(AxialFlowDynamics {
+        factors: [values[0], values[1], values[2], values[3], values[4]]
+    })),
 };
 
 /// Factors on what the rig states.

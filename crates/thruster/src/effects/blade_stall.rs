@@ -23,7 +23,12 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     starts: |_| vec![vec![0.1, 0.17, 1.0], vec![0.1, 0.28, 1.0], vec![0.1, 0.35, 1.0], vec![0.1, 0.28, 4.0]],
     needs: wet,
     build: both!(|values, context| {
-        Box::new(BladeStall { loss: values[0], stall_rad: values[1], lag_m: values[2] * context.parameters.get(P::RadiusM), tick_s: context.tick_s })
+        Box::new(BladeStall {
+            loss: values[0],
+            stall_rad: values[1],
+            lag_m: values[2] * context.parameters.get(P::RadiusM),
+            tick_s: context.tick_s,
+        })
     }),
 };
 

@@ -21,7 +21,13 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     equation: "sigma = (pa + rho g h - pv)/(rho/2 V^2); CL, CD / (1 + k ramp(sigma_i/sigma - 1)); k, sigma_i [1], h recorded \
                or 1 m. An onset sigma_i above about 3 is no cavitation at 0.7 radius",
     signature: "thrust over speed squared droops at top speed only, alike in both directions; less so at depth",
-    confused_with: &["ventilation", "voltage_limit_backemf", "current_saturation", "torque_constant_saturation", "air_ingestion"],
+    confused_with: &[
+        "ventilation",
+        "voltage_limit_backemf",
+        "current_saturation",
+        "torque_constant_saturation",
+        "air_ingestion",
+    ],
     separated_by: "the same run at several depths; a voltage limit caps speed but leaves thrust over speed squared alone",
     reference: "Carlton, Marine Propellers and Propulsion (cavitation number); the loss below onset is kort's form",
     parameters,

@@ -3,8 +3,8 @@
 use super::memory::History;
 use super::{Available, Descriptor, Effect, Hooks, Path, Scale, Spec};
 use crate::plant::{Sensed, Tick};
-use crate::rig::Rig;
 use crate::real::Real;
+use crate::rig::Rig;
 
 /// Longest delay, s.
 const LONGEST_S: f64 = 0.5;
@@ -16,7 +16,13 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     what: "one channel is logged late against the others and the command: another clock, a buffer, a slow bus",
     equation: "y_c(t) = y_c(t - d_c), d_c >= 0 [s] for thrust, shaft speed and flow; a channel logged early shows as the others late",
     signature: "one channel is shifted by the same time at all frequencies and amplitudes, its levels fit",
-    confused_with: &["transport_delay", "thrust_sensor_lag", "encoder_filter_lag", "flowmeter_offset_lag_location", "amplifier_lag"],
+    confused_with: &[
+        "transport_delay",
+        "thrust_sensor_lag",
+        "encoder_filter_lag",
+        "flowmeter_offset_lag_location",
+        "amplifier_lag",
+    ],
     separated_by: "channels correlated with each other at the start and at the end of the run",
     reference: "Ljung 1999, System Identification",
     parameters,

@@ -19,10 +19,17 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: |scale| {
         let full = scale.command;
-        [(0.02, 1.0), (0.06, 0.0), (0.06, 1.0), (0.15, 1.0)].iter().map(|(d, kept)| vec![d * full, 0.0, *kept]).collect()
+        [(0.02, 1.0), (0.06, 0.0), (0.06, 1.0), (0.15, 1.0)]
+            .iter()
+            .map(|(d, kept)| vec![d * full, 0.0, *kept])
+            .collect()
     },
     needs: commanded,
-    build: both!(|values, _| Box::new(CommandDeadBand { half_width: values[0], centre: values[1], kept: values[2] })),
+    build: both!(|values, _| Box::new(CommandDeadBand {
+        half_width: values[0],
+        centre: values[1],
+        kept: values[2]
+    })),
 };
 
 fn parameters(scale: &Scale) -> Vec<Spec> {

@@ -29,7 +29,13 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
     vec![
         Spec::strength("coulomb_torque_n_m", "N m", 0.02 * scale.torque_n_m, 0.0, scale.torque_n_m),
         Spec::shape("stribeck_rise", "1", 0.3, 0.0, 2.0),
-        Spec::shape("stribeck_speed_rad_s", "rad/s", 0.04 * scale.shaft_speed_rad_s, 0.002 * scale.shaft_speed_rad_s, 0.3 * scale.shaft_speed_rad_s),
+        Spec::shape(
+            "stribeck_speed_rad_s",
+            "rad/s",
+            0.04 * scale.shaft_speed_rad_s,
+            0.002 * scale.shaft_speed_rad_s,
+            0.3 * scale.shaft_speed_rad_s,
+        ),
     ]
 }
 
@@ -40,9 +46,10 @@ fn build<T: Real>(values: &[T], context: &Context<T>) -> Box<dyn Effect<T>> {
         stribeck_rad_s: values[2],
         // Sharp against the speeds in use, soft enough for the integrator's step:
         // level / (eps I) stays below 1/tick.
-        eps_rad_s: (values[2] * 0.02)
-            .max(values[0].abs() * 1.2 * (values[1] + 1.0) * context.tick_s
-                / context.parameters.get(crate::parameters::Parameter::InertiaKgM2)),
+        eps_rad_s: (values[2] * 0.02).max(
+            values[0].abs() * 1.2 * (values[1] + 1.0) * context.tick_s
+                / context.parameters.get(crate::parameters::Parameter::InertiaKgM2),
+        ),
     })
 }
 

@@ -24,7 +24,12 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     },
     needs: wet,
     build: both!(|values, _| {
-        Box::new(CrossFlow { loss: values[0], steady_m_s: values[1], per_signal_m_s: values[2], across_m2_s2: Real::ZERO })
+        Box::new(CrossFlow {
+            loss: values[0],
+            steady_m_s: values[1],
+            per_signal_m_s: values[2],
+            across_m2_s2: Real::ZERO,
+        })
     }),
 };
 

@@ -14,7 +14,12 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
                the flux coefficient and is taken up by it where that has a tolerance",
     signature: "thrust and flow no longer agree in the steady momentum balance, by the same percentage at all speeds; \
                 shaft speed hardly changes",
-    confused_with: &["thrust_bias_gain_hysteresis", "flowmeter_offset_lag_location", "thrust_deduction_interaction", "water_density"],
+    confused_with: &[
+        "thrust_bias_gain_hysteresis",
+        "flowmeter_offset_lag_location",
+        "thrust_deduction_interaction",
+        "water_density",
+    ],
     separated_by: "a profile of the flow across the duct; thrust and flow recorded together",
     reference: "control volume of the duct, equations (2)-(6); Carlton, Marine Propellers and Propulsion",
     parameters,

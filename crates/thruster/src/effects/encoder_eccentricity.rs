@@ -1,10 +1,12 @@
 //! The encoder's disc sits off centre.
 
 use super::memory::FirstOrder;
-use super::{Available, Descriptor, Effect, Hooks, Path, Scale, Spec, angle_recorded, one_start, speed_measured};
+use super::{
+    Available, Descriptor, Effect, Hooks, Path, Scale, Spec, angle_recorded, one_start, speed_measured,
+};
 use crate::plant::{Sensed, Tick};
-use crate::rig::Rig;
 use crate::real::Real;
+use crate::rig::Rig;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -57,7 +59,9 @@ impl<T: Real> Effect<T> for Eccentricity<T> {
         let angle = tick.shaft_angle_rad.map_or(sensed.shaft_angle_rad, |(_, end)| T::from(end));
         let (sin, cos) = angle.sin_cos();
         let (sin_2, cos_2) = (sin * 2.0 * cos, T::ONE - sin * 2.0 * sin);
-        let wave = self.first[0] * sin + self.first[1] * cos + self.second[0] * sin_2 + self.second[1] * cos_2;
-        sensed.shaft_speed_rad_s += self.filter.step(sensed.true_speed_rad_s * wave, T::from(self.filter_s), self.tick_s);
+        let wave =
+            self.first[0] * sin + self.first[1] * cos + self.second[0] * sin_2 + self.second[1] * cos_2;
+        sensed.shaft_speed_rad_s +=
+            self.filter.step(sensed.true_speed_rad_s * wave, T::from(self.filter_s), self.tick_s);
     }
 }

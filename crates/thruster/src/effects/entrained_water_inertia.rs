@@ -2,8 +2,8 @@
 
 use super::{Available, Descriptor, Effect, Hooks, Path, Scale, Spec, free_shaft, one_start, wet};
 use crate::plant::{Balance, Local};
-use crate::rig::Rig;
 use crate::real::Real;
+use crate::rig::Rig;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {

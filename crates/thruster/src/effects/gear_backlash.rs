@@ -3,8 +3,8 @@
 use super::{Available, Context, Descriptor, Effect, Hooks, Path, Scale, Spec, free_shaft, one_start};
 use crate::parameters::Parameter as P;
 use crate::plant::{Balance, Drive, Local, Sensed, Tick};
-use crate::rig::Rig;
 use crate::real::Real;
+use crate::rig::Rig;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -32,7 +32,11 @@ fn parameters(_: &Scale) -> Vec<Spec> {
 
 fn needs(rig: &Rig, available: &Available) -> Result<(), &'static str> {
     free_shaft(rig, available)?;
-    if rig.class.to_lowercase().contains("gear") { Ok(()) } else { Err("the rig is direct drive: its class names no gear") }
+    if rig.class.to_lowercase().contains("gear") {
+        Ok(())
+    } else {
+        Err("the rig is direct drive: its class names no gear")
+    }
 }
 
 fn build<T: Real>(values: &[T], context: &Context<T>) -> Box<dyn Effect<T>> {

@@ -18,7 +18,11 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: one_start,
     needs: wet,
-    build: both!(|values, _| Box::new(NonsinusoidalLiftDrag { profile_drag: values[0], drag_4: values[1], lift_4: values[2] })),
+    build: both!(|values, _| Box::new(NonsinusoidalLiftDrag {
+        profile_drag: values[0],
+        drag_4: values[1],
+        lift_4: values[2]
+    })),
 };
 
 /// Bounded where the blade would begin to pull energy out of still water.

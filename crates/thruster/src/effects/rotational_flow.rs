@@ -15,7 +15,12 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
                fitted as swirl_yield = 1/dbr and swirl_lag_ratio = gr/dbr",
     signature: "shaft speed overshoots after a torque step by the same percentage at all torques, because swirl is not \
                 yet washed out while axial flow is low",
-    confused_with: &["entrained_water_inertia", "unsteady_lift_lag", "nonsinusoidal_lift_drag", "inertia_added_mass_error"],
+    confused_with: &[
+        "entrained_water_inertia",
+        "unsteady_lift_lag",
+        "nonsinusoidal_lift_drag",
+        "inertia_added_mass_error",
+    ],
     separated_by: "steps of several sizes both ways with shaft speed and thrust logged: the pair of overshoots; a probe for tangential flow",
     reference: "Bachmayer, Whitcomb, Grosenbaugh 2000 (IEEE JOE 25:146); the equation's form is kort's",
     parameters,

@@ -12,7 +12,12 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     equation: "I (1 + e) Om' = ...; e [1]",
     signature: "shaft speed rises and falls more slowly (or faster) than modelled; the torque residual follows Om'; \
                 steady states fit",
-    confused_with: &["entrained_water_inertia", "inertia_added_mass_error", "amplifier_lag", "rotational_flow"],
+    confused_with: &[
+        "entrained_water_inertia",
+        "inertia_added_mass_error",
+        "amplifier_lag",
+        "rotational_flow",
+    ],
     separated_by: "small fast variations of torque about zero speed; a coast-down in air against one in water",
     reference: "Healey et al. 1995 (IEEE JOE 20:354), equation (10)",
     parameters,

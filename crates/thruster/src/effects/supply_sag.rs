@@ -4,8 +4,8 @@ use super::memory::FirstOrder;
 use super::voltage_limit_backemf::{self, emf_share};
 use super::{Available, Descriptor, Effect, Hooks, Path, Scale, Spec};
 use crate::plant::{Drive, Tick};
-use crate::rig::Rig;
 use crate::real::Real;
+use crate::rig::Rig;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -55,7 +55,8 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
 fn starts(scale: &Scale) -> Vec<Vec<f64>> {
     let full = source_ohm(scale);
     let stated = [0.03, 0.08, 0.14, 0.2, 0.28, 0.4].iter().map(|share| vec![share * full, 0.01, 1.0]);
-    let lower = [1.1, 1.2, 1.3, 1.45].iter().map(|k| vec![0.05 * full, 0.01, (k * emf_share(scale)).clamp(0.4, 1.0)]);
+    let lower =
+        [1.1, 1.2, 1.3, 1.45].iter().map(|k| vec![0.05 * full, 0.01, (k * emf_share(scale)).clamp(0.4, 1.0)]);
     stated.chain(lower).collect()
 }
 

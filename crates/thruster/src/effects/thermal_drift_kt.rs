@@ -17,7 +17,10 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: |scale| {
         let full = 1.0 / scale.current_a.powi(2);
-        [0.1, 1.0, 3.0].iter().map(|share| vec![0.05 * full, (share * scale.duration_s).clamp(4.0, 2000.0)]).collect()
+        [0.1, 1.0, 3.0]
+            .iter()
+            .map(|share| vec![0.05 * full, (share * scale.duration_s).clamp(4.0, 2000.0)])
+            .collect()
     },
     needs: free_shaft,
     build: both!(|values, _| Box::new(ThermalDriftKt { loss_per_a2: values[0], lag_s: values[1] })),

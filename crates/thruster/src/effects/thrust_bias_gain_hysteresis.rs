@@ -18,7 +18,13 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: one_start,
     needs: thrust_measured,
-    build: both!(|values, _| Box::new(ThrustSensor { gain_error: values[0], bias_n: values[1], loop_n: values[2], width_n: values[3], anchor_n: Real::ZERO })),
+    build: both!(|values, _| Box::new(ThrustSensor {
+        gain_error: values[0],
+        bias_n: values[1],
+        loop_n: values[2],
+        width_n: values[3],
+        anchor_n: Real::ZERO
+    })),
 };
 
 fn parameters(scale: &Scale) -> Vec<Spec> {
@@ -49,6 +55,7 @@ impl<T: Real> Effect<T> for ThrustSensor<T> {
         let t = sensed.thrust_n;
         // Not `clamp`, which panics on the NaN of a simulation that broke down.
         self.anchor_n = self.anchor_n.max(t - self.width_n).min(t + self.width_n);
-        sensed.thrust_n = t * (self.gain_error + 1.0) + self.bias_n + self.loop_n * (self.anchor_n - t) / self.width_n;
+        sensed.thrust_n =
+            t * (self.gain_error + 1.0) + self.bias_n + self.loop_n * (self.anchor_n - t) / self.width_n;
     }
 }

@@ -2,8 +2,8 @@
 
 use super::{Available, Descriptor, Effect, Hooks, Path, Scale, Spec, one_start, wet};
 use crate::plant::{Balance, Drive, Local, Tick};
-use crate::rig::Rig;
 use crate::real::Real;
+use crate::rig::Rig;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -12,13 +12,22 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     what: "the jet of a neighbouring thruster feeds or starves this one, and suction on the hull takes some of the thrust",
     equation: "va += C n; y = T (1 - t); n a neighbour's recorded signal (standardised) [1], C [m/s], t [1]",
     signature: "thrust and flow follow another thruster's command; thrust is low in proportion",
-    confused_with: &["ambient_axial_flow", "ambient_flow_unsteady", "thrust_bias_gain_hysteresis", "duct_loss"],
+    confused_with: &[
+        "ambient_axial_flow",
+        "ambient_flow_unsteady",
+        "thrust_bias_gain_hysteresis",
+        "duct_loss",
+    ],
     separated_by: "the thrusters run one by one, then together",
     reference: "Carlton, Marine Propellers and Propulsion (thrust deduction, interaction)",
     parameters,
     starts: one_start,
     needs,
-    build: both!(|values, _| Box::new(Interaction { flow_m_s: values[0], deduction: values[1], neighbour: 0.0 })),
+    build: both!(|values, _| Box::new(Interaction {
+        flow_m_s: values[0],
+        deduction: values[1],
+        neighbour: 0.0
+    })),
 };
 
 fn parameters(scale: &Scale) -> Vec<Spec> {

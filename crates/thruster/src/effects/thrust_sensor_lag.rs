@@ -18,7 +18,11 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: |_| vec![vec![0.003], vec![0.03], vec![0.1]],
     needs: thrust_measured,
-    build: both!(|values, context| Box::new(ThrustSensorLag { lag_s: values[0], tick_s: context.tick_s, lag: FirstOrder::new() })),
+    build: both!(|values, context| Box::new(ThrustSensorLag {
+        lag_s: values[0],
+        tick_s: context.tick_s,
+        lag: FirstOrder::new()
+    })),
 };
 
 fn parameters(_: &Scale) -> Vec<Spec> {

@@ -12,13 +12,22 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     equation: "shaft: kt im + b; measured: im + c, Q + d; b, d [N m], c [A]",
     signature: "a constant in the torque balance with the same sign in both directions (dry friction changes sign); a \
                 measured current or torque is off also at rest",
-    confused_with: &["coulomb_friction", "ambient_axial_flow", "command_dead_band", "forward_reverse_asymmetry"],
+    confused_with: &[
+        "coulomb_friction",
+        "ambient_axial_flow",
+        "command_dead_band",
+        "forward_reverse_asymmetry",
+    ],
     separated_by: "a staircase in both directions; the zeros before and after the run",
     reference: "Doebelin, Measurement Systems",
     parameters,
     starts: one_start,
     needs: always,
-    build: both!(|values, _| Box::new(TorqueChannelBias { shaft_n_m: values[0], current_a: values[1], transducer_n_m: values[2] })),
+    build: both!(|values, _| Box::new(TorqueChannelBias {
+        shaft_n_m: values[0],
+        current_a: values[1],
+        transducer_n_m: values[2]
+    })),
 };
 
 fn parameters(scale: &Scale) -> Vec<Spec> {

@@ -2,8 +2,8 @@
 
 use super::{Available, Context, Descriptor, Effect, Hooks, Path, Scale, Spec, angle_recorded, free_shaft};
 use crate::plant::{Balance, Local};
-use crate::rig::Rig;
 use crate::real::Real;
+use crate::rig::Rig;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -48,7 +48,11 @@ fn needs(rig: &Rig, available: &Available) -> Result<(), &'static str> {
 }
 
 fn build<T: Real>(values: &[T], _: &Context<T>) -> Box<dyn Effect<T>> {
-    Box::new(TorqueRipple { order: values[0].re().round(), cogging_n_m: [values[1], values[2]], ripple_nm_a: [values[3], values[4]] })
+    Box::new(TorqueRipple {
+        order: values[0].re().round(),
+        cogging_n_m: [values[1], values[2]],
+        ripple_nm_a: [values[3], values[4]],
+    })
 }
 
 struct TorqueRipple<T> {

@@ -2,8 +2,8 @@
 
 use super::{Available, Descriptor, Effect, Hooks, Path, Scale, Spec, commanded};
 use crate::plant::{Drive, Tick};
-use crate::rig::Rig;
 use crate::real::Real;
+use crate::rig::Rig;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -31,7 +31,13 @@ pub(super) fn emf_share(scale: &Scale) -> f64 {
 /// The start lets the limit bind just below the top of the recording.
 fn parameters(scale: &Scale) -> Vec<Spec> {
     vec![
-        Spec::strength("lost_voltage_share", "1", (1.0 - 1.2 * emf_share(scale)).clamp(-0.2, 0.9), -0.3, 0.95),
+        Spec::strength(
+            "lost_voltage_share",
+            "1",
+            (1.0 - 1.2 * emf_share(scale)).clamp(-0.2, 0.9),
+            -0.3,
+            0.95,
+        ),
         // Warm copper: a winding is seldom further from what is stated.
         Spec::shape("resistance_factor", "1", 1.0, 0.75, 1.4),
     ]
@@ -39,7 +45,10 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
 
 /// A limit a little too low is far off and one a little too high does nothing: close steps.
 fn starts(scale: &Scale) -> Vec<Vec<f64>> {
-    [0.88, 0.94, 1.0, 1.03, 1.06, 1.09, 1.12, 1.15, 1.18, 1.22, 1.26, 1.3, 1.35, 1.4, 1.5, 1.7].iter().map(|k| vec![(1.0 - k * emf_share(scale)).clamp(-0.2, 0.9), 1.0]).collect()
+    [0.88, 0.94, 1.0, 1.03, 1.06, 1.09, 1.12, 1.15, 1.18, 1.22, 1.26, 1.3, 1.35, 1.4, 1.5, 1.7]
+        .iter()
+        .map(|k| vec![(1.0 - k * emf_share(scale)).clamp(-0.2, 0.9), 1.0])
+        .collect()
 }
 
 fn needs(rig: &Rig, available: &Available) -> Result<(), &'static str> {

@@ -11,7 +11,12 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     what: "drag of hub, shaft or a flooded rotor as a disk in water: a torque that grows with the square of shaft speed",
     equation: "I Om' = ... - kw Om|Om|; kw [N m s^2]",
     signature: "thrust per torque is lower by the same percentage at all speeds; thrust over speed squared is unchanged",
-    confused_with: &["torque_constant_saturation", "nonsinusoidal_lift_drag", "viscous_friction", "water_density"],
+    confused_with: &[
+        "torque_constant_saturation",
+        "nonsinusoidal_lift_drag",
+        "viscous_friction",
+        "water_density",
+    ],
     separated_by: "a spin with the blades off (windage stays); an error of the torque constant shows at standstill too",
     reference: "Daily & Nece 1960 (J. Basic Eng. 82:217)",
     parameters,
