@@ -108,12 +108,12 @@ pub fn run(
     if poor {
         progress("the names leave too much: looking for a term without a name");
         let known = search.noise();
-        let nameless = nameless(search, &named.baseline, named.places.clone());
+        let nameless = nameless(search, &named.baseline, &named.places);
         // Names that explain most stand where no term explains more.
         let floor = floor(&search.problem, &named.last);
         let left = |fit: &Fit| excesses(&search.problem, fit, &floor).iter().map(|e| e.1).sum::<f64>();
-        if !nameless.places.is_empty() && left(&nameless.last) < left(&named.last) {
-            return nameless;
+        if let Some(outcome) = nameless.filter(|n| left(&n.last) < left(&named.last)) {
+            return outcome;
         }
         search.set_noise(known);
     }
@@ -259,21 +259,16 @@ fn switched(search: &mut Search, current: &mut Fit) -> Option<Candidate> {
     None
 }
 
-/// The outcome where no name explains enough: from the baseline anew, the best term without a name.
-fn nameless(search: &mut Search, baseline: &Fit, names: Vec<Place>) -> Outcome {
+/// The outcome where no name explains enough: from the baseline anew, the best term without a name, if
+/// there is one.
+fn nameless(search: &mut Search, baseline: &Fit, names: &[Place]) -> Option<Outcome> {
     let mut current = search.baseline(&baseline.resume());
-    let term = switched(search, &mut current);
-    let aside = |gain: f64| names.iter().map(|p| (p.chosen, (gain - p.gain).max(0.0))).collect();
-    let (last, places) = match term {
-        Some(term) => {
-            let gain = criterion(&current) - term.criterion;
-            let place = Place { chosen: term.effect, rivals: Vec::new(), aside: aside(gain), gain };
-            (term.fit, vec![place])
-        }
-        None => (current.clone(), Vec::new()),
-    };
-    let excess = Some(excess(&search.problem, &last)).filter(|e| e.1 > rules::REAL_EXCESS);
-    Outcome { baseline: current, last, places, doubt: None, excess, elsewhere: None }
+    let term = switched(search, &mut current)?;
+    let gain = criterion(&current) - term.criterion;
+    let aside = names.iter().map(|p| (p.chosen, (gain - p.gain).max(0.0))).collect();
+    let places = vec![Place { chosen: term.effect, rivals: Vec::new(), aside, gain }];
+    let excess = Some(excess(&search.problem, &term.fit)).filter(|e| e.1 > rules::REAL_EXCESS);
+    Some(Outcome { baseline: current, last: term.fit, places, doubt: None, excess, elsewhere: None })
 }
 
 /// Lets terms without a name judge what the names explain. One term alone that does better than
