@@ -181,6 +181,22 @@ fn a_silent_gateway_stops_within_five_periods_and_is_latched() {
     }
 }
 
+/// A client may arm so soon after the start that the servo's word overtakes the gateway's first setpoint.
+#[test]
+fn an_arming_faster_than_the_first_setpoint_is_no_replaced_gateway() {
+    let mut bench = Bench::new();
+    bench.gateway_speaks = false;
+    bench.step();
+    bench.arm();
+    bench.gateway_speaks = true;
+    bench.give(SetpointKind::Thrust as u32, 50.0);
+    for _ in 0..50 {
+        assert_eq!(bench.step().stop, 0);
+    }
+    assert_eq!(bench.tick.state().faults, 0);
+    assert!(bench.step().drive > 0.0, "the setpoint is followed");
+}
+
 #[test]
 fn a_replaced_gateway_and_a_silent_servo_stop() {
     let mut bench = Bench::thrusting();

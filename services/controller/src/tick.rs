@@ -148,7 +148,9 @@ impl Tick {
         if sender == Fresh::No {
             return;
         }
-        if sender == Fresh::NewSession && self.armed {
+        // A session is named by when it began. One that is new here but older than the arming is no
+        // successor: its arming was merely faster than its first setpoint.
+        if sender == Fresh::NewSession && self.armed && message.header.session > self.armed_at_ns {
             self.trip(Fault::GatewayRestarted);
         }
         self.gateway_stamp_ns = message.header.stamp_ns;
