@@ -138,7 +138,11 @@ click("take", async () => {
   const granted = await call("POST", `${base()}/lease`, { holder: $("holder").value, ttl_ms: lease_ttl_ms });
   lease = granted.lease_id; taken_ms = performance.now(); log(`lease taken as “${$("holder").value}”`);
 });
-click("give", async () => { await call("DELETE", `${base()}/lease`); lease = null; log("lease given up"); });
+click("give", async () => { // forgotten before the answer comes: what is being given up is not renewed
+  const given = call("DELETE", `${base()}/lease`);
+  lease = null;
+  await given; log("lease given up");
+});
 setInterval(() => { if (lease) call("PUT", `${base()}/lease`).catch(() => { lease = null; }); }, RENEW_EVERY_MS);
 
 click("arm", async () => { await call("POST", `${base()}/arm`); log("armed"); });
