@@ -628,6 +628,7 @@ pub fn scale(all: &[Prepared], rig: &Rig) -> Scale {
         current_a: current.max(1e-9),
         command: command.max(1e-9),
         supply_v: rig.amplifier.supply_v.unwrap_or(0.0),
+        winding_resistance_ohm: rig.motor.winding_resistance_ohm.map_or(0.0, |r| r.value),
         inertia_kg_m2: rig.motor.inertia_kg_m2.value,
         tick_s: all.first().map_or(0.002, |p| p.tick_s),
         duration_s: all.iter().map(Prepared::duration_s).fold(0.0, f64::max),

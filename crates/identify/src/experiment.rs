@@ -158,6 +158,7 @@ fn named(effect: &kort_thruster::effects::Descriptor, values: &[f64]) -> BTreeMa
         current_a: 1.0,
         command: 1.0,
         supply_v: 1.0,
+        winding_resistance_ohm: 1.0,
         inertia_kg_m2: 1.0,
         tick_s: 0.002,
         duration_s: 60.0,

@@ -132,6 +132,7 @@ fn bench(name: &'static str, text: &str) -> Bench {
             current_a: top,
             command: top,
             supply_v: rig.amplifier.supply_v.unwrap_or(0.0),
+            winding_resistance_ohm: rig.motor.winding_resistance_ohm.map_or(0.0, |r| r.value),
             inertia_kg_m2: parameters.get(P::InertiaKgM2),
             tick_s: TICK_S,
             duration_s: DURATION_S,

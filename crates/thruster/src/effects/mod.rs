@@ -59,6 +59,8 @@ pub struct Scale {
     pub command: f64,
     /// Nominal supply, V (zero if not stated).
     pub supply_v: f64,
+    /// Stated winding resistance, ohm (zero if not stated).
+    pub winding_resistance_ohm: f64,
     /// Stated inertia, kg m^2.
     pub inertia_kg_m2: f64,
     /// Control period, s.

@@ -1,7 +1,7 @@
 //! The supply sags under the thruster's own load.
 
 use super::memory::FirstOrder;
-use super::voltage_limit_backemf::{self, emf_share};
+use super::voltage_limit_backemf::{self, winding_share};
 use super::{Available, Descriptor, Effect, Hooks, Path, Scale, Spec};
 use crate::plant::{Drive, Tick};
 use crate::real::Real;
@@ -43,7 +43,7 @@ fn source_ohm(scale: &Scale) -> f64 {
 /// The start lets a current drive meet its voltage limit just below the top of the recording.
 fn parameters(scale: &Scale) -> Vec<Spec> {
     let full = source_ohm(scale);
-    let share = (1.0 - 1.1 * emf_share(scale)).clamp(0.02, 0.6);
+    let share = (1.0 - winding_share(scale)).clamp(0.02, 0.6);
     vec![
         Spec::strength("source_resistance_ohm", "ohm", share * full, 0.0, 2.0 * full),
         Spec::shape("recovery_s", "s", 0.01, 0.0, 20.0),
@@ -55,8 +55,9 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
 fn starts(scale: &Scale) -> Vec<Vec<f64>> {
     let full = source_ohm(scale);
     let stated = [0.03, 0.08, 0.14, 0.2, 0.28, 0.4].iter().map(|share| vec![share * full, 0.01, 1.0]);
-    let lower =
-        [1.1, 1.2, 1.3, 1.45].iter().map(|k| vec![0.05 * full, 0.01, (k * emf_share(scale)).clamp(0.4, 1.0)]);
+    let lower = [0.7, 0.8, 0.9, 1.0]
+        .iter()
+        .map(|k| vec![0.05 * full, 0.01, (k * winding_share(scale)).clamp(0.4, 1.0)]);
     stated.chain(lower).collect()
 }
 

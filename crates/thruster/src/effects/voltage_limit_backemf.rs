@@ -22,22 +22,19 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     build: both!(|values, _| Box::new(VoltageLimit { lost_share: values[0], resistance_factor: values[1] })),
 };
 
-/// Back-EMF at the largest speed as a share of the supply; bounded, since both are only stated.
-pub(super) fn emf_share(scale: &Scale) -> f64 {
+/// Back-EMF and resistive drop at the largest speed and current as a share of the supply: about where the
+/// limit lies if it binds at all. Bounded, since speed and current need not be largest together.
+pub(super) fn winding_share(scale: &Scale) -> f64 {
     let torque_constant_nm_a = scale.torque_n_m / scale.current_a;
-    (torque_constant_nm_a * scale.shaft_speed_rad_s / scale.supply_v.max(1e-3)).clamp(0.1, 0.9)
+    let winding_v =
+        torque_constant_nm_a * scale.shaft_speed_rad_s + scale.winding_resistance_ohm * scale.current_a;
+    (winding_v / scale.supply_v.max(1e-3)).clamp(0.1, 1.25)
 }
 
 /// The start lets the limit bind just below the top of the recording.
 fn parameters(scale: &Scale) -> Vec<Spec> {
     vec![
-        Spec::strength(
-            "lost_voltage_share",
-            "1",
-            (1.0 - 1.2 * emf_share(scale)).clamp(-0.2, 0.9),
-            -0.3,
-            0.95,
-        ),
+        Spec::strength("lost_voltage_share", "1", (1.0 - winding_share(scale)).clamp(-0.25, 0.9), -0.3, 0.95),
         // Warm copper: a winding is seldom further from what is stated.
         Spec::shape("resistance_factor", "1", 1.0, 0.75, 1.4),
     ]
@@ -45,9 +42,9 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
 
 /// A limit a little too low is far off and one a little too high does nothing: close steps.
 fn starts(scale: &Scale) -> Vec<Vec<f64>> {
-    [0.88, 0.94, 1.0, 1.03, 1.06, 1.09, 1.12, 1.15, 1.18, 1.22, 1.26, 1.3, 1.35, 1.4, 1.5, 1.7]
+    [0.6, 0.68, 0.74, 0.79, 0.83, 0.87, 0.9, 0.93, 0.96, 0.99, 1.02, 1.05, 1.08, 1.12, 1.17, 1.25]
         .iter()
-        .map(|k| vec![(1.0 - k * emf_share(scale)).clamp(-0.2, 0.9), 1.0])
+        .map(|k| vec![(1.0 - k * winding_share(scale)).clamp(-0.25, 0.9), 1.0])
         .collect()
 }
 

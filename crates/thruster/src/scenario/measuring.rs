@@ -91,6 +91,7 @@ mod tests {
             current_a: 9.0,
             command: 9.0,
             supply_v: 120.0,
+            winding_resistance_ohm: 2.2,
             inertia_kg_m2: 0.01,
             tick_s: 0.002,
             duration_s: 10.0,

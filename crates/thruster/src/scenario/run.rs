@@ -274,6 +274,7 @@ pub fn scale(rig: &Rig, p: &Parameters, peak: f64, tick_s: f64, duration_s: f64)
         current_a: current.max(1e-9),
         command: peak.max(1e-9),
         supply_v: rig.amplifier.supply_v.unwrap_or(0.0),
+        winding_resistance_ohm: rig.motor.winding_resistance_ohm.map_or(0.0, |r| r.value),
         inertia_kg_m2: p.get(Parameter::InertiaKgM2),
         tick_s,
         duration_s,

@@ -65,6 +65,7 @@ impl Bench {
             current_a: 9.0,
             command: top,
             supply_v: 120.0,
+            winding_resistance_ohm: 2.2,
             inertia_kg_m2: 0.01,
             tick_s: TICK_S,
             duration_s: DURATION_S,

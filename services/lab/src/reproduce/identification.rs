@@ -65,6 +65,7 @@ fn levels(paper: &Paper, effect: &str) -> Vec<Level> {
         current_a: LARGEST_TORQUE_N_M / kt,
         command: LARGEST_TORQUE_N_M / kt,
         supply_v: 120.0,
+        winding_resistance_ohm: 2.2,
         inertia_kg_m2: 0.01,
         tick_s: 0.002,
         duration_s: SETTLE_S,

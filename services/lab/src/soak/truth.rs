@@ -79,6 +79,7 @@ pub fn effects(scenario: &Scenario, rig: &Rig, model: &ControlModel) -> Result<V
         current_a: model.current_limit_a,
         command: model.current_limit_a,
         supply_v: model.supply_v.unwrap_or(0.0),
+        winding_resistance_ohm: rig.motor.winding_resistance_ohm.map_or(0.0, |r| r.value),
         inertia_kg_m2: model.inertia_kg_m2,
         tick_s: model.period_s,
         duration_s: scenario.duration_s,
