@@ -43,7 +43,7 @@ fn source_ohm(scale: &Scale) -> f64 {
 /// The start lets a current drive meet its voltage limit just below the top of the recording.
 fn parameters(scale: &Scale) -> Vec<Spec> {
     let full = source_ohm(scale);
-    let share = (1.0 - winding_share(scale)).clamp(0.02, 0.6);
+    let share = (1.0 - 0.85 * winding_share(scale)).clamp(0.02, 0.6);
     vec![
         Spec::strength("source_resistance_ohm", "ohm", share * full, 0.0, 2.0 * full),
         Spec::shape("recovery_s", "s", 0.01, 0.0, 20.0),
