@@ -58,6 +58,8 @@ pub const RIVAL_SHARE: f64 = 0.6;
 pub const LEAST_REMOVED: f64 = 0.5;
 /// Share below which a name is set aside where much is left.
 pub const LEAST_OF_A_FINDING: f64 = 0.2;
+/// ... where nothing else was found: a gain that held-out data do not confirm is a slow error of a sensor.
+pub const LEAST_OF_A_LONE_FINDING: f64 = 0.04;
 /// ... where another explains more.
 pub const LEAST_OF_A_LATER_FINDING: f64 = 0.4;
 /// ... by something free in time, which bends to anything a little; or by a relative where another has
@@ -68,6 +70,8 @@ pub const LEAST_OF_A_RELATIVE: f64 = 0.8;
 pub const RELATIVE_GAIN: f64 = 4.0;
 /// How much less sure a name is beside physics that has none.
 pub const BESIDE_UNKNOWN: f64 = 0.3;
+/// Share of the distance at which rivals are told apart, over which the odds of one fall by a factor e.
+pub const ODDS_FALL: f64 = 0.05;
 /// Share of the gain that terms without a name may hold beside names.
 pub const UNNAMED_SHARE: f64 = 0.15;
 /// How much more names may leave where a measured column drives.

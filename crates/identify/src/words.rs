@@ -11,6 +11,7 @@ use crate::locate;
 use crate::report::{
     Alternative, Baseline, EmpiricalTerm, Finding, HeldOut, Mismatch, NextExperiment, Verdict,
 };
+use crate::rules;
 
 /// How sure a lone name is when nothing comes near it; measured on tuning seeds.
 const SURE: f64 = 0.96;
@@ -18,7 +19,9 @@ const SURE: f64 = 0.96;
 /// Probabilities of the chosen effect and its rivals. A distance in the criterion counts less
 /// than its size in log-likelihood says, because the true form differs a little from ours.
 pub fn odds(place: &Place) -> Vec<f64> {
-    let weight = |other: &Descriptor, distance: f64| (-distance.max(0.0) / (0.1 * near(place, other))).exp();
+    let weight = |other: &Descriptor, distance: f64| {
+        (-distance.max(0.0) / (rules::ODDS_FALL * near(place, other))).exp()
+    };
     let mut weights = vec![1.0];
     weights.extend(place.rivals.iter().map(|r| weight(r.0.0, r.1)));
     let aside: f64 = place.aside.iter().filter(|a| !is_term(a.0)).map(|a| weight(a.0, a.1)).sum();

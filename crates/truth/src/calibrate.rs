@@ -226,7 +226,8 @@ fn varied(thruster: &Thruster, index: usize, factor: f64) -> Thruster {
 }
 
 fn smooth(thruster: &Thruster, hidden: &Hidden, scale: Scale, command_a: &[f64]) -> Rows {
-    let stand =
-        Stand { thruster, hidden, scale, thrust_full_scale_n: f64::INFINITY, steps_per_tick: COARSE_STEPS };
+    // Teeth that pass in a millisecond are not seen in steps of one.
+    let steps_per_tick = if hidden.cogging_order > 0.0 { FINE_STEPS } else { COARSE_STEPS };
+    let stand = Stand { thruster, hidden, scale, thrust_full_scale_n: f64::INFINITY, steps_per_tick };
     stand.record_smooth(command_a)
 }
