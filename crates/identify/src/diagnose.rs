@@ -392,10 +392,9 @@ fn least_removed(search: &Search, place: &Place, gains: &[(&Descriptor, f64)]) -
     let overshadows = |other: &(&Descriptor, f64)| {
         mates(place.chosen, other.0) && other.1 > rules::RELATIVE_GAIN * place.gain
     };
-    if gains.len() == 1 && is_term(place.chosen) {
-        f64::NEG_INFINITY
-    } else if gains.len() == 1 {
-        rules::LEAST_OF_A_LONE_FINDING
+    if gains.len() == 1 {
+        let small = place.gain < rules::SMALL_GAIN && !is_term(place.chosen);
+        if small { rules::LEAST_OF_A_LONE_FINDING } else { f64::NEG_INFINITY }
     } else if gains.iter().all(|other| other.1 <= place.gain) {
         rules::LEAST_OF_A_FINDING
     } else if search.free_in_time(place.chosen) || gains.iter().any(overshadows) {

@@ -58,8 +58,11 @@ pub const RIVAL_SHARE: f64 = 0.6;
 pub const LEAST_REMOVED: f64 = 0.5;
 /// Share below which a name is set aside where much is left.
 pub const LEAST_OF_A_FINDING: f64 = 0.2;
-/// ... where nothing else was found: a gain that held-out data do not confirm is a slow error of a sensor.
+/// ... where nothing else was found and the gain is small: what held-out data do not confirm may be a slow
+/// error of a sensor.
 pub const LEAST_OF_A_LONE_FINDING: f64 = 0.04;
+/// How small a gain that is.
+pub const SMALL_GAIN: f64 = 300.0;
 /// ... where another explains more.
 pub const LEAST_OF_A_LATER_FINDING: f64 = 0.4;
 /// ... by something free in time, which bends to anything a little; or by a relative where another has
