@@ -34,7 +34,13 @@ pub(super) fn winding_share(scale: &Scale) -> f64 {
 /// The start lets the limit bind just below the top of the recording.
 fn parameters(scale: &Scale) -> Vec<Spec> {
     vec![
-        Spec::strength("lost_voltage_share", "1", (1.0 - 0.85 * winding_share(scale)).clamp(-0.25, 0.9), -0.3, 0.95),
+        Spec::strength(
+            "lost_voltage_share",
+            "1",
+            (1.0 - 0.85 * winding_share(scale)).clamp(-0.25, 0.9),
+            -0.3,
+            0.95,
+        ),
         // Warm copper: a winding is seldom further from what is stated.
         Spec::shape("resistance_factor", "1", 1.0, 0.75, 1.4),
     ]
