@@ -210,6 +210,24 @@ fn a_stand_that_rings_is_named_whatever_its_frequency() {
     assert_eq!(found(&report), ["stand_resonance"]);
 }
 
+/// The supply's noise, tried as a driver of what is left, is no flow across the axis.
+#[test]
+fn flow_across_the_axis_is_found_beside_an_unrelated_column() {
+    let report = blind(CaseKind::Single, 8000010, &Selection::default());
+    assert_eq!(found(&report)[0], "cross_flow", "{}", report["summary"]);
+}
+
+/// Where the winding takes most of the supply a limit lies far above the back-EMF; a supply that sags
+/// into it gives the same current.
+#[test]
+fn a_limit_of_the_supply_is_named_with_the_sag_that_looks_like_it() {
+    let report = blind(CaseKind::Single, 9000075, &Selection::default());
+    assert_eq!(report["verdict"], "ambiguous", "{}", report["summary"]);
+    let mut names = found(&report);
+    names.sort_unstable();
+    assert_eq!(names, ["supply_sag", "voltage_limit_backemf"]);
+}
+
 #[test]
 fn the_static_models_leave_out_the_axial_flow_and_what_it_hides() {
     for model in ["model0", "model1"] {

@@ -234,8 +234,8 @@ fn write(
         let without =
             if rest.is_empty() { residual_baseline.clone() } else { problem.residual_of(&with(&rest)) };
         let held_here = score(&without, &residual_last);
-        if held_here.excess_error_removed < least_removed(search, place, &gains) {
-            // A name that hardly removes anything on new data is none.
+        if held_here.excess_error_removed < least_beside_others(search, place, &gains) {
+            // Beside others, a name that hardly removes anything on new data is none.
             weak.push(place.chosen.id);
             if !is_term(place.chosen) {
                 alternatives.push(words::weak(place.chosen.id, &held_here));
@@ -387,14 +387,13 @@ fn write(
     Diagnosis { report, traces: traces(&search.problem, &baseline_full, &last_full, &speed) }
 }
 
-/// Share of the held-out error above the noise that a find must remove, alone or beside others.
-fn least_removed(search: &Search, place: &Place, gains: &[(&Descriptor, f64)]) -> f64 {
+/// Share of the held-out error above the noise that a find must remove beside others.
+fn least_beside_others(search: &Search, place: &Place, gains: &[(&Descriptor, f64)]) -> f64 {
     let overshadows = |other: &(&Descriptor, f64)| {
         mates(place.chosen, other.0) && other.1 > rules::RELATIVE_GAIN * place.gain
     };
     if gains.len() == 1 {
-        let small = place.gain < rules::SMALL_GAIN && !is_term(place.chosen);
-        if small { rules::LEAST_OF_A_LONE_FINDING } else { f64::NEG_INFINITY }
+        f64::NEG_INFINITY
     } else if gains.iter().all(|other| other.1 <= place.gain) {
         rules::LEAST_OF_A_FINDING
     } else if search.free_in_time(place.chosen) || gains.iter().any(overshadows) {

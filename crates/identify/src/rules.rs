@@ -58,11 +58,6 @@ pub const RIVAL_SHARE: f64 = 0.6;
 pub const LEAST_REMOVED: f64 = 0.5;
 /// Share below which a name is set aside where much is left.
 pub const LEAST_OF_A_FINDING: f64 = 0.2;
-/// ... where nothing else was found and the gain is small: what held-out data do not confirm may be a slow
-/// error of a sensor.
-pub const LEAST_OF_A_LONE_FINDING: f64 = 0.04;
-/// How small a gain that is.
-pub const SMALL_GAIN: f64 = 300.0;
 /// ... where another explains more.
 pub const LEAST_OF_A_LATER_FINDING: f64 = 0.4;
 /// ... by something free in time, which bends to anything a little; or by a relative where another has
@@ -74,7 +69,7 @@ pub const RELATIVE_GAIN: f64 = 4.0;
 /// How much less sure a name is beside physics that has none.
 pub const BESIDE_UNKNOWN: f64 = 0.3;
 /// Share of the distance at which rivals are told apart, over which the odds of one fall by a factor e.
-pub const ODDS_FALL: f64 = 0.05;
+pub const ODDS_FALL: f64 = 0.04;
 /// Share of the gain that terms without a name may hold beside names.
 pub const UNNAMED_SHARE: f64 = 0.15;
 /// How much more names may leave where a measured column drives.

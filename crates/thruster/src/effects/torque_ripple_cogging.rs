@@ -33,10 +33,11 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
     ]
 }
 
-/// One start an order: twice the pole pairs, the slots, six times the pole pairs, and what misalignment gives.
+/// One start an order: what misalignment gives, the poles, the slots, six times the pole pairs, and the
+/// least common multiple of slots and poles of common windings.
 fn starts(scale: &Scale) -> Vec<Vec<f64>> {
     let (torque, per_a) = (0.02 * scale.torque_n_m, 0.02 * scale.torque_n_m / scale.current_a);
-    [2, 3, 4, 6, 7, 8, 12, 14, 18, 21, 24, 36, 42]
+    [2, 3, 4, 6, 7, 8, 10, 12, 14, 18, 21, 24, 30, 36, 42, 48, 60, 72, 84]
         .iter()
         .map(|order| vec![f64::from(*order), torque, torque, per_a, per_a])
         .collect()
