@@ -13,7 +13,8 @@ use crate::report::{
 };
 use crate::rules;
 
-/// How sure a lone name is when nothing comes near it; measured on replaced proofs.
+/// How sure a lone name is when nothing comes near it; measured on three proofs,
+/// the reported one among them: the next shows what it is worth.
 const SURE: f64 = 0.975;
 
 /// Probabilities of the chosen effect and its rivals. A distance in the criterion counts less
