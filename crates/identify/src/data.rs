@@ -352,10 +352,10 @@ impl Prepared {
 
     /// Writes the command to the ticks, with the edges where `edges` says.
     pub fn lay_command(&mut self) {
-        let is_edge: std::collections::HashMap<usize, usize> =
-            self.edges.iter().map(|e| (e.row, e.ticks_before)).collect();
         let c = &self.command;
         let n = c.len();
+        let mut edge_at: Vec<Option<usize>> = vec![None; n + 2];
+        self.edges.iter().for_each(|e| edge_at[e.row] = Some(e.ticks_before));
         let t0 = self.time_s[0];
         let mut row = 0;
         for (i, tick) in self.stimulus.ticks.iter_mut().enumerate() {
@@ -364,18 +364,16 @@ impl Prepared {
                 row += 1;
             }
             let (a, b) = (c[row], c[row + 1]);
-            tick.command = match is_edge.get(&(row + 1)) {
+            tick.command = match edge_at[row + 1] {
                 Some(before) => {
                     let remaining = ((self.time_s[row + 1] - t) / self.tick_s).round() as usize;
-                    if remaining <= *before { b } else { a }
+                    if remaining <= before { b } else { a }
                 }
                 None => {
                     let u =
                         ((t - self.time_s[row]) / (self.time_s[row + 1] - self.time_s[row])).clamp(0.0, 1.0);
-                    let smooth = row > 0
-                        && row + 2 < n
-                        && !is_edge.contains_key(&row)
-                        && !is_edge.contains_key(&(row + 2));
+                    let smooth =
+                        row > 0 && row + 2 < n && edge_at[row].is_none() && edge_at[row + 2].is_none();
                     if smooth { catmull_rom(c[row - 1], a, b, c[row + 2], u) } else { a + (b - a) * u }
                 }
             };

@@ -8,14 +8,15 @@ use kort_thruster::dual::{Dual, LANES};
 use kort_thruster::effects::{Descriptor, Stretch};
 use kort_thruster::models::ModelName;
 use kort_thruster::parameters::{Parameter, Parameters};
-use kort_thruster::plant::{Plant, Sensed, simulate};
+use kort_thruster::plant::{Plant, Sensed, simulate_each};
 use kort_thruster::real::Real;
 use kort_thruster::rig::Rig;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::sync::Arc;
 
-use crate::data::{Prepared, Response};
+use crate::data::Prepared;
+use crate::equations::Equations;
 use crate::noise::Whitener;
 use crate::step::damped_step;
 use crate::together::{groups, last_acting};
@@ -124,30 +125,54 @@ impl Fit {
 impl<'a> Problem<'a> {
     /// The response of a hypothesis at values of its free parameters.
     pub fn respond(&self, hypothesis: &Hypothesis, values: &[f64]) -> Stack {
-        self.stack(&self.rows(hypothesis, values), |v| v)
+        let [stack] = self.stacks(hypothesis, values, |v| [v]);
+        stack
     }
 
     /// Simulated rows of all recordings.
-    pub fn rows<T: Real>(&self, hypothesis: &Hypothesis, values: &[T]) -> Vec<Vec<Sensed<T>>> {
+    pub fn rows(&self, hypothesis: &Hypothesis, values: &[f64]) -> Vec<Vec<Sensed>> {
+        let mut all: Vec<Vec<Sensed>> = vec![Vec::new(); self.recordings.len()];
+        self.simulate(hypothesis, values, |r, _, sensed| all[r].push(*sensed));
+        all
+    }
+
+    /// Simulates all recordings; what the sensors show goes on by recording and row.
+    fn simulate<T: Real>(
+        &self,
+        hypothesis: &Hypothesis,
+        values: &[T],
+        mut show: impl FnMut(usize, usize, &Sensed<T>),
+    ) {
         let (parameters, effects) = self.assemble(hypothesis, values);
         let hooked: Vec<(&Descriptor, &[T])> =
             hypothesis.effects.iter().copied().zip(effects.iter().map(Vec::as_slice)).collect();
-        let run = |recording: &Prepared| {
+        for (r, recording) in self.recordings.iter().enumerate() {
             let mut plant = Plant::new(self.model, self.rig, &parameters, &hooked, recording.tick_s);
             let [speed, flow, current, angle] = recording.start;
             plant.start(recording.time_s[0], speed, flow, current, angle);
-            simulate(&mut plant, &recording.stimulus).rows
-        };
-        self.recordings.iter().map(run).collect()
+            simulate_each(&mut plant, &recording.stimulus, |row, sensed| show(r, row, sensed));
+        }
     }
 
-    /// A number of every sample of every channel.
-    fn stack<T: Copy>(&self, rows: &[Vec<Sensed<T>>], number: impl Fn(T) -> f64) -> Stack {
-        let of = |recording: &Prepared, rows: &[Sensed<T>]| {
-            let channels = recording.channels.iter();
-            channels.map(|c| c.rows.iter().map(|r| number(c.response.of(&rows[*r]))).collect()).collect()
-        };
-        self.recordings.iter().zip(rows).map(|(recording, rows)| of(recording, rows)).collect()
+    /// Some numbers of every sample of every channel, a stack each.
+    fn stacks<T: Real, const K: usize>(
+        &self,
+        hypothesis: &Hypothesis,
+        values: &[T],
+        numbers: impl Fn(T) -> [f64; K],
+    ) -> [Stack; K] {
+        let room = |r: &Prepared| r.channels.iter().map(|c| Vec::with_capacity(c.rows.len())).collect();
+        let mut stacks: [Stack; K] = std::array::from_fn(|_| self.recordings.iter().map(room).collect());
+        self.simulate(hypothesis, values, |r, row, sensed| {
+            for (c, channel) in self.recordings[r].channels.iter().enumerate() {
+                // Samples come in order of their rows; a row may have none.
+                if channel.rows.get(stacks[0][r][c].len()) == Some(&row) {
+                    let all = numbers(channel.response.of(sensed));
+                    stacks.iter_mut().zip(all).for_each(|(stack, one)| stack[r][c].push(one));
+                }
+            }
+        });
+        stacks
     }
 
     /// Parameters and effect values from the vector of free ones.
@@ -231,19 +256,17 @@ impl<'a> Problem<'a> {
                 moved[*k] = Dual::parameter(values[*k], lane);
             }
         }
-        let rows = self.rows(hypothesis, &moved);
-        let mut columns = Vec::new();
-        for (lane, group) in groups.iter().enumerate() {
-            let change = self.stack(&rows, |v| v.slope(lane));
-            columns.extend(group.iter().map(|(k, _)| *k).zip(self.shares(&change, group)));
-        }
-        columns
+        let changes = self.stacks(hypothesis, &moved, Dual::slopes);
+        let one = |(group, change): (&Vec<(usize, Stretch)>, Stack)| {
+            group.iter().map(|(k, _)| *k).zip(self.shares(change, group)).collect::<Vec<_>>()
+        };
+        groups.iter().zip(changes).flat_map(one).collect()
     }
 
     /// Splits the change that a group made together: each sample to the member that acted last.
-    pub fn shares(&self, change: &Stack, group: &[(usize, Stretch)]) -> Vec<Stack> {
+    pub fn shares(&self, change: Stack, group: &[(usize, Stretch)]) -> Vec<Stack> {
         if group.len() == 1 {
-            return vec![change.clone()];
+            return vec![change];
         }
         let mut shares: Vec<Stack> =
             vec![
@@ -301,33 +324,22 @@ impl<'a> Problem<'a> {
         let mut columns = known.to_vec();
         columns.resize(n, None);
         let mut fresh = columns.iter().all(Option::is_none);
-        let size = DVector::from_iterator(n, free.iter().map(|f| f.size));
+        let mut equations = Equations::new(free);
         for _ in 0..iterations {
             self.complete(hypothesis, &values, &mut columns);
-            let mut scaled = self.whiten_columns(&columns, residual.len());
-            for k in 0..n {
-                scaled.column_mut(k).scale_mut(size[k]);
-            }
-            // Blocked, which `tr_mul` is not: with eighty knots that counts.
-            let mut normal = scaled.transpose() * &scaled;
-            let mut gradient = scaled.tr_mul(&residual);
-            for k in 0..n {
-                if let Some((mean, sigma)) = free[k].prior {
-                    let s = size[k] / sigma;
-                    normal[(k, k)] += s * s;
-                    gradient[k] += s * (mean - values[k]) / sigma;
-                }
-            }
+            equations.follow(self, &columns, residual.len());
+            let gradient = equations.gradient(&residual, &values);
+            let (normal, size) = (&equations.normal, &equations.size);
             let mut outcome = None;
             for _ in 0..6 {
-                let step = damped_step(&normal, &gradient, damping, free, &values);
+                let step = damped_step(normal, &gradient, damping, free, &values);
                 let trial: Vec<f64> = (0..n)
                     .map(|k| (values[k] + step[k] * size[k]).clamp(free[k].low, free[k].high))
                     .collect();
                 let trial_residual = self.whiten(&self.residual(&self.respond(hypothesis, &trial)));
                 let trial_cost = trial_residual.norm_squared() + penalty(free, &trial);
                 if trial_cost < cost {
-                    let promised = 2.0 * gradient.dot(&step) - (&normal * &step).dot(&step);
+                    let promised = 2.0 * gradient.dot(&step) - (normal * &step).dot(&step);
                     outcome = Some((cost - trial_cost, promised));
                     (values, residual, cost) = (trial, trial_residual, trial_cost);
                     damping = (damping * 0.1).max(LEAST_DAMPING);
@@ -397,79 +409,6 @@ impl<'a> Problem<'a> {
         fit.columns = vec![None; fit.values.len()];
         self.complete(&fit.hypothesis, &fit.values, &mut fit.columns);
         self.whiten_columns(&fit.columns, fit.residual.len())
-    }
-
-    /// Forgets what was learned of the noise: white, and the same share of full scale everywhere.
-    pub fn flat_noise(&mut self) {
-        self.whiteners = self
-            .recordings
-            .iter()
-            .map(|p| p.channels.iter().map(|c| Whitener::flat(0.02 * c.full_scale, c.rows.len())).collect())
-            .collect();
-    }
-
-    /// Takes all that a fit leaves for white noise, on every channel.
-    pub fn white_noise_of(&mut self, fit: &Fit) {
-        let residual = self.residual_of(fit);
-        self.flat_noise();
-        for (whiteners, residual) in self.whiteners.iter_mut().zip(residual) {
-            for (whitener, values) in whiteners.iter_mut().zip(residual) {
-                let mean_square = values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64;
-                let least = 1e-3 * whitener.level()[0];
-                *whitener = Whitener::flat(mean_square.sqrt().max(least), values.len());
-            }
-        }
-    }
-
-    /// Learns the noise from the residual of a fitted hypothesis.
-    pub fn learn_noise(&mut self, hypothesis: &Hypothesis, values: &[f64]) {
-        let rows = self.rows(hypothesis, values);
-        let whiteners = self
-            .recordings
-            .iter()
-            .zip(&self.masked)
-            .zip(&rows)
-            .map(|((recording, masked), rows)| {
-                let top = rows.iter().fold(1e-9_f64, |m, r| m.max(r.true_speed_rad_s.abs()));
-                recording
-                    .channels
-                    .iter()
-                    .map(|c| {
-                        let residual: Vec<f64> = c
-                            .rows
-                            .iter()
-                            .zip(&c.values)
-                            .map(|(r, v)| if masked[*r] { 0.0 } else { v - c.response.of(&rows[*r]) })
-                            .collect();
-                        let activity: Vec<f64> =
-                            c.rows.iter().map(|r| (rows[*r].true_speed_rad_s / top).abs()).collect();
-                        Whitener::learn(&residual, &activity, self.quantum(c.response) + 1e-5 * c.full_scale)
-                    })
-                    .collect()
-            })
-            .collect();
-        self.whiteners = whiteners;
-    }
-
-    /// Standard deviation of a sensor's quantisation.
-    fn quantum(&self, response: Response) -> f64 {
-        let s = &self.rig.sensors;
-        let uniform = 12.0_f64.sqrt();
-        match response {
-            Response::Thrust => match (s.thrust_full_scale_n, s.thrust_bits) {
-                (Some(full), Some(bits)) => 2.0 * full / 2.0_f64.powi(bits as i32) / uniform,
-                _ => 0.0,
-            },
-            Response::ShaftSpeed => match (s.encoder_counts_per_rev, s.control_rate_hz) {
-                (Some(counts), Some(rate)) => {
-                    let raw = std::f64::consts::TAU / counts * rate;
-                    let tau = s.speed_filter_time_constant_s.unwrap_or(0.0) * rate;
-                    raw / uniform / (1.0 + 2.0 * tau).sqrt() / 3.0
-                }
-                _ => 0.0,
-            },
-            _ => 0.0,
-        }
     }
 }
 

@@ -6,6 +6,7 @@ pub mod checks;
 pub mod data;
 pub mod diagnose;
 pub mod edges;
+mod equations;
 pub mod errors;
 pub mod experiment;
 pub mod fit;

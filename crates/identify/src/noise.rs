@@ -10,6 +10,9 @@ use std::sync::Arc;
 use realfft::num_complex::Complex;
 use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 
+use crate::data::Response;
+use crate::fit::{Fit, Hypothesis, Problem};
+
 /// Whitens one channel of one recording.
 #[derive(Clone)]
 pub struct Whitener {
@@ -88,6 +91,81 @@ impl Whitener {
     /// Level at each sample, in the channel's unit.
     pub fn level(&self) -> &[f64] {
         &self.level
+    }
+}
+
+impl Problem<'_> {
+    /// Forgets what was learned of the noise: white, and the same share of full scale everywhere.
+    pub fn flat_noise(&mut self) {
+        self.whiteners = self
+            .recordings
+            .iter()
+            .map(|p| p.channels.iter().map(|c| Whitener::flat(0.02 * c.full_scale, c.rows.len())).collect())
+            .collect();
+    }
+
+    /// Takes all that a fit leaves for white noise, on every channel.
+    pub fn white_noise_of(&mut self, fit: &Fit) {
+        let residual = self.residual_of(fit);
+        self.flat_noise();
+        for (whiteners, residual) in self.whiteners.iter_mut().zip(residual) {
+            for (whitener, values) in whiteners.iter_mut().zip(residual) {
+                let mean_square = values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64;
+                let least = 1e-3 * whitener.level()[0];
+                *whitener = Whitener::flat(mean_square.sqrt().max(least), values.len());
+            }
+        }
+    }
+
+    /// Learns the noise from the residual of a fitted hypothesis.
+    pub fn learn_noise(&mut self, hypothesis: &Hypothesis, values: &[f64]) {
+        let rows = self.rows(hypothesis, values);
+        let whiteners = self
+            .recordings
+            .iter()
+            .zip(&self.masked)
+            .zip(&rows)
+            .map(|((recording, masked), rows)| {
+                let top = rows.iter().fold(1e-9_f64, |m, r| m.max(r.true_speed_rad_s.abs()));
+                recording
+                    .channels
+                    .iter()
+                    .map(|c| {
+                        let residual: Vec<f64> = c
+                            .rows
+                            .iter()
+                            .zip(&c.values)
+                            .map(|(r, v)| if masked[*r] { 0.0 } else { v - c.response.of(&rows[*r]) })
+                            .collect();
+                        let activity: Vec<f64> =
+                            c.rows.iter().map(|r| (rows[*r].true_speed_rad_s / top).abs()).collect();
+                        Whitener::learn(&residual, &activity, self.quantum(c.response) + 1e-5 * c.full_scale)
+                    })
+                    .collect()
+            })
+            .collect();
+        self.whiteners = whiteners;
+    }
+
+    /// Standard deviation of a sensor's quantisation.
+    fn quantum(&self, response: Response) -> f64 {
+        let s = &self.rig.sensors;
+        let uniform = 12.0_f64.sqrt();
+        match response {
+            Response::Thrust => match (s.thrust_full_scale_n, s.thrust_bits) {
+                (Some(full), Some(bits)) => 2.0 * full / 2.0_f64.powi(bits as i32) / uniform,
+                _ => 0.0,
+            },
+            Response::ShaftSpeed => match (s.encoder_counts_per_rev, s.control_rate_hz) {
+                (Some(counts), Some(rate)) => {
+                    let raw = std::f64::consts::TAU / counts * rate;
+                    let tau = s.speed_filter_time_constant_s.unwrap_or(0.0) * rate;
+                    raw / uniform / (1.0 + 2.0 * tau).sqrt() / 3.0
+                }
+                _ => 0.0,
+            },
+            _ => 0.0,
+        }
     }
 }
 

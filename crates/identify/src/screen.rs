@@ -177,7 +177,7 @@ fn respond_to(
             }
         }
         let change = difference(problem.respond(&hypothesis, &values), base);
-        for ((k, _), share) in group.iter().zip(problem.shares(&change, &group)) {
+        for ((k, _), share) in group.iter().zip(problem.shares(change, &group)) {
             responses[*k] = share;
         }
     }

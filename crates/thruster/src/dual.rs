@@ -41,9 +41,9 @@ impl Dual {
         self.slopes == other.slopes
     }
 
-    /// Its derivative by the parameter of a lane.
-    pub fn slope(self, lane: usize) -> f64 {
-        self.slopes.to_array()[lane]
+    /// Its derivatives, by lane.
+    pub fn slopes(self) -> [f64; LANES] {
+        self.slopes.to_array()
     }
 }
 

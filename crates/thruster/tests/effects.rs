@@ -416,7 +416,7 @@ fn axial_flow_dynamics_makes_model_2_of_the_static_models() {
         (0..500)
             .map(|k| {
                 plant.step(&Tick { time_s: k as f64 * bench.scale.tick_s, command: 5.0, ..Tick::default() });
-                *plant.sensed()
+                plant.sensed()
             })
             .collect::<Vec<_>>()
     };

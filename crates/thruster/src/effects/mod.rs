@@ -128,6 +128,10 @@ pub trait Effect<T = f64>: Send {
     fn states(&self) -> usize {
         0
     }
+    /// Whether its states are slow beside a tick, so that the rates of two ticks foretell the next.
+    fn slow(&self) -> bool {
+        self.states() == 0
+    }
     /// Once, before the run: other equations or other values of their parameters.
     fn amend(&self, _model: &mut ModelName, _parameters: &mut Parameters<T>) {}
     /// Which hooks are used; the others are never called.

@@ -38,6 +38,10 @@ impl<T: Real> Effect<T> for TankRecirculation<T> {
         1
     }
 
+    fn slow(&self) -> bool {
+        true
+    }
+
     fn hooks(&self) -> Hooks {
         Hooks::BALANCE
     }

@@ -44,6 +44,10 @@ impl<T: Real> Effect<T> for ThermalDriftKt<T> {
         1
     }
 
+    fn slow(&self) -> bool {
+        true
+    }
+
     fn hooks(&self) -> Hooks {
         Hooks::BALANCE
     }

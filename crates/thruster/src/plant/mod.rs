@@ -7,7 +7,7 @@ mod state;
 #[cfg(test)]
 mod tests;
 
-pub use run::{Response, Stimulus, simulate};
+pub use run::{Response, Stimulus, simulate, simulate_each};
 pub use state::{Balance, Drive, Driven, Foil, Local, Sensed, Tick};
 
 use crate::blade::Inflow;
@@ -27,6 +27,8 @@ const FLOW: usize = 1;
 const ANGLE: usize = 2;
 const SWIRL: usize = 3;
 const OWN: usize = 4;
+/// Most states of the usual plant with an effect that has states.
+const FEW: usize = OWN + 2;
 
 /// An effect at work, with the place of its states.
 struct Hooked<T> {
@@ -56,7 +58,10 @@ pub struct Plant<T = f64> {
     current_a: T,
     time_s: f64,
     filters: Filters<T>,
+    /// What the sensors show, where effects are at work on them.
     sensed: Sensed<T>,
+    supply_v: f64,
+    true_thrust_n: T,
     at: Local<T>,
     /// Rates at the end of the last tick, which the next one starts with where no input jumps, and
     /// at its start.
@@ -127,6 +132,7 @@ impl<T: Real> Decays<T> {
 /// States of the measuring chain.
 #[derive(Clone, Copy)]
 struct Filters<T> {
+    angle_rad: T,
     last_angle_rad: T,
     speed_rad_s: T,
     thrust_n: T,
@@ -172,7 +178,7 @@ impl<T: Real> Plant<T> {
         Self {
             model,
             rates_may_hold: !effects.iter().any(changes_between_ticks),
-            slow: next == OWN && model != ModelName::RotationalFlow,
+            slow: effects.iter().all(|e| e.effect.slow()) && model != ModelName::RotationalFlow,
             parameters,
             sensors: rig.sensors,
             amplifier: rig.amplifier.kind,
@@ -192,6 +198,7 @@ impl<T: Real> Plant<T> {
             current_a: T::ZERO,
             time_s: 0.0,
             filters: Filters {
+                angle_rad: T::ZERO,
                 last_angle_rad: T::ZERO,
                 speed_rad_s: T::ZERO,
                 thrust_n: T::ZERO,
@@ -200,6 +207,8 @@ impl<T: Real> Plant<T> {
                 last_torque_n_m: T::ZERO,
             },
             sensed: Sensed::default(),
+            supply_v: 0.0,
+            true_thrust_n: T::ZERO,
             at: Local::default(),
             last_rates: [[T::ZERO; STATES]; 2],
             moving: false,
@@ -232,7 +241,8 @@ impl<T: Real> Plant<T> {
         self.filters.last_angle_rad = T::from(angle_rad - shaft_speed_rad_s * self.tick_s);
         self.filters.speed_rad_s = T::from(shaft_speed_rad_s);
         self.at = self.local(T::ZERO, &Tick::default());
-        let (_, balance) = self.rates::<true, STATES>(&self.x, &self.at);
+        let mut balance = Balance::default();
+        self.rates::<true, true, STATES>(&self.x, &self.at, &mut balance);
         self.filters.last_thrust_n = balance.thrust_n + balance.stand_n;
         self.filters.thrust_n = balance.thrust_n + balance.stand_n;
         self.filters.last_torque_n_m = balance.blade_torque_n_m;
@@ -241,8 +251,8 @@ impl<T: Real> Plant<T> {
     }
 
     /// What the sensors show now (without noise).
-    pub fn sensed(&self) -> &Sensed<T> {
-        &self.sensed
+    pub fn sensed(&self) -> Sensed<T> {
+        if self.sense_hooks.is_empty() { self.unhooked_sensed() } else { self.sensed }
     }
 
     /// The true state and loads now.
@@ -258,20 +268,23 @@ impl<T: Real> Plant<T> {
     /// One control tick: the command acts from now to the next tick.
     ///
     /// Runge-Kutta of order 4; over ticks that the caller knows to be smooth Adams' method of order 3, at
-    /// half the cost.
+    /// a quarter of the cost.
     pub fn step(&mut self, tick: &Tick) {
         // Copies of the inner loop: the one without hooks keeps everything in registers, the others carry no
-        // more states than there are.
-        if self.inflow_hooks.is_empty() && self.foil_hooks.is_empty() && self.balance_hooks.is_empty() {
-            self.step_as::<false, OWN>(tick);
-        } else if self.used_states == OWN {
-            self.step_as::<true, OWN>(tick);
-        } else {
-            self.step_as::<true, STATES>(tick);
+        // more states, and show no more of the blade, than somebody looks at.
+        let blade = !self.inflow_hooks.is_empty() || !self.foil_hooks.is_empty();
+        let hooked = blade || !self.balance_hooks.is_empty();
+        match (hooked, blade, self.used_states) {
+            (false, ..) => self.step_as::<false, false, OWN>(tick),
+            (_, false, ..=OWN) => self.step_as::<true, false, OWN>(tick),
+            (_, true, ..=OWN) => self.step_as::<true, true, OWN>(tick),
+            (_, false, ..=FEW) => self.step_as::<true, false, FEW>(tick),
+            (_, true, ..=FEW) => self.step_as::<true, true, FEW>(tick),
+            _ => self.step_as::<true, true, STATES>(tick),
         }
     }
 
-    fn step_as<const HOOKED: bool, const N: usize>(&mut self, tick: &Tick) {
+    fn step_as<const HOOKED: bool, const BLADE: bool, const N: usize>(&mut self, tick: &Tick) {
         let dt = self.tick_s;
         let mut drive = Drive {
             command: T::from(tick.command),
@@ -287,8 +300,7 @@ impl<T: Real> Plant<T> {
         for i in &self.drive_hooks {
             self.effects[*i].effect.drive(tick, &mut drive);
         }
-        let (half, full) = (self.current_path(tick, &drive, 0.5 * dt), self.current_path(tick, &drive, dt));
-        let from = self.current_path(tick, &drive, 0.0);
+        let (from, full) = (self.current_path(tick, &drive, 0.0), self.current_path(tick, &drive, dt));
         let speed = match self.amplifier {
             AmplifierKind::Speed if tick.driven == Driven::Command => {
                 let (now, tau) = (self.x[SPEED], drive.time_constant_s);
@@ -304,50 +316,56 @@ impl<T: Real> Plant<T> {
                 x[SPEED] = a + (b - a) * at;
             }
         };
-        let mut start: [T; N] = std::array::from_fn(|i| self.x[i]);
+        let mut start: [T; N] = each(|i| self.x[i]);
         prescribe(&mut start, 0.0);
         let begin = self.local_at(&start, from, 0.0, tick);
         let held = self.moving && self.rates_may_hold && begin.continues::<HOOKED>(&self.at);
+        let mut balance = Balance::default();
         let k1: [T; N] = if held {
-            std::array::from_fn(|i| self.last_rates[0][i])
+            each(|i| self.last_rates[0][i])
         } else {
-            self.rates::<HOOKED, N>(&start, &begin).0
+            self.rates::<HOOKED, BLADE, N>(&start, &begin, &mut balance)
         };
-        let mut x = if held && tick.smooth && self.slow && speed.is_none() {
-            // Adams' predictor and corrector, with one look ahead.
+        let (mut x, foretold) = if held && tick.smooth && self.slow && speed.is_none() {
+            // Adams' predictor and corrector, with one look ahead: so little lies between the two that the
+            // rates and loads there are the end's.
             let k0 = &self.last_rates[1];
-            let ahead = std::array::from_fn(|i| start[i] + (k1[i] * 1.5 - k0[i] * 0.5) * dt);
-            let (k2, _) = self.rates::<HOOKED, N>(&ahead, &self.local_at(&ahead, full, 1.0, tick));
-            std::array::from_fn(|i| start[i] + (k2[i] * 5.0 + k1[i] * 8.0 - k0[i]) * (dt / 12.0))
+            let ahead = each(|i| start[i] + (k1[i] * 1.5 - k0[i] * 0.5) * dt);
+            let at = self.local_at(&ahead, full, 1.0, tick);
+            let k2 = self.rates::<HOOKED, BLADE, N>(&ahead, &at, &mut balance);
+            (each(|i| start[i] + (k2[i] * 5.0 + k1[i] * 8.0 - k0[i]) * (dt / 12.0)), Some(k2))
         } else {
             // Classic Runge-Kutta of order 4.
-            let along = |rate: &[T; N], dt: f64| std::array::from_fn(|i| start[i] + rate[i] * dt);
+            let half = self.current_path(tick, &drive, 0.5 * dt);
+            let along = |rate: &[T; N], dt: f64| each(|i| start[i] + rate[i] * dt);
             let mut x = along(&k1, 0.5 * dt);
             prescribe(&mut x, 0.5);
-            let (k2, _) = self.rates::<HOOKED, N>(&x, &self.local_at(&x, half, 0.5, tick));
+            let k2 = self.rates::<HOOKED, BLADE, N>(&x, &self.local_at(&x, half, 0.5, tick), &mut balance);
             x = along(&k2, 0.5 * dt);
             prescribe(&mut x, 0.5);
-            let (k3, _) = self.rates::<HOOKED, N>(&x, &self.local_at(&x, half, 0.5, tick));
+            let k3 = self.rates::<HOOKED, BLADE, N>(&x, &self.local_at(&x, half, 0.5, tick), &mut balance);
             x = along(&k3, dt);
             prescribe(&mut x, 1.0);
-            let (k4, _) = self.rates::<HOOKED, N>(&x, &self.local_at(&x, full, 1.0, tick));
-            std::array::from_fn(|i| start[i] + (k1[i] + (k2[i] + k3[i]) * 2.0 + k4[i]) * (dt / 6.0))
+            let k4 = self.rates::<HOOKED, BLADE, N>(&x, &self.local_at(&x, full, 1.0, tick), &mut balance);
+            (each(|i| start[i] + (k1[i] + (k2[i] + k3[i]) * 2.0 + k4[i]) * (dt / 6.0)), None)
         };
         prescribe(&mut x, 1.0);
-        self.x[..N].copy_from_slice(&x);
+        for (state, moved) in self.x.iter_mut().zip(x) {
+            *state = moved;
+        }
         self.current_a = full;
         self.time_s = tick.time_s + dt;
 
         let end = self.local_at(&x, full, 1.0, tick);
-        let (rates, balance) = self.rates::<HOOKED, N>(&x, &end);
-        self.last_rates[0][..N].copy_from_slice(&rates);
-        self.last_rates[1][..N].copy_from_slice(&k1);
+        let rates = foretold.unwrap_or_else(|| self.rates::<HOOKED, BLADE, N>(&x, &end, &mut balance));
+        for i in 0..N {
+            (self.last_rates[0][i], self.last_rates[1][i]) = (rates[i], k1[i]);
+        }
         self.moving = true;
         self.at = end;
         self.at.thrust_n = balance.thrust_n;
         self.at.blade_torque_n_m = balance.blade_torque_n_m;
-        let next = Tick { time_s: self.time_s, ..*tick };
-        self.observe(&next, &balance, true);
+        self.observe(tick, &balance, true);
     }
 
     /// Motor current a time `after_s` into this tick.
@@ -420,19 +438,29 @@ impl<T: Real> Plant<T> {
         }
     }
 
-    /// Rates of all states, and the loads they follow from.
+    /// Rates of all states. The loads they follow from are written where the caller keeps them: with
+    /// derivatives they are a kilobyte, too much to hand back by value.
     #[inline(always)]
-    fn rates<const HOOKED: bool, const N: usize>(&self, x: &[T; N], at: &Local<T>) -> ([T; N], Balance<T>) {
+    fn rates<const HOOKED: bool, const BLADE: bool, const N: usize>(
+        &self,
+        x: &[T; N],
+        at: &Local<T>,
+        balance: &mut Balance<T>,
+    ) -> [T; N] {
         let c = &self.constants;
         let (speed, flow) = (x[SPEED], x[FLOW]);
-        let mut balance = Balance {
+        *balance = Balance {
             motor_torque_n_m: c.torque_constant_nm_a * at.current_a,
             shaft_torque_n_m: -c.viscous_nm_s * speed,
             inertia_kg_m2: c.inertia_kg_m2,
             added_mass_kg: c.added_mass_kg,
             flux_kg_m: c.flux_kg_m,
             ambient_m_s: T::from(at.ambient_m_s),
-            ..Balance::default()
+            blade_torque_n_m: T::ZERO,
+            thrust_n: T::ZERO,
+            momentum_n: T::ZERO,
+            stand_n: T::ZERO,
+            foil: balance.foil,
         };
         match self.model {
             _ if c.dry => {}
@@ -451,12 +479,12 @@ impl<T: Real> Plant<T> {
                 balance.blade_torque_n_m = force * 0.5 * c.yoerger_slip_m;
                 balance.inertia_kg_m2 = c.yoerger_slip_m * c.yoerger_slip_m * c.added_mass_kg;
             }
-            _ => self.blade_loads::<HOOKED, N>(at, x, flow, speed, &mut balance),
+            _ => self.blade_loads::<BLADE, N>(at, x, flow, speed, balance),
         }
         let mut rates = [T::ZERO; N];
         for i in self.balance_hooks.iter().take(if HOOKED { usize::MAX } else { 0 }) {
             let hooked = &self.effects[*i];
-            hooked.effect.balance(at, &x[hooked.own.clone()], &mut balance, &mut rates[hooked.own.clone()]);
+            hooked.effect.balance(at, &x[hooked.own.clone()], balance, &mut rates[hooked.own.clone()]);
         }
         rates[SPEED] = (balance.motor_torque_n_m + balance.shaft_torque_n_m - balance.blade_torque_n_m)
             / balance.inertia_kg_m2;
@@ -477,12 +505,12 @@ impl<T: Real> Plant<T> {
                 }
             }
         }
-        (rates, balance)
+        rates
     }
 
     /// (14)-(17) without angles, with the hooks of inflow and foil.
     #[inline(always)]
-    fn blade_loads<const HOOKED: bool, const N: usize>(
+    fn blade_loads<const BLADE: bool, const N: usize>(
         &self,
         at: &Local<T>,
         x: &[T; N],
@@ -492,13 +520,16 @@ impl<T: Real> Plant<T> {
     ) {
         let c = &self.constants;
         let mut inflow = Inflow { tangential_m_s: c.lever_m * speed - x[SWIRL], axial_m_s: flow };
-        for i in self.inflow_hooks.iter().take(if HOOKED { usize::MAX } else { 0 }) {
+        for i in self.inflow_hooks.iter().take(if BLADE { usize::MAX } else { 0 }) {
             let hooked = &self.effects[*i];
             hooked.effect.inflow(at, &x[hooked.own.clone()], &mut inflow);
         }
         let (ut, vp) = (inflow.tangential_m_s, inflow.axial_m_s);
         let v2 = ut * ut + vp * vp;
         if v2 < STILL_M2_S2 {
+            if BLADE {
+                balance.foil = Foil::default();
+            }
             return;
         }
         let wn = ut * c.sin_pitch - vp * c.cos_pitch;
@@ -515,12 +546,12 @@ impl<T: Real> Plant<T> {
             drag: c.drag_max * one_minus_cos_2a,
             density_kg_m3: c.density_kg_m3,
         };
-        for i in self.foil_hooks.iter().take(if HOOKED { usize::MAX } else { 0 }) {
+        for i in self.foil_hooks.iter().take(if BLADE { usize::MAX } else { 0 }) {
             let hooked = &self.effects[*i];
             hooked.effect.foil(at, &x[hooked.own.clone()], &mut foil);
         }
         let q = foil.density_kg_m3 * c.half_area_m2 * foil.speed_m_s;
-        if HOOKED {
+        if BLADE {
             balance.foil = foil;
         }
         balance.thrust_n = q * (foil.lift * ut - foil.drag * vp);
@@ -537,6 +568,7 @@ impl<T: Real> Plant<T> {
             let quantum = std::f64::consts::TAU / counts;
             angle = T::from((angle.re() / quantum).floor() * quantum);
         }
+        f.angle_rad = angle;
         if filter {
             // Angle differenced at the control rate, then a first-order filter.
             let raw = (angle - f.last_angle_rad) / dt;
@@ -552,26 +584,47 @@ impl<T: Real> Plant<T> {
             f.last_thrust_n = thrust;
             f.last_torque_n_m = balance.blade_torque_n_m;
         }
-        let axial = match self.model {
-            ModelName::Model1 => self.constants.yoerger_slip_m * self.x[SPEED],
-            _ => self.x[FLOW],
-        };
-        let mut sensed = Sensed {
+        self.supply_v = tick.supply_v.unwrap_or(self.nominal_supply_v);
+        self.true_thrust_n = balance.thrust_n;
+        if !self.sense_hooks.is_empty() {
+            let mut sensed = self.unhooked_sensed();
+            let now = Tick { time_s: self.time_s, ..*tick };
+            for i in &self.sense_hooks {
+                self.effects[*i].effect.sense(&now, &mut sensed);
+            }
+            self.sensed = sensed;
+        }
+    }
+
+    /// What the sensors show where no effect is at work on them.
+    fn unhooked_sensed(&self) -> Sensed<T> {
+        let f = &self.filters;
+        Sensed {
             current_a: self.current_a,
-            shaft_angle_rad: angle,
+            shaft_angle_rad: f.angle_rad,
             shaft_speed_rad_s: f.speed_rad_s,
             thrust_n: f.thrust_n,
             torque_n_m: f.torque_n_m,
-            flow_m_s: axial,
+            flow_m_s: match self.model {
+                ModelName::Model1 => self.constants.yoerger_slip_m * self.x[SPEED],
+                _ => self.x[FLOW],
+            },
             true_speed_rad_s: self.x[SPEED],
-            true_thrust_n: balance.thrust_n,
-            supply_v: T::from(tick.supply_v.unwrap_or(self.nominal_supply_v)),
-        };
-        for i in &self.sense_hooks {
-            self.effects[*i].effect.sense(tick, &mut sensed);
+            true_thrust_n: self.true_thrust_n,
+            supply_v: T::from(self.supply_v),
         }
-        self.sensed = sensed;
     }
+}
+
+/// An array of what a function gives for each place. The standard library's `array::from_fn` is left as
+/// calls where numbers carry derivatives.
+#[inline(always)]
+fn each<T: Real, const N: usize>(of: impl Fn(usize) -> T) -> [T; N] {
+    let mut all = [T::ZERO; N];
+    for (i, one) in all.iter_mut().enumerate() {
+        *one = of(i);
+    }
+    all
 }
 
 /// Exact first-order low pass over one tick whose input runs straight from `u0` to `u1`.

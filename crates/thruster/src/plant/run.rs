@@ -22,24 +22,36 @@ pub struct Response<T = f64> {
 /// Steps the plant through all ticks.
 pub fn simulate<T: Real>(plant: &mut Plant<T>, stimulus: &Stimulus) -> Response<T> {
     let mut rows = Vec::with_capacity(stimulus.logs.len());
-    let mut next = stimulus.logs.iter().peekable();
+    simulate_each(plant, stimulus, |_, sensed| rows.push(*sensed));
+    Response { rows }
+}
+
+/// Steps the plant through all ticks and hands every log instant's number and what the sensors show on.
+pub fn simulate_each<T: Real>(
+    plant: &mut Plant<T>,
+    stimulus: &Stimulus,
+    mut show: impl FnMut(usize, &Sensed<T>),
+) {
+    let mut next = stimulus.logs.iter().enumerate().peekable();
     // An instant on the grid shows the state before that tick's command acts.
-    while next.next_if(|(tick, part)| *tick == 0 && *part == 0.0).is_some() {
-        rows.push(*plant.sensed());
+    while let Some((row, _)) = next.next_if(|(_, (tick, part))| *tick == 0 && *part == 0.0) {
+        show(row, &plant.sensed());
     }
     for (i, tick) in stimulus.ticks.iter().enumerate() {
-        let Some((at, part)) = next.peek() else { break };
-        // Numbers with derivatives are large: copied only where an instant lies within the tick.
-        let before = (*at == i && *part > 0.0).then(|| *plant.sensed());
+        let Some((_, (at, part))) = next.peek() else { break };
+        let before = (*at == i && *part > 0.0).then(|| plant.sensed());
         plant.step(tick);
-        let after = plant.sensed();
-        while let Some((_, part)) =
-            next.next_if(|(at, part)| *at == i && *part > 0.0 || *at == i + 1 && *part == 0.0)
+        while let Some((row, (_, part))) =
+            next.next_if(|(_, (at, part))| *at == i && *part > 0.0 || *at == i + 1 && *part == 0.0)
         {
-            rows.push(before.filter(|_| *part > 0.0).map_or(*after, |before| before.between(after, *part)));
+            match &before {
+                Some(before) if *part > 0.0 => show(row, &before.between(&plant.sensed(), *part)),
+                _ => show(row, &plant.sensed()),
+            }
         }
     }
     // Instants past the last tick see the last state.
-    rows.resize(stimulus.logs.len(), *plant.sensed());
-    Response { rows }
+    for (row, _) in next {
+        show(row, &plant.sensed());
+    }
 }

@@ -182,7 +182,8 @@ pub struct Balance<T = f64> {
     pub ambient_m_s: T,
     /// Force on the stand beyond the blades' thrust, N: seen by the force sensor, not by the water.
     pub stand_n: T,
-    /// The blade section these loads come from; all zero where the model has none or nothing moves.
+    /// The blade section these loads come from; all zero where the model has none, nothing moves, or no
+    /// effect has a hook at the blade ([`crate::effects::Hooks::inflow`] or `foil`).
     pub foil: Foil<T>,
 }
 

@@ -113,7 +113,7 @@ impl Run {
         let plant =
             Plant::new(scenario.model, rig, &parameters, &effects, tick_s).with_encoder_quantised(true);
         Ok(Self {
-            before: *plant.sensed(),
+            before: plant.sensed(),
             plant,
             measuring: Measuring::new(&rig.sensors, scale, scenario.noise, seed.wrapping_add(23)),
             signals: Signals { command, drive, ambient, turbulence, supply, depth, temperature },
@@ -156,10 +156,10 @@ impl Run {
         let part = (within - tick as f64).max(0.0);
         let sensed = if part < 1e-6 {
             self.show(tick as f64 * self.tick_s);
-            *self.plant.sensed()
+            self.plant.sensed()
         } else {
             self.step();
-            self.before.between(self.plant.sensed(), part)
+            self.before.between(&self.plant.sensed(), part)
         };
         let read = self.measuring.read(time_s, &sensed);
         values.clear();
@@ -176,7 +176,7 @@ impl Run {
     fn step(&mut self) {
         let time_s = self.tick as f64 * self.tick_s;
         self.show(time_s);
-        self.before = *self.plant.sensed();
+        self.before = self.plant.sensed();
         let at = |s: &Option<Excitation>, t: f64| s.as_ref().map(|s| s.value(t));
         let s = &mut self.signals;
         let gust = s.turbulence.as_mut().map_or((0.0, 0.0), |t| t.next(self.tick_s));

@@ -120,7 +120,7 @@ impl Bench {
                 "{what}: other values"
             );
             let column = norm(&|i| difference(i));
-            let wrong = norm(&|i| derived[i][channel].slope(1) - difference(i));
+            let wrong = norm(&|i| derived[i][channel].slopes()[1] - difference(i));
             let response = norm(&|i| here[i][channel]);
             assert!(
                 wrong <= SHARE * column + NOTHING * response / size,

@@ -49,7 +49,7 @@ fn run(paper: &Paper, duration_s: f64, sign: f64, reference: impl Fn(f64) -> f64
     for k in 0..(duration_s * rate) as usize {
         let t = k as f64 * dt;
         let wanted = reference(t);
-        let seen = *plant.sensed();
+        let seen = plant.sensed();
         out.time_s.push(t);
         out.reference_rad_s.push(wanted);
         out.measured_rad_s.push(seen.shaft_speed_rad_s);

@@ -266,7 +266,7 @@ impl<'a> Bench<'a> {
 
     fn change(&mut self, factors: &HashMap<Parameter, f64>) {
         truth::change(&mut self.truth, factors);
-        let (at, sensed) = (*self.plant.truth(), *self.plant.sensed());
+        let (at, sensed) = (*self.plant.truth(), self.plant.sensed());
         self.plant = truth::plant(self.prepared, &self.truth, self.dt);
         self.plant.start(at.time_s, at.shaft_speed_rad_s, at.axial_m_s, sensed.current_a, at.shaft_angle_rad);
     }
@@ -282,7 +282,7 @@ impl<'a> Bench<'a> {
         let model = self.chain.controller().nominal();
         let (scale_n, limit_a, quantum_n) =
             (self.prepared.thrust_max_n, model.current_limit_a, model.thrust_quantum_n);
-        let s = *self.plant.sensed();
+        let s = self.plant.sensed();
         let speed_drive = rig.amplifier.kind == AmplifierKind::Speed;
         let mut channels = [Some(s.shaft_speed_rad_s), None, None, None];
         if fitted.current && !speed_drive {

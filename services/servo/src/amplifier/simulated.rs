@@ -121,7 +121,7 @@ impl Amplifier for Simulated {
         {
             return Err(AmplifierFault);
         }
-        let read = self.measuring.read(self.time_s, self.plant.sensed());
+        let read = self.measuring.read(self.time_s, &self.plant.sensed());
         into.current_a = read.current_a;
         into.shaft_angle_rad = read.shaft_angle_rad;
         into.shaft_speed_rad_s = read.shaft_speed_rad_s;
