@@ -2,7 +2,7 @@
 
 use kort_thruster::effects::{Available, Scale};
 use kort_thruster::models::ModelName;
-use kort_thruster::plant::{Driven, Stimulus, Tick};
+use kort_thruster::plant::{Course, Driven, Stimulus, Tick};
 use kort_thruster::rig::{AmplifierKind, Rig};
 
 use crate::refuse;
@@ -335,7 +335,7 @@ impl Prepared {
                 depth_m: depth.as_deref().map(|d| at(d, time_s)),
                 temperature_c: temperature.as_deref().map(|d| at(d, time_s)),
                 extra: 0.0,
-                smooth: false,
+                course: Course::Any,
             });
         }
         self.stimulus.ticks = ticks;

@@ -1,4 +1,4 @@
-//! Ticks about which nothing jumps or moves fast: simulated there at half the cost.
+//! Ticks about which nothing jumps or moves fast: simulated there at half the cost or less.
 //!
 //! Most of a recording is settled or settling. Which ticks those are is read off one simulation with
 //! the stated coefficients and kept for every later one: a choice made anew in each simulation would
@@ -6,7 +6,7 @@
 
 use kort_thruster::models::ModelName;
 use kort_thruster::parameters::Parameters;
-use kort_thruster::plant::Plant;
+use kort_thruster::plant::{Course, Plant};
 use kort_thruster::rig::Rig;
 
 use crate::data::Prepared;
@@ -16,21 +16,30 @@ const CURVES: f64 = 1e-4;
 /// The same for the bow of the current within a tick.
 const BOWS: f64 = 1e-4;
 
+/// Share of a disturbance that may die within a tick for it to be calm. A look ahead stays stable to 0.55;
+/// a fit may move masses and inertia.
+const DIES: f64 = 0.15;
+
 impl Prepared {
     /// Marks the smooth ticks of the stimulus.
     pub fn mark_smooth(&mut self, model: ModelName, rig: &Rig, stated: &Parameters) {
         let mut plant = Plant::new(model, rig, stated, &[], self.tick_s);
         let [speed, flow, current, angle] = self.start;
         plant.start(self.time_s[0], speed, flow, current, angle);
-        let mut course = vec![[speed, flow, current]];
+        let (mut course, mut lasting) = (vec![[speed, flow, current]], Vec::new());
         for tick in &self.stimulus.ticks {
             plant.step(tick);
             let truth = plant.truth();
             course.push([truth.shaft_speed_rad_s, truth.axial_m_s, truth.current_a]);
+            lasting.push(plant.fastest_decay_1_s() * self.tick_s < DIES);
         }
         let smooth = smooth(&course, self.ticks_per_row + 2);
-        for (tick, smooth) in self.stimulus.ticks.iter_mut().zip(smooth) {
-            tick.smooth = smooth;
+        for ((tick, smooth), lasting) in self.stimulus.ticks.iter_mut().zip(smooth).zip(lasting) {
+            tick.course = match (smooth, lasting) {
+                (false, _) => Course::Any,
+                (true, false) => Course::Smooth,
+                (true, true) => Course::Calm,
+            };
         }
     }
 }

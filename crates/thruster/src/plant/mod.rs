@@ -2,13 +2,16 @@
 //! omitted effects hooked in. One `step` is one control tick; the same step runs in the live
 //! simulated stand, in soak tests, in `kort simulate` and inside a fit.
 
+mod measuring;
 mod run;
 mod state;
 #[cfg(test)]
 mod tests;
 
 pub use run::{Response, Stimulus, simulate, simulate_each};
-pub use state::{Balance, Drive, Driven, Foil, Local, Sensed, Tick};
+pub use state::{Balance, Course, Drive, Driven, Foil, Local, Sensed, Tick};
+
+use measuring::Filters;
 
 use crate::blade::Inflow;
 use crate::effects::{Context, Descriptor, Effect};
@@ -129,18 +132,6 @@ impl<T: Real> Decays<T> {
     }
 }
 
-/// States of the measuring chain.
-#[derive(Clone, Copy)]
-struct Filters<T> {
-    angle_rad: T,
-    last_angle_rad: T,
-    speed_rad_s: T,
-    thrust_n: T,
-    last_thrust_n: T,
-    torque_n_m: T,
-    last_torque_n_m: T,
-}
-
 impl<T: Real> Plant<T> {
     /// Sets a plant up at rest. `effects` are pairs of a catalogue entry and its parameter values.
     ///
@@ -250,14 +241,30 @@ impl<T: Real> Plant<T> {
         self.observe(&Tick { time_s, ..Tick::default() }, &balance, false);
     }
 
-    /// What the sensors show now (without noise).
-    pub fn sensed(&self) -> Sensed<T> {
-        if self.sense_hooks.is_empty() { self.unhooked_sensed() } else { self.sensed }
-    }
-
     /// The true state and loads now.
     pub fn truth(&self) -> &Local<T> {
         &self.at
+    }
+
+    /// How fast a disturbance of shaft speed and axial flow dies here at most, 1/s: the larger eigenvalue of
+    /// the rates' derivative.
+    pub fn fastest_decay_1_s(&self) -> f64 {
+        let rates = |place: usize, by: f64| {
+            let mut x = self.x;
+            x[place] += T::from(by);
+            let at = Local { shaft_speed_rad_s: x[SPEED], axial_m_s: x[FLOW], ..self.at };
+            let rates = self.rates::<true, true, STATES>(&x, &at, &mut Balance::default());
+            [rates[SPEED].re(), rates[FLOW].re()]
+        };
+        let here = rates(SPEED, 0.0);
+        let [[a, c], [b, d]] = [SPEED, FLOW].map(|place| {
+            let by = 1e-6 * self.x[place].re().abs().max(1e-3);
+            let there = rates(place, by);
+            [(there[0] - here[0]) / by, (there[1] - here[1]) / by]
+        });
+        let (mean, det) = (0.5 * (a + d), a * d - b * c);
+        let root = mean * mean - det;
+        if root < 0.0 { det.sqrt() } else { mean.abs() + root.sqrt() }
     }
 
     /// The model's name.
@@ -268,7 +275,7 @@ impl<T: Real> Plant<T> {
     /// One control tick: the command acts from now to the next tick.
     ///
     /// Runge-Kutta of order 4; over ticks that the caller knows to be smooth Adams' method of order 3, at
-    /// a quarter of the cost.
+    /// half the cost, or a quarter of it where they are calm.
     pub fn step(&mut self, tick: &Tick) {
         // Copies of the inner loop: the one without hooks keeps everything in registers, the others carry no
         // more states, and show no more of the blade, than somebody looks at.
@@ -326,14 +333,17 @@ impl<T: Real> Plant<T> {
         } else {
             self.rates::<HOOKED, BLADE, N>(&start, &begin, &mut balance)
         };
-        let (mut x, foretold) = if held && tick.smooth && self.slow && speed.is_none() {
-            // Adams' predictor and corrector, with one look ahead: so little lies between the two that the
+        let (mut x, foretold) = if held && tick.course != Course::Any && self.slow && speed.is_none() {
+            // Adams' predictor and corrector, with one look ahead; where so little lies between the two, the
             // rates and loads there are the end's.
             let k0 = &self.last_rates[1];
             let ahead = each(|i| start[i] + (k1[i] * 1.5 - k0[i] * 0.5) * dt);
             let at = self.local_at(&ahead, full, 1.0, tick);
             let k2 = self.rates::<HOOKED, BLADE, N>(&ahead, &at, &mut balance);
-            (each(|i| start[i] + (k2[i] * 5.0 + k1[i] * 8.0 - k0[i]) * (dt / 12.0)), Some(k2))
+            (
+                each(|i| start[i] + (k2[i] * 5.0 + k1[i] * 8.0 - k0[i]) * (dt / 12.0)),
+                (tick.course == Course::Calm).then_some(k2),
+            )
         } else {
             // Classic Runge-Kutta of order 4.
             let half = self.current_path(tick, &drive, 0.5 * dt);
@@ -557,63 +567,6 @@ impl<T: Real> Plant<T> {
         balance.thrust_n = q * (foil.lift * ut - foil.drag * vp);
         balance.blade_torque_n_m = c.lever_m * q * (foil.lift * vp + foil.drag * ut);
     }
-
-    /// The measuring chain, once a tick.
-    fn observe(&mut self, tick: &Tick, balance: &Balance<T>, filter: bool) {
-        let dt = self.tick_s;
-        let s = &self.sensors;
-        let f = &mut self.filters;
-        let mut angle = self.x[ANGLE];
-        if let (true, Some(counts)) = (self.quantise_encoder, s.encoder_counts_per_rev) {
-            let quantum = std::f64::consts::TAU / counts;
-            angle = T::from((angle.re() / quantum).floor() * quantum);
-        }
-        f.angle_rad = angle;
-        if filter {
-            // Angle differenced at the control rate, then a first-order filter.
-            let raw = (angle - f.last_angle_rad) / dt;
-            f.speed_rad_s = match self.decays.speed {
-                Some(left) => raw + (f.speed_rad_s - raw) * left,
-                _ if s.encoder_counts_per_rev.is_some() => raw,
-                _ => self.x[SPEED],
-            };
-            f.last_angle_rad = angle;
-            let (thrust, torque) = (balance.thrust_n + balance.stand_n, balance.blade_torque_n_m);
-            f.thrust_n = first_order(f.thrust_n, f.last_thrust_n, thrust, dt, self.decays.thrust);
-            f.torque_n_m = first_order(f.torque_n_m, f.last_torque_n_m, torque, dt, self.decays.torque);
-            f.last_thrust_n = thrust;
-            f.last_torque_n_m = balance.blade_torque_n_m;
-        }
-        self.supply_v = tick.supply_v.unwrap_or(self.nominal_supply_v);
-        self.true_thrust_n = balance.thrust_n;
-        if !self.sense_hooks.is_empty() {
-            let mut sensed = self.unhooked_sensed();
-            let now = Tick { time_s: self.time_s, ..*tick };
-            for i in &self.sense_hooks {
-                self.effects[*i].effect.sense(&now, &mut sensed);
-            }
-            self.sensed = sensed;
-        }
-    }
-
-    /// What the sensors show where no effect is at work on them.
-    fn unhooked_sensed(&self) -> Sensed<T> {
-        let f = &self.filters;
-        Sensed {
-            current_a: self.current_a,
-            shaft_angle_rad: f.angle_rad,
-            shaft_speed_rad_s: f.speed_rad_s,
-            thrust_n: f.thrust_n,
-            torque_n_m: f.torque_n_m,
-            flow_m_s: match self.model {
-                ModelName::Model1 => self.constants.yoerger_slip_m * self.x[SPEED],
-                _ => self.x[FLOW],
-            },
-            true_speed_rad_s: self.x[SPEED],
-            true_thrust_n: self.true_thrust_n,
-            supply_v: T::from(self.supply_v),
-        }
-    }
 }
 
 /// An array of what a function gives for each place. The standard library's `array::from_fn` is left as
@@ -625,13 +578,6 @@ fn each<T: Real, const N: usize>(of: impl Fn(usize) -> T) -> [T; N] {
         *one = of(i);
     }
     all
-}
-
-/// Exact first-order low pass over one tick whose input runs straight from `u0` to `u1`.
-fn first_order<T: Real>(y: T, u0: T, u1: T, dt: f64, filter: Option<(f64, f64)>) -> T {
-    let Some((tau, left)) = filter else { return u1 };
-    let slope = (u1 - u0) / dt;
-    u1 - slope * tau + (y - u0 + slope * tau) * left
 }
 
 impl<T: Real> Constants<T> {

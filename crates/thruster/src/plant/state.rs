@@ -24,10 +24,21 @@ pub struct Tick {
     pub temperature_c: Option<f64>,
     /// Another recorded signal (a neighbour's speed, an unknown column), standardised.
     pub extra: f64,
-    /// Nothing jumps or moves fast about this tick: the rates at its ends and those a tick before tell its
-    /// course. Known beforehand, and not found on the way, so that a response stays smooth in the
-    /// parameters. False costs time only.
-    pub smooth: bool,
+    /// What is known beforehand of the tick's course.
+    pub course: Course,
+}
+
+/// What is known of a tick's course: beforehand, and not found on the way, so that a response stays smooth
+/// in the parameters. `Any` is always right and costs time only.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Course {
+    /// Nothing.
+    #[default]
+    Any,
+    /// Nothing jumps or moves fast about it: the rates at its ends and a tick before tell it.
+    Smooth,
+    /// Smooth, and what is disturbed takes many ticks to die out: the rates at a look ahead are the end's.
+    Calm,
 }
 
 /// A recorded signal that drives the model instead of the command, at start and end of the tick.

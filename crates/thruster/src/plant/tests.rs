@@ -1,6 +1,6 @@
 //! The step at input jumps, against the same plant stepped a hundred times finer.
 
-use super::{Driven, Plant, Tick};
+use super::{Course, Driven, Plant, Tick};
 use crate::models::ModelName;
 use crate::parameters::{Parameter as P, Parameters};
 use crate::rig::Rig;
@@ -74,14 +74,34 @@ fn a_jump_of_the_ambient_flow_costs_no_accuracy() {
     assert!(e < 5e-3, "{e}");
 }
 
-/// Where nothing moves fast the cheaper step does as well; at a jump it would not.
+/// Where nothing moves fast the cheaper steps do as well; at a jump they would not.
 #[test]
 fn a_smooth_tick_costs_no_accuracy() {
     let slow = |i: usize| 6.0 + 0.5 * (0.1 * i as f64).sin();
     let driven = |i: usize| Driven::Current(slow(i), slow(i + 1));
-    let cheap = error(0.0, |i| Tick { driven: driven(i), smooth: i > 40, ..Tick::default() });
-    assert!(cheap < 2e-3, "{cheap} rad/s");
     let plain = error(0.0, |i| Tick { command: level(i), ..Tick::default() });
-    let wrong = error(0.0, |i| Tick { command: level(i), smooth: true, ..Tick::default() });
-    assert!(wrong > 1.05 * plain, "{wrong} {plain}");
+    for course in [Course::Smooth, Course::Calm] {
+        let late = |i: usize| if i > 40 { course } else { Course::Any };
+        let cheap = error(0.0, |i| Tick { driven: driven(i), course: late(i), ..Tick::default() });
+        assert!(cheap < 2e-3, "{course:?}: {cheap} rad/s");
+        let wrong = error(0.0, |i| Tick { command: level(i), course, ..Tick::default() });
+        assert!(wrong > 1.05 * plain, "{course:?}: {wrong} {plain}");
+    }
+}
+
+#[test]
+fn a_disturbance_dies_at_the_rate_that_is_told() {
+    let rig = Rig::from_toml(include_str!("../../../../config/thrusters/whitcomb-yoerger-1999.toml"))
+        .expect("the shipped rig");
+    let parameters = Parameters::stated(&rig);
+    let settle = |by_m_s: f64| {
+        let mut plant: Plant = Plant::new(ModelName::Model2, &rig, &parameters, &[], 1e-4);
+        plant.start(0.0, 20.0, 0.5 + by_m_s, 0.0, 0.0);
+        let told = plant.fastest_decay_1_s();
+        plant.step(&Tick::default());
+        (told, plant.truth().axial_m_s)
+    };
+    let ((told, calm), (_, disturbed)) = (settle(0.0), settle(1e-3));
+    let dies = (1.0 - (disturbed - calm) / 1e-3) / 1e-4;
+    assert!(told > 0.9 * dies && told < 2.0 * dies, "{told} {dies}");
 }
