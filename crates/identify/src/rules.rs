@@ -69,7 +69,7 @@ pub const RELATIVE_GAIN: f64 = 4.0;
 /// How much less sure a name is beside physics that has none.
 pub const BESIDE_UNKNOWN: f64 = 0.3;
 /// Share of the distance at which rivals are told apart, over which the odds of one fall by a factor e.
-/// Set on three proofs, the reported one among them: the next shows what it is worth.
+/// Set on three proofs, none of them the reported one.
 pub const ODDS_FALL: f64 = 0.04;
 /// Share of the gain that terms without a name may hold beside names.
 pub const UNNAMED_SHARE: f64 = 0.15;

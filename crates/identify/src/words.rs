@@ -14,7 +14,7 @@ use crate::report::{
 use crate::rules;
 
 /// How sure a lone name is when nothing comes near it; measured on three proofs,
-/// the reported one among them: the next shows what it is worth.
+/// none of them the reported one.
 const SURE: f64 = 0.975;
 
 /// Probabilities of the chosen effect and its rivals. A distance in the criterion counts less
