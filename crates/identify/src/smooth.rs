@@ -64,7 +64,43 @@ fn smooth(course: &[[f64; 3]], reach: usize) -> Vec<bool> {
 
 #[cfg(test)]
 mod tests {
+    use kort_thruster::models::ModelName;
+    use kort_thruster::parameters::Parameters;
+    use kort_thruster::plant::Course;
+    use kort_thruster::rig::Rig;
+
     use super::smooth;
+    use crate::data::{Prepared, Series};
+
+    /// Of the settled second half of a step, the share of ticks that are calm.
+    fn calm(rig: &str, command_a: f64) -> f64 {
+        let rig = Rig::from_toml(rig).expect("a rig");
+        let rows = 2000;
+        let series = Series {
+            name: "step".into(),
+            time_s: (0..rows).map(|k| 0.01 * f64::from(k)).collect(),
+            columns: vec![
+                ("current_cmd_a".into(), (0..rows).map(|k| if k < 100 { 0.0 } else { command_a }).collect()),
+                ("thrust_n".into(), (0..rows).map(|k| f64::from(k % 7)).collect()),
+            ],
+        };
+        let mut prepared = Prepared::new(&series, &rig, false).expect("a recording");
+        prepared.mark_smooth(ModelName::Model2, &rig, &Parameters::stated(&rig));
+        let settled = &prepared.stimulus.ticks[prepared.stimulus.ticks.len() / 2..];
+        assert!(settled.iter().all(|t| t.course != Course::Any), "settled");
+        settled.iter().filter(|t| t.course == Course::Calm).count() as f64 / settled.len() as f64
+    }
+
+    /// The axial flow through a short duct settles within a few ticks: a look ahead taken for the end would
+    /// swing up there.
+    #[test]
+    fn no_tick_is_calm_where_a_disturbance_dies_at_once() {
+        let large = include_str!("../../../config/thrusters/whitcomb-yoerger-1999.toml");
+        assert!(calm(large, 6.0) > 0.99);
+        let short = large.replace("duct_length_m = ", "duct_length_m = 0.015 # ");
+        assert!(short != large);
+        assert!(calm(&short, 6.0) < 0.01);
+    }
 
     #[test]
     fn a_jump_is_not_smooth_and_what_has_settled_is() {

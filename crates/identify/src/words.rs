@@ -13,8 +13,8 @@ use crate::report::{
 };
 use crate::rules;
 
-/// How sure a lone name is when nothing comes near it; measured on three proofs,
-/// none of them the reported one.
+/// How sure a lone name is when nothing comes near it; measured on three proofs, none of them the reported
+/// one.
 const SURE: f64 = 0.975;
 
 /// Probabilities of the chosen effect and its rivals. A distance in the criterion counts less
