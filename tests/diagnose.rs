@@ -228,6 +228,39 @@ fn a_limit_of_the_supply_is_named_with_the_sag_that_looks_like_it() {
     assert_eq!(names, ["supply_sag", "voltage_limit_backemf"]);
 }
 
+/// Limits bind at the top of a recording only: a fit that starts where they do not bind has nowhere to go.
+#[test]
+fn a_small_sag_is_found_where_the_supply_just_falls_short() {
+    let report = blind(CaseKind::Single, 12000147, &Selection::default());
+    assert_eq!(report["verdict"], "explained", "{}", report["summary"]);
+    assert_eq!(found(&report), ["supply_sag"]);
+}
+
+/// The first command comes while the shaft still stands; a current that is taken to flow at once would look
+/// like friction at low speed.
+#[test]
+fn a_run_that_starts_with_a_step_from_rest_leaves_bias_and_friction_alike() {
+    let report = blind(CaseKind::Confounded, 12000010, &Selection::default());
+    assert_eq!(report["verdict"], "ambiguous", "{}", report["summary"]);
+    for effect in ["torque_channel_bias", "coulomb_friction"] {
+        let finding = report["findings"].as_array().unwrap().iter().find(|f| f["effect"] == effect);
+        let probability = finding.unwrap_or_else(|| panic!("{effect}"))["probability"].as_f64().unwrap();
+        assert!((probability - 0.49).abs() < 0.05, "{effect} {probability}");
+    }
+}
+
+/// Ventilation sets in with a memory of its own; what is left of it looks like its relatives.
+#[test]
+fn two_losses_at_the_blade_that_fit_best_together_are_in_doubt() {
+    let report = blind(CaseKind::Single, 12000013, &Selection::default());
+    assert_eq!(report["verdict"], "ambiguous", "{}", report["summary"]);
+    let finding = &report["findings"][0];
+    assert_eq!(finding["effect"], "ventilation");
+    assert!(!finding["confounded_with"].as_array().unwrap().is_empty());
+    let separates = report["next_experiment"]["separates"].as_array().unwrap();
+    assert!(separates.contains(&"ventilation".into()), "{separates:?}");
+}
+
 #[test]
 fn the_static_models_leave_out_the_axial_flow_and_what_it_hides() {
     for model in ["model0", "model1"] {

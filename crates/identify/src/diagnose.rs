@@ -13,7 +13,7 @@ use crate::errors;
 use crate::experiment;
 use crate::fit::{Fit, Problem, Stack, Target};
 use crate::heldout::{held_out_rows, longest_block_s};
-use crate::judge::{self, Outcome, Place, margin, mates};
+use crate::judge::{self, Outcome, margin, mates};
 use crate::library::is_term;
 use crate::locate::{locate, since_edge};
 use crate::report::{
@@ -21,6 +21,7 @@ use crate::report::{
 };
 use crate::rules;
 use crate::search::Search;
+use crate::verdict::{doubt_kin, least_beside_others, verdict};
 use crate::words;
 
 /// How to diagnose.
@@ -308,6 +309,7 @@ fn write(
         }
     }
     outcome.places.retain(|p| !weak.contains(&p.chosen.id));
+    doubt_kin(&outcome.places, &mut findings);
     if let Some((effect, gain, why)) = outcome.doubt
         && !is_term(effect)
     {
@@ -332,7 +334,7 @@ fn write(
     // Best first: what explains most, and of its rivals the likeliest.
     findings.sort_by(|a, b| b.0.total_cmp(&a.0).then(b.1.probability.total_cmp(&a.1.probability)));
     let mut findings: Vec<Finding> = findings.into_iter().map(|f| f.1).collect();
-    let verdict = verdict(&outcome, &findings, thin.is_some());
+    let verdict = verdict(&outcome, &findings, total_gain, thin.is_some());
     if verdict == Verdict::Unexplained {
         findings.iter_mut().for_each(|f| f.probability *= rules::BESIDE_UNKNOWN);
     }
@@ -385,41 +387,6 @@ fn write(
         notes,
     };
     Diagnosis { report, traces: traces(&search.problem, &baseline_full, &last_full, &speed) }
-}
-
-/// Share of the held-out error above the noise that a find must remove beside others.
-fn least_beside_others(search: &Search, place: &Place, gains: &[(&Descriptor, f64)]) -> f64 {
-    let overshadows = |other: &(&Descriptor, f64)| {
-        mates(place.chosen, other.0) && other.1 > rules::RELATIVE_GAIN * place.gain
-    };
-    if gains.len() == 1 {
-        f64::NEG_INFINITY
-    } else if gains.iter().all(|other| other.1 <= place.gain) {
-        rules::LEAST_OF_A_FINDING
-    } else if search.free_in_time(place.chosen) || gains.iter().any(overshadows) {
-        rules::LEAST_OF_A_RELATIVE
-    } else {
-        rules::LEAST_OF_A_LATER_FINDING
-    }
-}
-
-fn verdict(outcome: &Outcome, findings: &[Finding], thin: bool) -> Verdict {
-    let removed = findings.iter().map(|f| f.heldout.excess_error_removed).fold(0.0, f64::max);
-    let total: f64 = outcome.places.iter().map(|p| p.gain).sum();
-    let unnamed: f64 = outcome.places.iter().filter(|p| is_term(p.chosen)).map(|p| p.gain).sum();
-    if outcome.places.is_empty() && outcome.excess.is_some() && !thin {
-        Verdict::Unexplained
-    } else if outcome.places.is_empty() {
-        if thin { Verdict::InsufficientData } else { Verdict::NoMismatch }
-    } else if unnamed > rules::UNNAMED_SHARE * total
-        || outcome.excess.is_some() && removed < rules::LEAST_REMOVED
-    {
-        Verdict::Unexplained
-    } else if outcome.places.iter().any(|p| !p.rivals.is_empty()) {
-        Verdict::Ambiguous
-    } else {
-        Verdict::Explained
-    }
 }
 
 /// A mismatch that neither name nor term describes: located by its error alone, on the path whose

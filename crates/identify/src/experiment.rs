@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use kort_thruster::effects::Scale;
+use kort_thruster::effects::{Descriptor, Scale};
 use kort_thruster::parameters::Parameter;
 use kort_thruster::rig::Rig;
 use kort_thruster::scenario::{EffectUse, NoReplays, Run, Scenario};
@@ -13,6 +13,7 @@ use crate::fit::Fit;
 use crate::judge::{Outcome, Place};
 use crate::report::NextExperiment;
 use crate::search::Search;
+use crate::verdict::kin_of;
 
 /// Test signals to choose from: shipped scenario, what it does in an engineer's words.
 const SIGNALS: &[(&str, &str)] = &[
@@ -32,52 +33,75 @@ const SIGNALS: &[(&str, &str)] = &[
     (include_str!("../../../config/scenarios/tow.toml"), "steps while towed ahead and astern"),
 ];
 
+/// Two explanations that this recording leaves open.
+struct Open<'a> {
+    place: &'a Place,
+    rival: &'static Descriptor,
+    mine: Vec<Member>,
+    theirs: Vec<Member>,
+    all: Vec<&'static str>,
+}
+
+impl<'a> Open<'a> {
+    fn of(search: &Search, outcome: &'a Outcome) -> Option<Self> {
+        let all = members(&search.problem, &outcome.last);
+        let without = |id: &str| -> Vec<Member> { all.iter().filter(|m| m.0.id != id).cloned().collect() };
+        if let Some(place) = outcome.places.iter().find(|p| !p.rivals.is_empty()) {
+            let (rival, _) = place.rivals.first()?;
+            let mut theirs = all.clone();
+            *theirs.iter_mut().find(|m| m.0.id == place.chosen.id)? = rival.clone();
+            let names = std::iter::once(place.chosen.id).chain(place.rivals.iter().map(|r| r.0.0.id));
+            return Some(Self { place, rival: rival.0, mine: all.clone(), theirs, all: names.collect() });
+        }
+        let (place, other) = kin_of(&outcome.places).next()?;
+        let (mine, theirs) = (without(other.chosen.id), without(place.chosen.id));
+        Some(Self { place, rival: other.chosen, mine, theirs, all: vec![place.chosen.id, other.chosen.id] })
+    }
+}
+
 /// The next experiment, if anything is left open.
 pub fn next(search: &Search, outcome: &Outcome, rig: &Rig) -> Option<NextExperiment> {
-    let open = outcome.places.iter().enumerate().find(|(_, p)| !p.rivals.is_empty());
-    let Some((slot, place)) = open else { return unexplained(outcome) };
-    let (rival, _) = place.rivals.first()?;
-    let mine = members(&search.problem, &outcome.last);
-    let mut theirs = mine.clone();
-    *theirs.get_mut(slot)? = rival.clone();
-    let (hypothesis, columns) = recompose(&outcome.last, &theirs, &search.scale);
-    let other = search.problem.fit(&hypothesis, &columns, 4);
+    let Some(open) = Open::of(search, outcome) else { return unexplained(outcome) };
+    let fitted = |list: &[Member]| {
+        let (hypothesis, columns) = recompose(&outcome.last, list, &search.scale);
+        search.problem.fit(&hypothesis, &columns, 4)
+    };
+    let (mine, theirs) = (fitted(&open.mine), fitted(&open.theirs));
     let best = SIGNALS
         .iter()
         .filter_map(|(text, words)| {
             let scenario: Scenario = toml::from_str(text).ok()?;
-            let a = respond(&scenario, rig, search, &outcome.last)?;
-            let b = respond(&scenario, rig, search, &other)?;
+            let a = respond(&scenario, rig, search, &mine)?;
+            let b = respond(&scenario, rig, search, &theirs)?;
             Some((difference(&a, &b, &search.scale), scenario, *words))
         })
         .max_by(|x, y| x.0.total_cmp(&y.0))?;
-    let mut scenario = with_effects(best.1, &mine);
-    scenario.what = format!("Parts {} from {}: {}", place.chosen.id, rival.0.id, best.2);
-    scenario.name = format!("separate-{}-{}", place.chosen.id, rival.0.id).replace('_', "-");
+    let (chosen, rival) = (open.place.chosen, open.rival);
+    let mut scenario = with_effects(best.1, &members(&search.problem, &mine));
+    scenario.what = format!("Parts {} from {}: {}", chosen.id, rival.id, best.2);
+    scenario.name = format!("separate-{}-{}", chosen.id, rival.id).replace('_', "-");
     Some(NextExperiment {
-        separates: std::iter::once(place.chosen.id.to_string())
-            .chain(place.rivals.iter().map(|r| r.0.0.id.to_string()))
-            .collect(),
+        separates: open.all.iter().map(|id| (*id).to_string()).collect(),
         excitation: best.2.into(),
-        why: why(place, rival, best.0),
+        why: why(chosen, rival, best.0),
         scenario: serde_json::to_value(&scenario).ok()?,
     })
 }
 
-fn why(place: &Place, rival: &Member, difference: f64) -> String {
+fn why(chosen: &Descriptor, rival: &Descriptor, difference: f64) -> String {
     let sizes = format!(
         "fitted to this recording, {} and {} would then differ by {:.1} % of full scale on the channel where they differ most",
-        place.chosen.id,
-        rival.0.id,
+        chosen.id,
+        rival.id,
         100.0 * difference
     );
     if difference < 0.003 {
         format!(
             "{sizes}: none of the shipped test signals parts them well; what does is {}",
-            place.chosen.separated_by
+            chosen.separated_by
         )
     } else {
-        format!("{sizes}; the catalogue's advice: {}", place.chosen.separated_by)
+        format!("{sizes}; the catalogue's advice: {}", chosen.separated_by)
     }
 }
 

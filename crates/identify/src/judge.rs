@@ -11,7 +11,7 @@ use crate::data::{Driving, Series, available};
 use crate::errors;
 use crate::fit::{Columns, Fit, Hypothesis, Problem};
 use crate::library::is_term;
-use crate::look::look;
+use crate::look::{bends, look};
 use crate::refit::{TIMING, amends, cost, unscreened};
 use crate::rules;
 use crate::search::{Candidate, Search, criterion};
@@ -132,7 +132,7 @@ fn names(
     let mut so_far: f64 = rounds.iter().map(|r| r[0].screened).sum();
     let mut term: Option<Candidate> = None;
     let mut doubt = None;
-    while rounds.len() < rules::MOST_FOUND {
+    while rounds.len() < rules::MOST_FOUND && !bends(search, &rounds) {
         progress(&format!("looking for effect {}", rounds.len() + 1));
         let saved = search.noise();
         let Some(one) = look(search, &mut current, so_far, progress) else { break };
@@ -417,6 +417,18 @@ fn in_place(search: &Search, current: &Fit, place: usize, member: Member) -> (Hy
     recompose(current, &swapped, &search.scale)
 }
 
+/// How far a rival is behind. Numbers that it has and does not need are no argument against it: what counts
+/// is how it fits. Not so where it changes freely with time: that bends to what has a form of its own, and
+/// then the form is the likelier.
+fn behind(search: &Search, place: &Place, rival: &Member, fit: &Fit, leader: &Fit) -> f64 {
+    let free = |effect| search.free_in_time(effect);
+    match (free(rival.0), free(place.chosen)) {
+        (false, _) => (fit.chi2 + fit.penalty - leader.chi2 - leader.penalty).max(0.0),
+        (true, false) => criterion(fit) - criterion(leader) + rules::BENDS * near(place, rival.0),
+        (true, true) => criterion(fit) - criterion(leader),
+    }
+}
+
 /// For every place: do others do as well, now that everything else is known? A better one takes
 /// the place.
 fn settle(search: &Search, current: &mut Fit, rounds: &[Vec<Candidate>]) -> Vec<Place> {
@@ -464,12 +476,17 @@ fn settle(search: &Search, current: &mut Fit, rounds: &[Vec<Candidate>]) -> Vec<
             tried.sort_by(|a, b| criterion(&a.1).total_cmp(&criterion(&b.1)));
         }
         let now = criterion(current);
-        let (rivals, aside): (Vec<_>, Vec<_>) = tried
+        let (rivals, aside): (Vec<_>, Vec<_>) = tried.into_iter().partition(|(member, fit)| {
+            criterion(fit) - now < near(&place, member.0) && !is_term(member.0) && !is_term(place.chosen)
+        });
+        place.rivals = rivals
             .into_iter()
-            .map(|(member, fit)| (member, criterion(&fit) - now))
-            .partition(|t| t.1 < near(&place, t.0.0) && !is_term(t.0.0) && !is_term(place.chosen));
-        place.rivals = rivals;
-        place.aside = aside.into_iter().map(|t| (t.0.0, t.1)).collect();
+            .map(|(member, fit)| {
+                let distance = behind(search, &place, &member, &fit, current);
+                (member, distance)
+            })
+            .collect();
+        place.aside = aside.into_iter().map(|(member, fit)| (member.0, criterion(&fit) - now)).collect();
         places.push(place);
     }
     places

@@ -27,4 +27,5 @@ pub mod search;
 mod smooth;
 mod step;
 mod together;
+mod verdict;
 pub mod words;

@@ -18,6 +18,7 @@ pub(crate) const TIMING: [&str; 5] =
 impl Search<'_> {
     /// Re-fits chosen effects on top of a fit, best first.
     pub(crate) fn refit(&self, current: &Fit, chosen: &[Screened]) -> Vec<Candidate> {
+        let base = criterion(current);
         let first: Vec<Fit> = chosen
             .par_iter()
             .map(|s| {
@@ -31,21 +32,26 @@ impl Search<'_> {
                 let at = |start: &[f64]| {
                     with_effect(&current.hypothesis, &from, s.effect, &self.scale, Some(start))
                 };
-                // Limits and thresholds do not scale: start where the screen stood, if that is better.
-                // A promise far out may break the simulation: then a part of the way.
-                let part = weaken(s.effect, &self.scale, &s.start);
-                let hypothesis = [at(&s.start), at(&s.origin), at(&part)]
-                    .into_iter()
-                    .map(|h| (cost(&self.problem, &h), h))
-                    .min_by(|a, b| a.0.total_cmp(&b.0))
-                    .map_or_else(|| at(&s.start), |best| best.1);
                 // Derivatives carry over, unless the equations are others.
                 let known = if amends(s.effect, &self.scale) { &[][..] } else { &current.columns };
-                self.problem.fit(&hypothesis, known, if known.is_empty() { 8 } else { 3 })
+                let fit_from =
+                    |h: &Hypothesis| self.problem.fit(h, known, if known.is_empty() { 8 } else { 3 });
+                // Limits and thresholds do not scale: start where the screen stood, if that is better.
+                let near = [at(&s.start), at(&s.origin)]
+                    .into_iter()
+                    .map(|h| (cost(&self.problem, &h), h))
+                    .min_by(|a, b| a.0.total_cmp(&b.0));
+                // A promise far out may break the simulation, or lead nowhere: then a part of the way. Not
+                // first: a limit weakened to where it does not bind has nowhere to go.
+                let part = at(&weaken(s.effect, &self.scale, &s.start));
+                let fit = near.filter(|n| n.0.is_finite()).map(|n| fit_from(&n.1));
+                match fit {
+                    Some(fit) if criterion(&fit) < base => fit,
+                    _ => fit_from(&part),
+                }
             })
             .collect();
         // Whoever trails far after the first steps is left there.
-        let base = criterion(current);
         let best = first.iter().map(|fit| base - criterion(fit)).fold(0.0, f64::max);
         let mut all: Vec<Candidate> = chosen
             .par_iter()

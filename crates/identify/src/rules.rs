@@ -6,6 +6,8 @@
 pub const PER_PARAMETER: f64 = 6.0;
 /// What an effect must gain to be believed at all.
 pub const BELIEVE: f64 = 80.0;
+/// ... of what slow turbulence of the inflow looks like.
+pub const BELIEVE_LIKE_TURBULENCE: f64 = 300.0;
 /// ... and as a share of what was gained before: the rest of an effect whose true form
 /// differs a little from ours is not another effect.
 pub const SHARE_OF_FIRST: f64 = 0.02;
@@ -41,6 +43,9 @@ pub const TERM_LEAST: f64 = 20.0;
 pub const LEAST_EXCESS: f64 = 0.002;
 /// ... and above which a mismatch is real even if nothing describes it.
 pub const REAL_EXCESS: f64 = 0.006;
+/// Share of the squared error above the noise, more of which a first name may not leave without a second
+/// look under white noise.
+pub const LOOK_AGAIN: f64 = 0.5;
 /// Changes in mid-run must leave less than this share of the squared error above the noise that
 /// names leave.
 pub const CHANGE_LEAVES: f64 = 0.6;
@@ -67,10 +72,13 @@ pub const LEAST_OF_A_RELATIVE: f64 = 0.8;
 /// How many times the gain of its relative that is.
 pub const RELATIVE_GAIN: f64 = 4.0;
 /// How much less sure a name is beside physics that has none.
-pub const BESIDE_UNKNOWN: f64 = 0.3;
+pub const BESIDE_UNKNOWN: f64 = 0.1;
 /// Share of the distance at which rivals are told apart, over which the odds of one fall by a factor e.
 /// Set on three proofs, none of them the reported one.
 pub const ODDS_FALL: f64 = 0.04;
+/// Share of that distance by which something free in time stands behind a name with a form of its own that
+/// fits as well.
+pub const BENDS: f64 = 0.1;
 /// Share of the gain that terms without a name may hold beside names.
 pub const UNNAMED_SHARE: f64 = 0.15;
 /// How much more names may leave where a measured column drives.

@@ -70,6 +70,14 @@ pub fn evidence(place: &Place, heldout: &HeldOut, located: &locate::Place) -> Ve
     out
 }
 
+/// Why one of two relatives that fit best together is in doubt.
+pub fn kin(one: &Descriptor, other: &Descriptor) -> String {
+    format!(
+        "fits best together with {}, which also takes thrust away at the blade: one of the two alone, setting in another way than in kort's form, would look like both, so {} is in doubt",
+        other.id, one.id
+    )
+}
+
 /// Why an effect was set aside.
 pub fn why_not(leader: &str, distance: f64, gain: f64) -> String {
     let share = 100.0 * (1.0 - distance / gain.max(1e-9));

@@ -51,14 +51,20 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
     ]
 }
 
-/// Supplies as stated with more and less sag, and lower ones that hardly sag.
+/// Supplies as stated with more and less sag, and others that fall short of what the winding takes at the
+/// top of the recording by about as much, with little and much of it through sag.
 fn starts(scale: &Scale) -> Vec<Vec<f64>> {
     let full = source_ohm(scale);
     let stated = [0.03, 0.08, 0.14, 0.2, 0.28, 0.4].iter().map(|share| vec![share * full, 0.01, 1.0]);
-    let lower = [0.7, 0.8, 0.9, 1.0]
-        .iter()
-        .map(|k| vec![0.05 * full, 0.01, (k * winding_share(scale)).clamp(0.4, 1.0)]);
-    stated.chain(lower).collect()
+    let winding = winding_share(scale);
+    let back_emf_v = scale.torque_n_m * scale.shaft_speed_rad_s / scale.current_a;
+    let electric_over_shaft_power = winding * scale.supply_v / back_emf_v.max(1e-3);
+    let binding = [0.02, 0.06, 0.12].into_iter().flat_map(move |share| {
+        let lost = share * electric_over_shaft_power;
+        [0.85, 0.91, 0.95, 0.98, 1.01, 1.05]
+            .map(|k| vec![share * full, 0.01, (k * winding + lost).clamp(0.4, 1.2)])
+    });
+    stated.chain(binding).collect()
 }
 
 /// A recorded supply that loses less than this share at the largest load is no sagging one.
