@@ -11,6 +11,7 @@ use kort_thruster::scenario::{EffectUse, NoReplays, Run, Scenario};
 use crate::baseline::{Member, members, recompose};
 use crate::fit::Fit;
 use crate::judge::{Outcome, Place};
+use crate::library::is_term;
 use crate::report::NextExperiment;
 use crate::search::Search;
 use crate::verdict::kin_of;
@@ -77,48 +78,66 @@ pub fn next(search: &Search, outcome: &Outcome, rig: &Rig) -> Option<NextExperim
         })
         .max_by(|x, y| x.0.total_cmp(&y.0))?;
     let (chosen, rival) = (open.place.chosen, open.rival);
-    let mut scenario = with_effects(best.1, &members(&search.problem, &mine));
+    let mut scenario = with_effects(best.1, search, &mine);
     scenario.what = format!("Parts {} from {}: {}", chosen.id, rival.id, best.2);
     scenario.name = format!("separate-{}-{}", chosen.id, rival.id).replace('_', "-");
     Some(NextExperiment {
         separates: open.all.iter().map(|id| (*id).to_string()).collect(),
         excitation: best.2.into(),
-        why: why(chosen, rival, best.0),
+        why: why(search, chosen, rival, best.0),
         scenario: serde_json::to_value(&scenario).ok()?,
     })
 }
 
-fn why(chosen: &Descriptor, rival: &Descriptor, difference: f64) -> String {
-    let sizes = format!(
-        "fitted to this recording, {} and {} would then differ by {:.1} % of full scale on the channel where they differ most",
-        chosen.id,
-        rival.id,
-        100.0 * difference
-    );
+fn why(search: &Search, chosen: &Descriptor, rival: &Descriptor, difference: f64) -> String {
+    let percent = 100.0 * difference;
+    let (sizes, advice) = match (search.free_in_time(chosen), search.free_in_time(rival)) {
+        (false, false) => (
+            format!(
+                "fitted to this recording, {} and {} would then differ by {percent:.1} % of full scale on the channel where they differ most",
+                chosen.id, rival.id
+            ),
+            chosen.separated_by,
+        ),
+        (true, true) => (
+            format!("{} and {} change freely with time and come again another way", chosen.id, rival.id),
+            chosen.separated_by,
+        ),
+        (chosen_is_free, _) => {
+            let (formed, free) = if chosen_is_free { (rival, chosen) } else { (chosen, rival) };
+            let text = format!(
+                "{} would come back as fitted to this recording and differ from its absence by up to {percent:.1} % of full scale, {} changes freely with time and would come back another way",
+                formed.id, free.id
+            );
+            (text, formed.separated_by)
+        }
+    };
     if difference < 0.003 {
-        format!(
-            "{sizes}: none of the shipped test signals parts them well; what does is {}",
-            chosen.separated_by
-        )
+        format!("{sizes}: none of the shipped test signals parts them well; what does is {advice}")
     } else {
-        format!("{sizes}; the catalogue's advice: {}", chosen.separated_by)
+        format!("{sizes}; the catalogue's advice: {advice}")
     }
 }
 
-/// Nothing named: the richest signal there is, both ways.
+/// A real mismatch without a name: the richest signal there is, both ways.
 fn unexplained(outcome: &Outcome) -> Option<NextExperiment> {
-    let term = outcome.places.iter().find(|p| crate::library::is_term(p.chosen))?;
+    let term = outcome.places.iter().map(|p| p.chosen).find(|e| is_term(e));
+    let why = match term {
+        Some(term) if crate::changes::is_change(term) => {
+            "with the change in force and without it, current recorded: a load takes the same torque at every level, a drive that loses gain a share of it".into()
+        }
+        Some(term) => format!(
+            "steady levels both ways show on the {} path how the unknown term goes with speed and direction; then repeat this run to see whether it stays",
+            term.path.name()
+        ),
+        None if outcome.excess.is_some() && outcome.places.is_empty() => {
+            "steady levels both ways show whether what is left follows speed and direction at all; then repeat this run to see whether it stays".into()
+        }
+        None => return None,
+    };
     let (text, words) = SIGNALS[1];
     let mut scenario: Scenario = toml::from_str(text).ok()?;
     scenario.name = "locate-the-unknown".into();
-    let why = if crate::changes::is_change(term.chosen) {
-        "with the change in force and without it, current recorded: a load takes the same torque at every level, a drive that loses gain a share of it".into()
-    } else {
-        format!(
-            "steady levels both ways show on the {} path how the unknown term goes with speed and direction; then repeat this run to see whether it stays",
-            term.chosen.path.name()
-        )
-    };
     Some(NextExperiment {
         separates: vec!["unknown".into()],
         excitation: words.into(),
@@ -129,7 +148,7 @@ fn unexplained(outcome: &Outcome) -> Option<NextExperiment> {
 
 fn respond(scenario: &Scenario, rig: &Rig, search: &Search, fit: &Fit) -> Option<Vec<Vec<f64>>> {
     let (parameters, _) = search.problem.assemble(&fit.hypothesis, &fit.values);
-    let mut run = with_effects(scenario.clone(), &members(&search.problem, fit));
+    let mut run = with_effects(scenario.clone(), search, fit);
     run.noise = 0.0;
     run.turbulence = None;
     run.model = search.problem.model;
@@ -163,10 +182,12 @@ fn difference(a: &[Vec<f64>], b: &[Vec<f64>], scale: &Scale) -> f64 {
         .fold(0.0, f64::max)
 }
 
-fn with_effects(mut scenario: Scenario, list: &[Member]) -> Scenario {
-    scenario.effects = list
+/// A scenario with what was found in force. What changes freely with time stays out: it does not come again
+/// as it came.
+fn with_effects(mut scenario: Scenario, search: &Search, fit: &Fit) -> Scenario {
+    scenario.effects = members(&search.problem, fit)
         .iter()
-        .filter(|m| !crate::library::is_term(m.0))
+        .filter(|m| !is_term(m.0) && !search.free_in_time(m.0))
         .map(|(effect, values)| EffectUse { effect: effect.id.into(), parameters: named(effect, values) })
         .collect();
     scenario
