@@ -73,7 +73,7 @@ pub fn evidence(place: &Place, heldout: &HeldOut, located: &locate::Place) -> Ve
 /// Why one of two relatives that fit best together is in doubt.
 pub fn kin(one: &Descriptor, other: &Descriptor) -> String {
     format!(
-        "fits best together with {}, which also takes thrust away at the blade: one of the two alone, setting in another way than in kort's form, would look like both, so {} is in doubt",
+        "fits best together with {}, which also takes thrust away at the blade: one of the two alone, with an onset of another form than kort's, would look like both, so {} is in doubt",
         other.id, one.id
     )
 }
