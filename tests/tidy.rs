@@ -45,7 +45,6 @@ const LONG: &[(&str, usize)] = &[
     ("crates/identify/src/changes.rs", 620),
     ("crates/identify/src/data.rs", 780),
     ("crates/identify/src/diagnose.rs", 600),
-    ("crates/thruster/src/plant/mod.rs", 640),
     ("crates/thruster/src/rig.rs", 600),
     ("crates/thruster/src/scenario/excitation.rs", 640),
     ("proto/src/messages.rs", 540),

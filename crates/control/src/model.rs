@@ -4,7 +4,7 @@
 //! Every gain in this crate follows from these numbers by a bandwidth rule, so that one set of
 //! options serves a 1 kW test stand and a 76 mm thruster alike.
 
-use kort_thruster::blade::{Blade, BladeLoad, BladeRow, Inflow};
+use kort_thruster::blade::{self, Blade, BladeLoad, BladeRow, Inflow};
 use kort_thruster::rig::{AmplifierKind, Rig};
 use thiserror::Error;
 
@@ -279,13 +279,12 @@ impl ControlModel {
     /// Swirl speed that the blades' torque keeps up, m/s: `Q(ut - us, vp)/re = dbr rho a |vp| us`.
     /// Zero without rotational flow.
     pub fn steady_swirl(&self, tangential_m_s: f64, axial_m_s: f64) -> f64 {
-        let Some(swirl) = self.swirl else { return 0.0 };
-        let drag = swirl.drag * self.blade.density_kg_m3 * self.blade.area_m2() * axial_m_s.abs();
+        let Some(law) = self.swirl_law() else { return 0.0 };
         let (mut low, mut high) = (tangential_m_s.min(0.0), tangential_m_s.max(0.0));
         for _ in 0..30 {
             let us = 0.5 * (low + high);
             let q = self.row.load(tangential_m_s - us, axial_m_s).torque_n_m;
-            if q / self.blade.lever_m() > drag * us { low = us } else { high = us }
+            if law.acceleration(q, axial_m_s, us, 0.0) > 0.0 { low = us } else { high = us }
         }
         0.5 * (low + high)
     }
@@ -343,19 +342,24 @@ impl ControlModel {
         (thrust_n - flux * (flow_m_s - ambient_m_s) * flow_m_s.abs()) / self.added_mass_kg
     }
 
+    /// The swirl law with this model's coefficients; `None` without rotational flow.
+    fn swirl_law(&self) -> Option<blade::Swirl> {
+        self.swirl.map(|swirl| blade::Swirl {
+            share: 1.0,
+            mass_kg: self.swirl_mass_kg(swirl),
+            flux_kg_m: swirl.drag * self.blade.density_kg_m3 * self.blade.area_m2(),
+            lever_m: self.row.lever_m,
+        })
+    }
+
     /// Acceleration of the swirl, m/s^2; zero without rotational flow.
     pub fn swirl_acceleration(&self, torque_n_m: f64, flow_m_s: f64, swirl_m_s: f64) -> f64 {
-        let Some(swirl) = self.swirl else { return 0.0 };
-        let drag = swirl.drag * self.blade.density_kg_m3 * self.blade.area_m2() * flow_m_s.abs();
-        (torque_n_m / self.blade.lever_m() - drag * swirl_m_s) / self.swirl_mass_kg(swirl)
+        self.swirl_law().map_or(0.0, |law| law.acceleration(torque_n_m, flow_m_s, swirl_m_s, 0.0))
     }
 
     /// How fast the axial flow washes the swirl out, 1/s; zero without rotational flow.
     pub fn swirl_decay_per_s(&self, flow_m_s: f64) -> f64 {
-        self.swirl.map_or(0.0, |swirl| {
-            swirl.drag * self.blade.density_kg_m3 * self.blade.area_m2() * flow_m_s.abs()
-                / self.swirl_mass_kg(swirl)
-        })
+        self.swirl_law().map_or(0.0, |law| law.decay_1_s(flow_m_s))
     }
 
     /// Mass of the swirling water at 0.7 radius, kg: `rho a l gr`.

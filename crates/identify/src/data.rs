@@ -336,6 +336,7 @@ impl Prepared {
                 temperature_c: temperature.as_deref().map(|d| at(d, time_s)),
                 extra: 0.0,
                 course: Course::Any,
+                ..Tick::default()
             });
         }
         self.stimulus.ticks = ticks;

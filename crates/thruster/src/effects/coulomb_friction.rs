@@ -1,6 +1,6 @@
 //! Dry friction of bearings and seals, with a Stribeck rise near standstill.
 
-use super::{Context, Descriptor, Effect, Hooks, Path, Scale, Spec, free_shaft};
+use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, free_shaft};
 use crate::plant::{Balance, Local};
 use crate::real::Real;
 
@@ -10,7 +10,8 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     path: Path::Shaft,
     what: "dry friction of bearings or shaft seals: a torque of constant size against the direction of turning, \
            higher near standstill (Stribeck)",
-    equation: "I Om' = ... - [tc + (ts - tc) exp(-(Om/vs)^2)] tanh(Om/eps); tc, ts [N m], vs, eps [rad/s]",
+    equation: "I Om' = ... - tc [1 + (ts/tc - 1) exp(-(Om/vs)^2)] sgn(Om), at rest whatever holds the shaft up to ts; tc, ts [N m], \
+               vs [rad/s]",
     signature: "an offset in the shaft's torque balance that changes sign with the direction; stick-slip near zero; \
                 thrust over speed squared is unchanged; the loss in thrust per torque falls as 1/Om^2",
     confused_with: &["viscous_friction", "torque_channel_bias", "command_dead_band"],
@@ -22,7 +23,9 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
         vec![vec![0.02 * torque, 0.7, 0.015 * speed], vec![0.02 * torque, 0.7, 0.08 * speed]]
     },
     needs: free_shaft,
-    build: both!(build),
+    build: both!(|values, _| {
+        Box::new(CoulombFriction { level_n_m: values[0], rise: values[1], stribeck_rad_s: values[2] })
+    }),
 };
 
 fn parameters(scale: &Scale) -> Vec<Spec> {
@@ -39,25 +42,10 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
     ]
 }
 
-fn build<T: Real>(values: &[T], context: &Context<T>) -> Box<dyn Effect<T>> {
-    Box::new(CoulombFriction {
-        level_n_m: values[0],
-        rise: values[1],
-        stribeck_rad_s: values[2],
-        // Sharp against the speeds in use, soft enough for the integrator's step:
-        // level / (eps I) stays below 1/tick.
-        eps_rad_s: (values[2] * 0.02).max(
-            values[0].abs() * 1.2 * (values[1] + 1.0) * context.tick_s
-                / context.parameters.get(crate::parameters::Parameter::InertiaKgM2),
-        ),
-    })
-}
-
 struct CoulombFriction<T> {
     level_n_m: T,
     rise: T,
     stribeck_rad_s: T,
-    eps_rad_s: T,
 }
 
 impl<T: Real> Effect<T> for CoulombFriction<T> {
@@ -66,9 +54,8 @@ impl<T: Real> Effect<T> for CoulombFriction<T> {
     }
 
     fn balance(&self, at: &Local<T>, _: &[T], balance: &mut Balance<T>, _: &mut [T]) {
-        let speed = at.shaft_speed_rad_s;
-        let stribeck = (-(speed / self.stribeck_rad_s).squared()).exp();
+        let stribeck = (-(at.shaft_speed_rad_s / self.stribeck_rad_s).squared()).exp();
         let torque = self.level_n_m * (self.rise * stribeck + 1.0);
-        balance.shaft_torque_n_m -= torque * (speed / self.eps_rad_s).tanh();
+        balance.rub(torque, torque);
     }
 }

@@ -1,7 +1,7 @@
 //! The wake turns with the propeller: swirl unloads the blades.
 
 use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, wet};
-use crate::blade::{Inflow, REFERENCE_RADIUS};
+use crate::blade::{Inflow, Swirl};
 use crate::parameters::Parameter as P;
 use crate::plant::{Balance, Local};
 use crate::real::Real;
@@ -28,13 +28,9 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     needs: wet,
     build: both!(|values, context| {
         let p = context.parameters;
-        Box::new(RotationalFlow {
-            share: values[0],
-            flux_kg_m: p.get(P::DensityKgM3) * p.area_m2(),
-            mass_kg: values[1] * p.duct_mass_kg(),
-            lever_m: p.get(P::RadiusM) * REFERENCE_RADIUS,
-            tick_s: context.tick_s,
-        })
+        let flux_kg_m = p.get(P::DensityKgM3) * p.area_m2();
+        let law = Swirl { share: values[0], mass_kg: values[1] * p.duct_mass_kg(), flux_kg_m, ..Swirl::new(p) };
+        Box::new(RotationalFlow { law, tick_s: context.tick_s })
     }),
 };
 
@@ -47,10 +43,7 @@ fn parameters(_: &Scale) -> Vec<Spec> {
 }
 
 struct RotationalFlow<T> {
-    share: T,
-    flux_kg_m: T,
-    mass_kg: T,
-    lever_m: T,
+    law: Swirl<T>,
     tick_s: f64,
 }
 
@@ -69,8 +62,7 @@ impl<T: Real> Effect<T> for RotationalFlow<T> {
 
     /// The swirl's lag is never shorter than a tick, which the integrator could not follow.
     fn balance(&self, at: &Local<T>, own: &[T], balance: &mut Balance<T>, rates: &mut [T]) {
-        let washed = self.flux_kg_m * at.axial_m_s.abs();
-        rates[0] = (self.share * balance.blade_torque_n_m / self.lever_m - washed * own[0])
-            / (self.mass_kg + washed * self.tick_s);
+        rates[0] =
+            self.law.acceleration(balance.blade_torque_n_m, at.axial_m_s, own[0], self.tick_s);
     }
 }

@@ -51,7 +51,7 @@ impl Model2 {
         Self {
             motor: Motor::new(p),
             momentum,
-            row: p.blade().row(),
+            row: BladeRow::new(p),
             bollard: (torque, (thrust / momentum.flux_kg_m).max(0.0).sqrt()),
         }
     }

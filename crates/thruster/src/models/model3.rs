@@ -40,7 +40,7 @@ impl Model3 {
     pub fn new(p: &Parameters) -> Self {
         let momentum = Momentum::new(p);
         let (thrust, _) = p.bollard_coefficients();
-        Self { momentum, row: p.blade().row(), advance_m: (thrust / momentum.flux_kg_m).max(0.0).sqrt() }
+        Self { momentum, row: BladeRow::new(p), advance_m: (thrust / momentum.flux_kg_m).max(0.0).sqrt() }
     }
 }
 

@@ -1,22 +1,18 @@
 //! Model 2 with the swirl of the wake as a third state, after the successor models (Bachmayer,
-//! Whitcomb & Grosenbaugh 2000 add rotational fluid velocity and inertia). The form of the swirl
-//! equation is ours: angular momentum balance of the water in the duct, washed out by the axial
-//! flow.
+//! Whitcomb & Grosenbaugh 2000 add rotational fluid velocity and inertia).
 
 use super::model2::Model2;
 use super::{DriveInput, Model};
-use crate::blade::BladeLoad;
-use crate::parameters::{Parameter as P, Parameters};
+use crate::blade::{BladeLoad, Swirl};
+use crate::parameters::Parameters;
 
-/// `rho a l gr us' = Q/re - dbr rho a |vp| us`; the blade meets the water at `re Om - us`.
+/// Model 2 and the [swirl law](crate::blade::Swirl); the blade meets the water at `re Om - us`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RotationalFlow {
     /// Everything but the swirl.
     pub axial: Model2,
-    /// `rho a l gr`, kg.
-    pub swirl_mass_kg: f64,
-    /// `dbr rho a`, kg/m.
-    pub swirl_flux_kg_m: f64,
+    /// Swirl of the wake.
+    pub swirl: Swirl,
 }
 
 /// State of a model that knows shaft, axial flow and swirl.
@@ -45,11 +41,7 @@ impl From<SwirlState> for [f64; 3] {
 impl RotationalFlow {
     /// The model with these parameters; they must be those of a propeller.
     pub fn new(p: &Parameters) -> Self {
-        Self {
-            axial: Model2::new(p),
-            swirl_mass_kg: p.duct_mass_kg() * p.get(P::SwirlMassCoefficient),
-            swirl_flux_kg_m: p.get(P::SwirlFluxCoefficient) * p.get(P::DensityKgM3) * p.area_m2(),
-        }
+        Self { axial: Model2::new(p), swirl: Swirl::new(p) }
     }
 
     fn blades(&self, speed: f64, flow: f64, swirl: f64) -> BladeLoad {
@@ -67,8 +59,7 @@ impl Model<3> for RotationalFlow {
         [
             self.axial.motor.acceleration(input.drive, *speed, load.torque_n_m),
             self.axial.momentum.acceleration(load.thrust_n, *flow, input.ambient_m_s),
-            (load.torque_n_m / self.axial.row.lever_m - self.swirl_flux_kg_m * flow.abs() * swirl)
-                / self.swirl_mass_kg,
+            self.swirl.acceleration(load.torque_n_m, *flow, *swirl, 0.0),
         ]
     }
 

@@ -1,6 +1,6 @@
 //! The measuring chain: encoder, filters, and what the sensors show, once a tick.
 
-use super::{ANGLE, Balance, FLOW, Plant, SPEED, Sensed, Tick};
+use super::{ANGLE, Balance, Plant, SPEED, Sensed, Tick};
 use crate::models::ModelName;
 use crate::real::Real;
 
@@ -14,6 +14,21 @@ pub(super) struct Filters<T> {
     pub(super) last_thrust_n: T,
     pub(super) torque_n_m: T,
     pub(super) last_torque_n_m: T,
+}
+
+impl<T: Real> Filters<T> {
+    /// At rest.
+    pub(super) const fn still() -> Self {
+        Self {
+            angle_rad: T::ZERO,
+            last_angle_rad: T::ZERO,
+            speed_rad_s: T::ZERO,
+            thrust_n: T::ZERO,
+            last_thrust_n: T::ZERO,
+            torque_n_m: T::ZERO,
+            last_torque_n_m: T::ZERO,
+        }
+    }
 }
 
 impl<T: Real> Plant<T> {
@@ -70,10 +85,10 @@ impl<T: Real> Plant<T> {
             thrust_n: f.thrust_n,
             torque_n_m: f.torque_n_m,
             flow_m_s: match self.model {
-                ModelName::Model1 => self.constants.yoerger_slip_m * self.x[SPEED],
-                _ => self.x[FLOW],
+                ModelName::Model1 => self.constants.yoerger_slip_m * self.at.shaft_speed_rad_s,
+                _ => self.at.axial_m_s,
             },
-            true_speed_rad_s: self.x[SPEED],
+            true_speed_rad_s: self.at.shaft_speed_rad_s,
             true_thrust_n: self.true_thrust_n,
             supply_v: T::from(self.supply_v),
         }

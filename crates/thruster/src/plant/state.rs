@@ -1,5 +1,6 @@
 //! What the plant shows to its effects, and what they may change.
 
+use crate::blade::Foil;
 use crate::real::Real;
 
 /// Inputs of one control tick. Quantities that vary within the tick run straight from the first
@@ -24,6 +25,12 @@ pub struct Tick {
     pub temperature_c: Option<f64>,
     /// Another recorded signal (a neighbour's speed, an unknown column), standardised.
     pub extra: f64,
+    /// The drive is released: its terminals are open, no current flows, whatever the command.
+    pub released: bool,
+    /// Recorded shaft angle at the tick's end, rad, for the observer ([`super::Plant::with_observer`]).
+    pub observed_angle_rad: Option<f64>,
+    /// Recorded shaft speed at the tick's end, rad/s, for the observer; used where no angle is.
+    pub observed_speed_rad_s: Option<f64>,
     /// What is known beforehand of the tick's course.
     pub course: Course,
 }
@@ -138,38 +145,6 @@ impl<T: Real> Local<T> {
     }
 }
 
-/// The blade section at work.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Foil<T = f64> {
-    /// Resultant speed `V`, m/s.
-    pub speed_m_s: T,
-    /// Speed normal to the chord, m/s.
-    pub normal_m_s: T,
-    /// Speed along the chord, m/s.
-    pub chordwise_m_s: T,
-    /// `sin 2 alpha`
-    pub sin_2a: T,
-    /// `1 - cos 2 alpha`
-    pub one_minus_cos_2a: T,
-    /// Lift coefficient.
-    pub lift: T,
-    /// Drag coefficient.
-    pub drag: T,
-    /// Density of the water, kg/m^3.
-    pub density_kg_m3: T,
-}
-
-impl<T: Real> Foil<T> {
-    /// Angle of attack in (-pi/2, pi/2], rad.
-    pub fn attack_rad(&self) -> T {
-        if self.chordwise_m_s < 0.0 {
-            (-self.normal_m_s).atan2(-self.chordwise_m_s)
-        } else {
-            self.normal_m_s.atan2(self.chordwise_m_s)
-        }
-    }
-}
-
 /// Torques on the shaft and forces on the water at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Balance<T = f64> {
@@ -177,6 +152,11 @@ pub struct Balance<T = f64> {
     pub motor_torque_n_m: T,
     /// Other torque on the shaft, N m; positive accelerates ahead.
     pub shaft_torque_n_m: T,
+    /// Size of the dry friction against turning ahead, N m, zero or above: it slows and holds the shaft,
+    /// and never drives it. See [`Balance::rub`].
+    pub friction_ahead_n_m: T,
+    /// The same against turning astern, N m.
+    pub friction_astern_n_m: T,
     /// Blade torque, N m; positive opposes positive speed.
     pub blade_torque_n_m: T,
     /// Inertia of the shaft, kg m^2.
@@ -196,6 +176,16 @@ pub struct Balance<T = f64> {
     /// The blade section these loads come from; all zero where the model has none, nothing moves, or no
     /// effect has a hook at the blade ([`crate::effects::Hooks::inflow`] or `foil`).
     pub foil: Foil<T>,
+}
+
+impl<T: Real> Balance<T> {
+    /// Adds dry friction: its size against turning ahead and against turning astern, N m. The plant lets it
+    /// shrink the shaft's speed after the step that all else makes, so that it sticks exactly.
+    #[inline(always)]
+    pub fn rub(&mut self, ahead_n_m: T, astern_n_m: T) {
+        self.friction_ahead_n_m += ahead_n_m.max(T::ZERO);
+        self.friction_astern_n_m += astern_n_m.max(T::ZERO);
+    }
 }
 
 /// What the sensors show, without noise; names are the recording's columns.
@@ -258,7 +248,7 @@ at_rest! {
     }
     Foil { speed_m_s normal_m_s chordwise_m_s sin_2a one_minus_cos_2a lift drag density_kg_m3 }
     Balance {
-        motor_torque_n_m shaft_torque_n_m blade_torque_n_m inertia_kg_m2 thrust_n momentum_n added_mass_kg
+        motor_torque_n_m shaft_torque_n_m friction_ahead_n_m friction_astern_n_m blade_torque_n_m inertia_kg_m2 thrust_n momentum_n added_mass_kg
         flux_kg_m ambient_m_s stand_n,
         foil
     }

@@ -1,0 +1,118 @@
+//! The drive within a tick: from the command, through the effects on it, to a motor current or an imposed
+//! shaft speed at every instant of the tick.
+
+use super::{Drive, Driven, Plant, SPEED, Tick};
+use crate::parameters::Parameter as P;
+use crate::real::Real;
+use crate::rig::AmplifierKind;
+
+/// What the drive does over one tick.
+pub(super) struct Course<T> {
+    drive: Drive<T>,
+    /// Whether the current depends on the speed reached within the tick: through the back-EMF.
+    by_speed: bool,
+    /// Current at start, middle and end of the tick where it does not, A.
+    current_a: [T; 3],
+    /// Shaft speed at start and end, rad/s, where it is imposed.
+    pub(super) speed_rad_s: Option<(T, T)>,
+}
+
+impl<T: Real> Plant<T> {
+    /// Runs the effects on the drive and lays out the tick.
+    #[inline(always)]
+    pub(super) fn drive_over(&mut self, tick: &Tick) -> Course<T> {
+        let mut drive = Drive {
+            command: T::from(tick.command),
+            current_limit_a: T::from(self.current_limit_a),
+            time_constant_s: self.parameters.get(P::TimeConstantS),
+            supply_v: T::from(tick.supply_v.unwrap_or(self.nominal_supply_v)),
+            resistance_ohm: self.constants.resistance_ohm,
+            back_emf_v: self.constants.torque_constant_nm_a * self.x[SPEED],
+            shaft_speed_rad_s: self.x[SPEED],
+            current_a: self.current_a,
+            voltage_limited: false,
+        };
+        for i in &self.drive_hooks {
+            self.effects[*i].effect.drive(tick, &mut drive);
+        }
+        let commanded = tick.driven == Driven::Command && !tick.released;
+        let by_speed = commanded
+            && match self.amplifier {
+                AmplifierKind::Voltage => true,
+                AmplifierKind::Current => drive.voltage_limited,
+                AmplifierKind::Speed => false,
+            };
+        let speed_rad_s = match self.amplifier {
+            AmplifierKind::Speed if commanded => {
+                let (now, tau) = (self.x[SPEED], drive.time_constant_s);
+                let left = if tau > 0.0 { (T::from(-self.tick_s) / tau).exp() } else { T::ZERO };
+                Some((now, drive.command + (now - drive.command) * left))
+            }
+            _ => tick.driven_speed().map(|(a, b)| (T::from(a), T::from(b))),
+        };
+        let current_a = if by_speed {
+            [T::ZERO; 3]
+        } else {
+            [0.0, 0.5, 1.0].map(|part| self.current_path(tick, &drive, part, T::ZERO))
+        };
+        Course { drive, by_speed, current_a, speed_rad_s }
+    }
+
+    /// Motor current, A, `part` of the tick after its start, where the shaft has this speed.
+    #[inline(always)]
+    pub(super) fn current_at(&self, tick: &Tick, course: &Course<T>, part: f64, speed_rad_s: T) -> T {
+        if course.by_speed || part != 0.0 && part != 0.5 && part != 1.0 {
+            self.current_path(tick, &course.drive, part, speed_rad_s)
+        } else {
+            course.current_a[(2.0 * part) as usize]
+        }
+    }
+
+    fn current_path(&self, tick: &Tick, drive: &Drive<T>, part: f64, speed_rad_s: T) -> T {
+        if let Driven::Current(a, b) = tick.driven {
+            return T::from(a + (b - a) * part);
+        }
+        // Open terminals: no current, and so no braking by the back-EMF.
+        if tick.released {
+            return T::ZERO;
+        }
+        let lagging = drive.time_constant_s > 0.0;
+        if lagging && part == 0.0 {
+            return self.current_a;
+        }
+        // Without a lag the current follows the back-EMF; with one, it has followed its mean so far.
+        let gained = (speed_rad_s - drive.shaft_speed_rad_s) * self.constants.torque_constant_nm_a;
+        let back_emf_v = drive.back_emf_v + if lagging { gained * 0.5 } else { gained };
+        let r = drive.resistance_ohm.max(T::from(1e-9));
+        let target = match self.amplifier {
+            AmplifierKind::Current => drive.command,
+            // (10)-(12) with the inductance neglected; the lag then stands for L/R and the stage.
+            AmplifierKind::Voltage => (drive.command - back_emf_v) / r,
+            // A speed drive's shaft follows the command through the lag; no current is modelled.
+            AmplifierKind::Speed => return T::ZERO,
+        };
+        let mut target = target.clamp(-drive.current_limit_a, drive.current_limit_a);
+        if drive.voltage_limited {
+            // |R i + ke Om| <= V: what the bus can push through the winding at this speed.
+            target = target.clamp(
+                ((-drive.supply_v - back_emf_v) / r).min(T::ZERO),
+                ((drive.supply_v - back_emf_v) / r).max(T::ZERO),
+            );
+        }
+        if !lagging {
+            return target;
+        }
+        // The stated lag's decay is at hand; an effect may have changed the lag, or its derivative alone.
+        let (stated, half, full) = self.decays.drive;
+        let left = if drive.time_constant_s != stated || !drive.time_constant_s.same_slopes(stated) {
+            (T::from(-part * self.tick_s) / drive.time_constant_s).exp()
+        } else if part == 0.5 {
+            half
+        } else if part == 1.0 {
+            full
+        } else {
+            (T::from(-part * self.tick_s) / stated).exp()
+        };
+        target + (self.current_a - target) * left
+    }
+}

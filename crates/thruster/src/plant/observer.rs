@@ -1,0 +1,41 @@
+//! A slow observer that keeps the simulated shaft with the recorded one.
+//!
+//! A free run of what integrates or is unstable (an angle, a pendulum) drifts away from the recording for
+//! reasons that are no physics; a pull of about 1 Hz takes that away and leaves what is faster to be seen.
+//! What the sensors show is always the prediction, made before the pull.
+
+use super::{ANGLE, Plant, SPEED, Tick};
+use crate::real::Real;
+
+impl<T: Real> Plant<T> {
+    /// Pulls the shaft toward [`Tick::observed_angle_rad`], or [`Tick::observed_speed_rad_s`] where no angle
+    /// is, with this bandwidth, rad/s; 0 is off.
+    pub fn with_observer(mut self, bandwidth_rad_s: f64) -> Self {
+        self.observer_rad_s = bandwidth_rad_s.max(0.0);
+        self
+    }
+
+    /// At the end of a tick: `Om += w^2 dt e, q += 1.4 w dt e` by the angle's error, `Om += w dt e` by the
+    /// speed's alone. The encoder does not see the angle's pull as motion.
+    #[inline(always)]
+    pub(super) fn pull(&mut self, tick: &Tick) {
+        let reach = self.observer_rad_s * self.tick_s;
+        if reach == 0.0 {
+            return;
+        }
+        if let Some(angle) = tick.observed_angle_rad {
+            let behind = T::from(angle) - self.x[ANGLE];
+            let by = behind * (1.4 * reach).min(1.0);
+            self.x[SPEED] += behind * (reach * self.observer_rad_s);
+            self.x[ANGLE] += by;
+            self.filters.last_angle_rad += by;
+        } else if let Some(speed) = tick.observed_speed_rad_s {
+            let behind = T::from(speed) - self.x[SPEED];
+            self.x[SPEED] += behind * reach.min(1.0);
+        } else {
+            return;
+        }
+        // The rates at hand are not those of the state that was pulled.
+        self.moving = false;
+    }
+}

@@ -1,0 +1,240 @@
+//! The step for plants whose flow, swirl or shaft settles within a tick: a propeller in air, a very short
+//! duct, a motor that its back-EMF brakes at once.
+//!
+//! Linearly implicit Euler steps with the derivative of the rates, one of a tick and two of half a tick,
+//! extrapolated to order 2 (Deuflhard 1985, SIAM Review 27:505): stable at any stiffness, and what settles
+//! within the tick is followed to where it settles. The derivative may be rough without costing order; it is
+//! taken by differences where the shaft's acceleration leads: from rest, blades that do not turn yet would
+//! show no slope. Whether a plant takes this step is
+//! settled once from the stated rig, so that a response stays smooth in the parameters.
+
+use super::drive::Course;
+use super::{ANGLE, Balance, FLOW, Plant, Rub, SPEED, Tick, each};
+use crate::models::{DriveInput, Model, Model2, ModelName};
+use crate::parameters::{Parameter as P, Parameters};
+use crate::real::Real;
+use crate::rig::{AmplifierKind, Rig};
+
+/// Largest product of decay rate and tick that explicit steps are left to: they stay stable to 2.8, and a
+/// fit may move inertia and masses to a third of what is stated.
+const EXPLICIT: f64 = 0.9;
+
+/// Part of the slower decay that one implicit step may take: the loads go with the square of the speed, and a
+/// straight line through them leads far off where the speed changes by more than itself.
+const RESOLVED: f64 = 0.4;
+/// Most implicit steps a tick.
+const MOST_STEPS: f64 = 64.0;
+
+/// Blade tip speed that bounds a rig whose drive states no limit, m/s: cavitation in water, sound in air.
+const TIP_M_S: (f64, f64) = (25.0, 250.0);
+/// Density below which a rig is taken to run in a gas, kg/m^3.
+const GAS_KG_M3: f64 = 100.0;
+
+/// What the implicit step needs to know of the stated rig.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stiff {
+    /// Largest shaft speed, rad/s.
+    top_rad_s: f64,
+    /// Steps a tick: as many as its slower decay asks for.
+    steps: usize,
+}
+
+impl Stiff {
+    /// For a rig that is too stiff for explicit steps at its stated values and largest speed.
+    pub(super) fn of(model: ModelName, rig: &Rig, tick_s: f64) -> Option<Self> {
+        let p = Parameters::stated(rig);
+        let mut shaft_1_s = p.get(P::ViscousFrictionNmS) / p.get(P::InertiaKgM2);
+        let ohm = p.get(P::WindingResistanceOhm);
+        if rig.amplifier.kind == AmplifierKind::Voltage && ohm > 0.0 {
+            shaft_1_s += p.get(P::TorqueConstantNmA).powi(2) / (ohm * p.get(P::InertiaKgM2));
+        }
+        let top_rad_s = top_speed_rad_s(rig, &p);
+        let (fast_1_s, slow_1_s) = match model {
+            _ if rig.propeller.is_none() => (0.0, 0.0),
+            ModelName::Model0 | ModelName::Model1 => (0.0, 0.0),
+            _ => wet_1_s(&p, top_rad_s),
+        };
+        let steps = (slow_1_s * tick_s / RESOLVED).ceil().clamp(1.0, MOST_STEPS);
+        ((shaft_1_s + fast_1_s) * tick_s > EXPLICIT).then_some(Self { top_rad_s, steps: steps as usize })
+    }
+}
+
+/// Faster and slower decay of shaft speed and flow in bollard pull at a shaft speed, 1/s.
+fn wet_1_s(p: &Parameters, speed_rad_s: f64) -> (f64, f64) {
+    let model = Model2::new(p);
+    let flow = model.rough_steady_state(&DriveInput::torque(1.0));
+    let x = [speed_rad_s, speed_rad_s * flow[1] / flow[0]];
+    let rates = |x: [f64; 2]| model.rates(&x, &DriveInput::torque(0.0));
+    let here = rates(x);
+    let by = x.map(|x| 1e-6 * x.abs().max(1e-6));
+    let there = [rates([x[0] + by[0], x[1]]), rates([x[0], x[1] + by[1]])];
+    let slopes: [[f64; 2]; 2] =
+        std::array::from_fn(|i| std::array::from_fn(|j| (there[j][i] - here[i]) / by[j]));
+    let fast = fastest_1_s(slopes);
+    let [[a, b], [c, d]] = slopes;
+    (fast, ((a * d - b * c) / fast).abs())
+}
+
+/// The largest eigenvalue of a matrix by size.
+pub(super) fn fastest_1_s([[a, b], [c, d]]: [[f64; 2]; 2]) -> f64 {
+    let (mean, det) = (0.5 * (a + d), a * d - b * c);
+    let root = mean * mean - det;
+    if root < 0.0 { det.sqrt() } else { mean.abs() + root.sqrt() }
+}
+
+/// Largest shaft speed that the stated limits allow, rad/s.
+fn top_speed_rad_s(rig: &Rig, p: &Parameters) -> f64 {
+    if rig.propeller.is_none() {
+        return 0.0;
+    }
+    let kt = p.get(P::TorqueConstantNmA);
+    let gas = p.get(P::DensityKgM3) < GAS_KG_M3;
+    let tip = if gas { TIP_M_S.1 } else { TIP_M_S.0 } / p.get(P::RadiusM);
+    let by_supply = rig.amplifier.supply_v.map_or(f64::INFINITY, |v| v / kt);
+    let (_, load_nm_s2) = p.bollard_coefficients();
+    let by_current = (kt * rig.amplifier.current_limit_a / load_nm_s2.max(1e-12)).sqrt();
+    tip.min(by_supply).min(by_current)
+}
+
+/// Derivative of the rates, as far as it is fast: by shaft speed and axial flow of all states, and of each
+/// other state by itself.
+struct Slopes<T, const N: usize> {
+    by_speed: [T; N],
+    by_flow: [T; N],
+    by_itself: [T; N],
+}
+
+impl<T: Real> Plant<T> {
+    pub(super) fn step_stiff<const N: usize>(&mut self, tick: &Tick, stiff: Stiff) {
+        let drive = self.drive_over(tick);
+        let mut balance = Balance::default();
+        let mut x: [T; N] = each(|i| self.x[i]);
+        let part = 1.0 / stiff.steps as f64;
+        for step in 0..stiff.steps {
+            let from = step as f64 * part;
+            let until = if step + 1 == stiff.steps { 1.0 } else { from + part };
+            x = self.stiff_part(tick, &drive, &x, (from, until), stiff.top_rad_s, &mut balance);
+        }
+        let current = self.current_at(tick, &drive, 1.0, x[SPEED]);
+        let end = self.local_at(&x, current, 1.0, tick);
+        self.rates::<true, true, N>(&x, &end, &mut balance);
+        self.moving = false;
+        self.arrive(tick, &x, end, &balance);
+    }
+
+    /// One extrapolated step between two parts of the tick.
+    fn stiff_part<const N: usize>(
+        &self,
+        tick: &Tick,
+        drive: &Course<T>,
+        from: &[T; N],
+        (start, end): (f64, f64),
+        top_rad_s: f64,
+        balance: &mut Balance<T>,
+    ) -> [T; N] {
+        let step_s = (end - start) * self.tick_s;
+        let imposed = |part: f64| drive.speed_rad_s.map(|(a, b)| a + (b - a) * part);
+        let rates = self.rates_at(tick, drive, from, end, balance);
+        let rub = Rub::of(balance);
+        let mut about = *from;
+        about[SPEED] = imposed(end).unwrap_or_else(|| {
+            let reach = T::from(top_rad_s);
+            let led = from[SPEED] + (rates[SPEED] * step_s).clamp(-reach, reach);
+            // A reversal passes rest, where nothing is fast, but does not stay there.
+            let least = from[SPEED].abs();
+            if led < 0.0 { led.min(-least) } else { led.max(least) }
+        });
+        let slopes = self.slopes(tick, drive, &about, end);
+        let mut advance = |from: &[T; N], until: f64, step_s: f64| {
+            let mut x = *from;
+            let speed = imposed(until);
+            x[SPEED] = speed.unwrap_or(x[SPEED]);
+            let rates = self.rates_at(tick, drive, &x, until, balance);
+            slopes.advance(&x, &rates, step_s, rub.mean(Rub::of(balance)), speed.is_some())
+        };
+        let whole = advance(from, end, step_s);
+        let half = advance(from, 0.5 * (start + end), 0.5 * step_s);
+        let halves = advance(&half, end, 0.5 * step_s);
+        let mut x: [T; N] = each(|i| halves[i] * 2.0 - whole[i]);
+        x[SPEED] = match imposed(end) {
+            Some(speed) => speed,
+            // Held by dry friction at the end of the finer steps.
+            None if halves[SPEED] == T::ZERO => T::ZERO,
+            None => x[SPEED],
+        };
+        x
+    }
+
+    /// Rates at a state under the inputs `part` of the tick after its start.
+    fn rates_at<const N: usize>(
+        &self,
+        tick: &Tick,
+        drive: &Course<T>,
+        x: &[T; N],
+        part: f64,
+        balance: &mut Balance<T>,
+    ) -> [T; N] {
+        let at = self.local_at(x, self.current_at(tick, drive, part, x[SPEED]), part, tick);
+        self.rates::<true, true, N>(x, &at, balance)
+    }
+
+    /// Derivative of the rates by differences about a state.
+    fn slopes<const N: usize>(
+        &self,
+        tick: &Tick,
+        drive: &Course<T>,
+        about: &[T; N],
+        part: f64,
+    ) -> Slopes<T, N> {
+        let mut balance = Balance::default();
+        let here = self.rates_at(tick, drive, about, part, &mut balance);
+        let mut difference = |moves: &dyn Fn(usize) -> bool, least: f64| {
+            let by =
+                each::<T, N>(|i| T::from(if moves(i) { 1e-6 * about[i].re().abs().max(least) } else { 0.0 }));
+            let moved: [T; N] = each(|i| about[i] + by[i]);
+            (by, self.rates_at(tick, drive, &moved, part, &mut balance))
+        };
+        let mut column = |place: usize, least: f64| -> [T; N] {
+            let (by, there) = difference(&|i| i == place, least);
+            each(|i| (there[i] - here[i]) / by[place])
+        };
+        let (by_speed, by_flow) = (column(SPEED, 1.0), column(FLOW, 0.1));
+        // The others all at once: what they do to each other is left to be followed.
+        let (by, there) = difference(&|i| i > ANGLE, 0.1);
+        let mut by_itself: [T; N] = each(|i| if i > ANGLE { (there[i] - here[i]) / by[i] } else { T::ZERO });
+        for slope in &mut by_itself {
+            *slope = slope.min(T::ZERO);
+        }
+        Slopes { by_speed, by_flow, by_itself }
+    }
+}
+
+impl<T: Real, const N: usize> Slopes<T, N> {
+    /// One linearly implicit step, with dry friction at its end: `(1 - h J) (x1 - x) = h x'`.
+    fn advance(&self, x: &[T; N], rates: &[T; N], step_s: f64, rub: Rub<T>, imposed: bool) -> [T; N] {
+        // Only what decays is taken implicitly; what grows is left to be followed.
+        let (ww, vv) = (self.by_speed[SPEED].min(T::ZERO), self.by_flow[FLOW].min(T::ZERO));
+        let (vw, mut wv) = (self.by_speed[FLOW], self.by_flow[SPEED]);
+        if ww * vv <= wv * vw {
+            wv = T::ZERO;
+        }
+        let (a, d) = (T::ONE - ww * step_s, T::ONE - vv * step_s);
+        let det = a * d - wv * vw * (step_s * step_s);
+        let mut next = *x;
+        let mut speed_by = T::ZERO;
+        if !imposed {
+            speed_by = (d * rates[SPEED] + wv * rates[FLOW] * step_s) / det * step_s;
+            // The friction's torque meets the same resistance as any other.
+            let slowed = rub.slow(x[SPEED] + speed_by, d / det * step_s);
+            speed_by = slowed - x[SPEED];
+            next[SPEED] = slowed;
+        }
+        let flow_by = (rates[FLOW] + vw * speed_by) / d * step_s;
+        next[FLOW] = x[FLOW] + flow_by;
+        for i in ANGLE..N {
+            let pushed = rates[i] + self.by_speed[i] * speed_by + self.by_flow[i] * flow_by;
+            next[i] = x[i] + pushed / (T::ONE - self.by_itself[i] * step_s) * step_s;
+        }
+        next
+    }
+}
