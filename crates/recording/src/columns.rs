@@ -1,17 +1,8 @@
 //! The columns kort knows, as the recording contract names them.
 
-/// What a column is to a model.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Role {
-    /// The log instant.
-    Time,
-    /// What was asked for; drives a model.
-    Command,
-    /// What was measured of the thruster; a model's response, and in part able to drive it.
-    Measured,
-    /// What surrounds the thruster.
-    Environment,
-}
+use kort_proto::signals::SIGNALS;
+
+use crate::units;
 
 /// One known column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,39 +11,26 @@ pub struct Known {
     pub name: &'static str,
     /// Unit for display.
     pub unit: &'static str,
-    /// What it is to a model.
-    pub role: Role,
     /// Meaning and sign.
     pub meaning: &'static str,
 }
 
-const fn known(name: &'static str, unit: &'static str, role: Role, meaning: &'static str) -> Known {
-    Known { name, unit, role, meaning }
+/// The one column that is no signal.
+const TIME: Known = Known { name: "time_s", unit: "s", meaning: "Log instant, strictly increasing." };
+
+/// Every known column: the time, then the one table of signals, in its order.
+pub fn known() -> impl Iterator<Item = Known> {
+    let signals = SIGNALS.iter().map(|signal| Known {
+        name: signal.name,
+        unit: units::of_column(signal.name).map_or(signal.unit, |unit| unit.symbol),
+        meaning: signal.meaning,
+    });
+    std::iter::once(TIME).chain(signals)
 }
 
-/// Every known column; positive means ahead.
-pub const KNOWN: &[Known] = &[
-    known("time_s", "s", Role::Time, "log instant, strictly increasing"),
-    known("current_cmd_a", "A", Role::Command, "commanded motor current"),
-    known("current_a", "A", Role::Measured, "measured motor current"),
-    known("voltage_cmd_v", "V", Role::Command, "commanded motor voltage"),
-    known("duty_cmd", "1", Role::Command, "commanded duty, -1 to 1 of the supply"),
-    known("speed_cmd_rad_s", "rad/s", Role::Command, "commanded shaft speed"),
-    known("thrust_cmd_n", "N", Role::Command, "commanded thrust"),
-    known("shaft_angle_rad", "rad", Role::Measured, "shaft angle, unwrapped"),
-    known("shaft_speed_rad_s", "rad/s", Role::Measured, "shaft speed"),
-    known("thrust_n", "N", Role::Measured, "measured thrust"),
-    known("torque_n_m", "N m", Role::Measured, "propeller torque, positive against positive shaft speed"),
-    known("flow_m_s", "m/s", Role::Measured, "axial flow through the propeller"),
-    known("ambient_m_s", "m/s", Role::Environment, "flow past the thruster far ahead of it"),
-    known("supply_v", "V", Role::Environment, "supply voltage at the drive"),
-    known("temperature_c", "C", Role::Environment, "temperature of motor or water, degrees Celsius"),
-    known("depth_m", "m", Role::Environment, "depth of the propeller below the surface"),
-];
-
 /// The known column of this name.
-pub fn find(name: &str) -> Option<&'static Known> {
-    KNOWN.iter().find(|k| k.name == name)
+pub fn find(name: &str) -> Option<Known> {
+    known().find(|k| k.name == name)
 }
 
 /// Words for a quantity that mean nothing without a unit.
@@ -66,12 +44,12 @@ const BARE_WORDS: &[&str] = &[
 ///
 /// `thrust`, `shaft_speed_rpm` and `voltage` are such names; `valve_open` and `humidity_percent`
 /// are not: they are kept as unknown columns.
-pub fn unit_missing(name: &str) -> Option<Option<&'static Known>> {
+pub fn unit_missing(name: &str) -> Option<Option<Known>> {
     let name = name.trim().to_lowercase();
-    let stem = crate::units::split_suffix(&name).map_or(name.as_str(), |(stem, _)| stem);
-    let stem_of = |k: &Known| crate::units::split_suffix(k.name).map_or(k.name, |(s, _)| s);
-    let fits = |k: &&Known| stem_of(k) == stem || stem_of(k) == name;
-    if let Some(k) = KNOWN.iter().find(fits) {
+    let stem = units::split_suffix(&name).map_or(name.as_str(), |(stem, _)| stem);
+    let stem_of = |k: &Known| units::split_suffix(k.name).map_or(k.name, |(s, _)| s);
+    let fits = |k: &Known| stem_of(k) == stem || stem_of(k) == name;
+    if let Some(k) = known().find(fits) {
         return (k.name != name).then_some(Some(k));
     }
     let bare = BARE_WORDS.contains(&name.as_str());
@@ -112,15 +90,19 @@ mod tests {
         {
             assert!(unit_missing(other).is_none(), "{other}");
         }
-        for ours in KNOWN {
+        for ours in known() {
             assert!(unit_missing(ours.name).is_none(), "{}", ours.name);
         }
     }
 
     #[test]
     fn every_known_name_ends_in_its_unit() {
-        for k in KNOWN.iter().filter(|k| k.unit != "1") {
-            assert_eq!(crate::units::of_column(k.name).unwrap().symbol, k.unit, "{}", k.name);
+        for k in known().filter(|k| k.unit != "1") {
+            assert_eq!(units::of_column(k.name).unwrap().symbol, k.unit, "{}", k.name);
+        }
+        // The table of signals spells Celsius out; every other unit is the same symbol.
+        for s in SIGNALS.iter().filter(|s| s.name != "temperature_c") {
+            assert_eq!(find(s.name).unwrap().unit, s.unit, "{}", s.name);
         }
     }
 }

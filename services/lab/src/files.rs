@@ -4,40 +4,48 @@ use std::path::{Path, PathBuf};
 
 use kort_recording::{ColumnMap, Recording};
 use kort_thruster::rig::Rig;
+use rust_embed::Embed;
 
 use crate::failure::{Failure, read_text};
 use crate::progress;
 
-macro_rules! shipped {
-    ($($name:literal: $file:literal),* $(,)?) => { &[$(($name, include_str!(concat!("../../../", $file)))),*] };
+/// Rigs built in, so that the program needs no folder beside it.
+#[derive(Embed)]
+#[folder = "../../config/thrusters"]
+struct Rigs;
+
+/// Scenarios built in, those of `kort simulate` and of `kort soak` alike.
+#[derive(Embed)]
+#[folder = "../../config/scenarios"]
+struct Scenarios;
+
+/// Scenarios of `kort soak` have this before their name.
+pub const SOAK: &str = "soak-";
+
+/// Names of what is built in, without ending.
+fn names<E: Embed>() -> Vec<String> {
+    let mut names: Vec<String> =
+        E::iter().filter_map(|file| file.strip_suffix(".toml").map(str::to_owned)).collect();
+    names.sort();
+    names
 }
 
-/// Rigs built in, so that the program needs no folder beside it.
-const RIGS: &[(&str, &str)] = shipped![
-    "t200": "config/thrusters/t200.toml",
-    "whitcomb-yoerger-1999": "config/thrusters/whitcomb-yoerger-1999.toml",
-];
+/// Names of the rigs built in.
+pub fn rigs() -> Vec<String> {
+    names::<Rigs>()
+}
 
-/// Scenarios of `kort simulate` built in.
-pub const SCENARIOS: &[(&str, &str)] = shipped![
-    "chirp": "config/scenarios/chirp.toml",
-    "identification-prbs": "config/scenarios/identification-prbs.toml",
-    "identification-random-levels": "config/scenarios/identification-random-levels.toml",
-    "joystick-replay": "config/scenarios/joystick-replay.toml",
-    "multisine": "config/scenarios/multisine.toml",
-    "slow-reversal-ramp": "config/scenarios/slow-reversal-ramp.toml",
-    "staircase": "config/scenarios/staircase.toml",
-    "torque-step-9.2": "config/scenarios/torque-step-9.2.toml",
-    "torque-steps-18": "config/scenarios/torque-steps-18.toml",
-    "tow": "config/scenarios/tow.toml",
-];
+/// Names of the scenarios of `kort soak` built in.
+pub fn soak_scenarios() -> Vec<String> {
+    names::<Scenarios>().into_iter().filter(|name| name.starts_with(SOAK)).collect()
+}
 
 /// Recordings built in, for replays.
 const RECORDINGS: &[(&str, &[u8])] =
     &[("vortex-auv-pool-heave-1", include_bytes!("../../../tests/recordings/vortex-auv-pool-heave-1.csv"))];
 
 /// A text by path, else in `folder` by name, else built in.
-fn text_of(wanted: &Path, folder: &str, what: &str, shipped: &[(&str, &str)]) -> Result<String, Failure> {
+fn text_of<E: Embed>(wanted: &Path, folder: &str, what: &str, offered: &[String]) -> Result<String, Failure> {
     if wanted.is_file() {
         return read_text(wanted);
     }
@@ -46,17 +54,16 @@ fn text_of(wanted: &Path, folder: &str, what: &str, shipped: &[(&str, &str)]) ->
     if wanted.components().count() == 1 && named.is_file() {
         return read_text(&named);
     }
-    if let Some((_, text)) = shipped.iter().find(|(n, _)| *n == name) {
-        return Ok((*text).to_string());
+    if let Some(text) = E::get(&format!("{name}.toml")) {
+        return Ok(String::from_utf8_lossy(&text.data).into_owned());
     }
-    let names: Vec<&str> = shipped.iter().map(|(n, _)| *n).collect();
-    let hint = match kort_recording::columns::nearest(&name, names.iter().copied()) {
+    let hint = match kort_recording::columns::nearest(&name, offered.iter().map(String::as_str)) {
         Some(near) => format!("did you mean `{near}`? "),
         None => String::new(),
     };
     Err(Failure::input(format!(
         "{name}: there is no such {what}, neither as a file nor by name\nhint: {hint}shipped: {}",
-        names.join(", ")
+        offered.join(", ")
     )))
 }
 
@@ -73,15 +80,25 @@ pub fn read_rig(wanted: &Path) -> Result<Rig, Failure> {
 /// # Errors
 /// There is no such file or rig.
 pub fn rig_text(wanted: &Path) -> Result<String, Failure> {
-    text_of(wanted, "config/thrusters", "rig description", RIGS)
+    text_of::<Rigs>(wanted, "config/thrusters", "rig description", &rigs())
 }
 
-/// A scenario's text by path or name.
+/// The text of a scenario of `kort simulate`, by path or name.
 ///
 /// # Errors
 /// There is no such file or scenario.
 pub fn scenario_text(wanted: &Path) -> Result<String, Failure> {
-    text_of(wanted, "config/scenarios", "scenario", SCENARIOS)
+    let offered: Vec<String> =
+        names::<Scenarios>().into_iter().filter(|name| !name.starts_with(SOAK)).collect();
+    text_of::<Scenarios>(wanted, "config/scenarios", "scenario", &offered)
+}
+
+/// The text of a scenario of `kort soak`, by path or name.
+///
+/// # Errors
+/// There is no such file or scenario.
+pub fn soak_scenario_text(wanted: &Path) -> Result<String, Failure> {
+    text_of::<Scenarios>(wanted, "config/scenarios", "soak scenario", &soak_scenarios())
 }
 
 /// A column map by path or name; `None` stays `None`.

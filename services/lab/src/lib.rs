@@ -10,7 +10,6 @@ pub mod fitted_rig;
 pub mod input;
 pub mod progress;
 pub mod render;
-pub mod reproduce;
 pub mod soak;
 
 pub use commands::Command;

@@ -7,8 +7,8 @@ use maud::html;
 use serde::Serialize;
 
 use crate::failure::{Failure, Outcome, print, print_json, write_text};
-use crate::render::{Page, number, table};
-use crate::reproduce::{self, Part, Row, Shown, Verdict};
+use crate::render::{Chart, Mark, Page, Series, number, table};
+use kort_reproduce::{Figure, Part, Row, Shown, Verdict};
 
 const EXAMPLE: &str = "\
 Example: kort reproduce --html reproduce.html
@@ -42,7 +42,7 @@ struct Document<'a> {
 /// # Errors
 /// The page cannot be written.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
-    let parts = reproduce::all(args.seed).map_err(Failure::failed)?;
+    let parts = kort_reproduce::all(args.seed).map_err(Failure::failed)?;
     if let Some(path) = &args.html {
         write_text(path, &page(&parts, args.seed))?;
         eprintln!("page: {}", path.display());
@@ -136,9 +136,20 @@ fn page(parts: &[Part], seed: u64) -> String {
             html! {
                 p { (part.text) }
                 (table(&["what", "printed", "ours", "deviation", "verdict", "note"], &rows))
-                @for chart in &part.charts { (chart.draw()) }
+                @for figure in &part.figures { (chart(figure).draw()) }
             },
         );
     }
     page.into_html()
+}
+
+fn chart(figure: &Figure) -> Chart {
+    figure.series.iter().fold(Chart::new(&figure.caption, &figure.x, &figure.y), |chart, s| {
+        let mark = match s.mark {
+            kort_reproduce::Mark::Line => Mark::Line,
+            kort_reproduce::Mark::Dashed => Mark::Dashed,
+            kort_reproduce::Mark::Dots => Mark::Dots,
+        };
+        chart.with(Series { name: s.name.clone(), mark, points: s.points.clone() })
+    })
 }

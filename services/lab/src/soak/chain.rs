@@ -9,6 +9,7 @@ use kort_proto::messages::{Command, DriveKind, Header, Request, RequestKind, Set
 use kort_proto::signals::Signals;
 use kort_servo::settings::{Limits, Settings};
 use kort_servo::tick::{Inputs, Servo};
+use kort_soak::{Chain, Driven};
 use kort_thruster::rig::{AmplifierKind, Rig};
 
 /// Virtual time starts here, ns: sessions are told apart by when they began.
@@ -17,7 +18,7 @@ const START_NS: u64 = 1_000_000_000;
 const OPERATOR_S: f64 = 0.5;
 
 /// Controller, servo and operator of one thruster.
-pub struct Chain {
+pub struct ProductionChain {
     rig: Rig,
     config: ControllerConfig,
     period_ns: u64,
@@ -36,21 +37,9 @@ pub struct Chain {
     was_armed: bool,
 }
 
-/// What the drive gets at one tick.
-#[derive(Clone, Copy, Debug)]
-pub struct Driven {
-    /// Command in the amplifier's unit; zero while not armed.
-    pub command: f64,
-    /// The output stage is on.
-    pub armed: bool,
-}
-
-impl Chain {
+impl Chain for ProductionChain {
     /// At rest, not yet armed: the operator arms in the first ticks.
-    ///
-    /// # Errors
-    /// [`ModelError`] if the rig has no propeller.
-    pub fn new(rig: &Rig, config: &ControllerConfig, period_s: f64) -> Result<Self, ModelError> {
+    fn start(rig: &Rig, config: &ControllerConfig, period_s: f64) -> Result<Self, ModelError> {
         let period_ns = (period_s * 1e9).round() as u64;
         let controller = Tick::new(rig, config, period_ns, START_NS)?;
         let servo = Servo::new(settings(rig, controller.controller(), period_ns), START_NS);
@@ -72,31 +61,26 @@ impl Chain {
         })
     }
 
-    /// The law with its observer and estimator.
-    pub fn controller(&self) -> &Controller {
+    fn controller(&self) -> &Controller {
         self.controller.controller()
     }
 
-    /// The last output of the controller.
-    pub fn output(&self) -> &Output {
+    fn output(&self) -> &Output {
         self.controller.output()
     }
 
-    /// How often the servo has gone off by itself.
-    pub fn trips(&self) -> u32 {
+    fn trips(&self) -> u32 {
         self.trips
     }
 
-    /// The controller process came up afresh: nothing of the old one is left.
-    pub fn restart(&mut self) {
+    fn restart(&mut self) {
         if let Ok(fresh) = Tick::new(&self.rig, &self.config, self.period_ns, self.now_ns) {
             self.controller = fresh;
             self.controller_session = self.now_ns;
         }
     }
 
-    /// One tick of both; `alive` says whether the controller ticks at all.
-    pub fn tick(&mut self, measured: &Signals, thrust_n: f64, alive: bool) -> Driven {
+    fn tick(&mut self, measured: &Signals, thrust_n: f64, alive: bool) -> Driven {
         self.now_ns += self.period_ns;
         self.sequence += 1;
         let now = self.now_ns;
@@ -120,7 +104,9 @@ impl Chain {
         }
         Driven { command: drive.unwrap_or(0.0), armed: drive.is_some() }
     }
+}
 
+impl ProductionChain {
     fn header(&self, session: u64) -> Header {
         Header { sequence: self.sequence, stamp_ns: self.now_ns, session }
     }
@@ -207,9 +193,9 @@ mod tests {
     #[test]
     fn a_constant_setpoint_counts_after_every_arming() {
         let rig = Rig::from_toml(RIG).unwrap();
-        let mut chain = Chain::new(&rig, &ControllerConfig::default(), 1e-3).unwrap();
+        let mut chain = ProductionChain::start(&rig, &ControllerConfig::default(), 1e-3).unwrap();
         let still = Signals { shaft_speed_rad_s: 0.0, current_a: 0.0, ..Signals::UNKNOWN };
-        let drives = |chain: &mut Chain, ticks: u32| {
+        let drives = |chain: &mut ProductionChain, ticks: u32| {
             (0..ticks).map(|_| chain.tick(&still, 50.0, true).command).fold(0.0, f64::max)
         };
         assert!(drives(&mut chain, 20) > 1.0);

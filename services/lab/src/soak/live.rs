@@ -8,17 +8,14 @@ use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
 use kort_control::{ControllerConfig, TUNABLES};
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
 use thiserror::Error;
 use tokio_tungstenite::tungstenite::stream::MaybeTlsStream;
 use tokio_tungstenite::tungstenite::{self, Message, WebSocket};
 
-use super::reference::Player;
-use super::report::{LawResult, Report, ScenarioResult};
-use super::score::{Outcome, Sample, Tally};
-use super::{Loaded, Watch};
+use kort_soak::{LawResult, Outcome, Player, Sample, ScenarioResult, Tally};
+
+use super::{Loaded, Report, Watch};
 
 /// States a second, and how often the reference is looked at.
 const RATE_HZ: f64 = 50.0;
@@ -105,9 +102,7 @@ fn drive(
     seed: u64,
     progress: &dyn Fn(f64, f64, f64),
 ) -> Result<Outcome, LiveError> {
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    random.set_stream(1);
-    let mut player = Player::new(&l.scenario.references, &l.replayed, random);
+    let mut player = Player::new(&l.scenario.references, &l.replayed, kort_soak::stream(seed, 1));
     let dt = 1.0 / RATE_HZ;
     let mut tally = Tally::new(dt, &l.rig, l.thrust_max_n, l.scenario.settle_s);
     let mut stream = service.stream()?;

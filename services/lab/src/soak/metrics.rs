@@ -13,7 +13,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use prometheus::{GaugeVec, Opts, Registry, TextEncoder};
 use thiserror::Error;
 
-use super::report::LawResult;
+use kort_soak::LawResult;
 
 /// Why metrics cannot be served.
 #[derive(Debug, Error)]

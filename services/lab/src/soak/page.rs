@@ -2,8 +2,9 @@
 
 use maud::{Markup, html};
 
-use super::report::{LawResult, OF_PLAIN, Report, ScenarioResult};
-use super::score::{Point, SCORES, Score};
+use kort_soak::{LawResult, OF_PLAIN, Point, SCORES, ScenarioResult, Score};
+
+use super::Report;
 use crate::render::{Chart, Mark, Page, Series, facts, note, number, table};
 
 /// The page.

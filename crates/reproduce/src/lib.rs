@@ -5,6 +5,7 @@
 //! models, the composed plant or a fit. Where the print and its own equations disagree, both are
 //! shown and nothing is tuned.
 
+mod figure;
 mod identification;
 mod servo;
 mod steady;
@@ -14,10 +15,10 @@ use kort_thruster::parameters::Parameters;
 use kort_thruster::rig::{Rig, RigError};
 use serde::Serialize;
 
-use crate::render::Chart;
+pub use figure::{Figure, Mark, Series};
 
 /// The stand's description, as shipped.
-const STAND: &str = include_str!("../../../../config/thrusters/whitcomb-yoerger-1999.toml");
+const STAND: &str = include_str!("../../../config/thrusters/whitcomb-yoerger-1999.toml");
 
 /// A value in a table: a number, words, or nothing.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -125,7 +126,7 @@ pub struct Part {
     /// Values.
     pub rows: Vec<Row>,
     /// Plots.
-    pub charts: Vec<Chart>,
+    pub figures: Vec<Figure>,
 }
 
 /// The stand with its stated parameters.
@@ -174,7 +175,7 @@ fn rise_s(t: &[f64], y: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use crate::*;
 
     #[test]
     fn every_row_is_finite_and_named_once() {

@@ -3,16 +3,16 @@
 use kort_thruster::models::{DriveInput, Model, Model2};
 use kort_thruster::parameters::Parameter as P;
 
-use super::{Paper, Part, Row};
-use crate::render::{Chart, Mark, Series};
+use crate::figure::{Figure, Mark, Series};
+use crate::{Paper, Part, Row};
 
 /// Printed in (18)-(20): N s^2, N m s^2, N per N m.
-pub(super) const EQ18: f64 = 0.0375;
-pub(super) const EQ19: f64 = 0.00232;
-pub(super) const EQ20: f64 = 16.1;
+pub(crate) const EQ18: f64 = 0.0375;
+pub(crate) const EQ19: f64 = 0.00232;
+pub(crate) const EQ20: f64 = 16.1;
 /// Largest torque of the experiment, N m, and its levels on one side.
-pub(super) const LARGEST_TORQUE_N_M: f64 = 11.0;
-pub(super) const LEVELS: usize = 9;
+pub(crate) const LARGEST_TORQUE_N_M: f64 = 11.0;
+pub(crate) const LEVELS: usize = 9;
 
 /// One steady level in bollard pull.
 struct Level {
@@ -45,14 +45,14 @@ fn slope(x: &[f64], y: &[f64]) -> f64 {
     dot(x, y) / dot(x, x)
 }
 
-pub(super) fn relations(paper: &Paper) -> Part {
+pub(crate) fn relations(paper: &Paper) -> Part {
     let levels = levels(&Model2::new(&paper.parameters));
     let column = |f: fn(&Level) -> f64| levels.iter().map(f).collect::<Vec<_>>();
     let (thrust, torque) = (column(|l| l.thrust_n), column(|l| l.torque_n_m));
     let square = column(|l| l.speed_rad_s * l.speed_rad_s);
     let printed = |x: &[f64], c: f64| x.iter().map(|x| c * x).collect::<Vec<_>>();
-    let chart = |caption: &str, x_name: &str, y_name: &str, x: &[f64], y: &[f64], c: f64| {
-        Chart::new(caption, x_name, y_name)
+    let figure = |caption: &str, x_name: &str, y_name: &str, x: &[f64], y: &[f64], c: f64| {
+        Figure::new(caption, x_name, y_name)
             .with(Series::new("printed fit", Mark::Dashed, x, &printed(x, c)))
             .with(Series::new("Model 2, steady", Mark::Dots, x, y))
     };
@@ -74,22 +74,22 @@ pub(super) fn relations(paper: &Paper) -> Part {
                 "The three printed slopes agree among themselves.",
             ),
         ],
-        charts: vec![
-            chart("Thrust over speed squared, (18)", "speed squared [rad^2/s^2]", "thrust [N]", &square, &thrust, EQ18),
-            chart("Torque over speed squared, (19)", "speed squared [rad^2/s^2]", "torque [N m]", &square, &torque, EQ19),
-            chart("Thrust over torque, (20)", "torque [N m]", "thrust [N]", &torque, &thrust, EQ20),
+        figures: vec![
+            figure("Thrust over speed squared, (18)", "speed squared [rad^2/s^2]", "thrust [N]", &square, &thrust, EQ18),
+            figure("Torque over speed squared, (19)", "speed squared [rad^2/s^2]", "torque [N m]", &square, &torque, EQ19),
+            figure("Thrust over torque, (20)", "torque [N m]", "thrust [N]", &torque, &thrust, EQ20),
         ],
     }
 }
 
 /// `eta` of Model 1 from (18), through (7).
-pub(super) fn efficiency_from_thrust(paper: &Paper, thrust_over_square: f64) -> f64 {
+pub(crate) fn efficiency_from_thrust(paper: &Paper, thrust_over_square: f64) -> f64 {
     let p = &paper.parameters;
     let slip = p.get(P::RadiusM) * p.get(P::PitchRad).tan();
     (thrust_over_square / (p.get(P::DensityKgM3) * p.area_m2())).sqrt() / slip
 }
 
-pub(super) fn efficiencies(paper: &Paper) -> Part {
+pub(crate) fn efficiencies(paper: &Paper) -> Part {
     let p = &paper.parameters;
     let slip = p.get(P::RadiusM) * p.get(P::PitchRad).tan();
     // Fixed point of (9): Q = rho a / 2 (eta r tan p)^3 Om|Om|.
@@ -134,11 +134,11 @@ pub(super) fn efficiencies(paper: &Paper) -> Part {
                 "Same conclusion.",
             ),
         ],
-        charts: vec![],
+        figures: vec![],
     }
 }
 
-pub(super) fn attack(paper: &Paper) -> Part {
+pub(crate) fn attack(paper: &Paper) -> Part {
     let model = Model2::new(&paper.parameters);
     let blade = paper.parameters.blade();
     let levels = levels(&model);
@@ -197,8 +197,8 @@ pub(super) fn attack(paper: &Paper) -> Part {
                 "Every term is quadratic, so bollard pull has one steady angle at every level.",
             ),
         ],
-        charts: vec![
-            Chart::new("Steady angles over steady thrust", "thrust [N]", "angle [rad]")
+        figures: vec![
+            Figure::new("Steady angles over steady thrust", "thrust [N]", "angle [rad]")
                 .with(Series::new("printed, about 0.21", Mark::Dashed, &thrust, &vec![0.21; thrust.len()]))
                 .with(Series::new("angle of attack, Model 2", Mark::Dots, &thrust, &column(|a| a.1)))
                 .with(Series::new("inflow angle, Model 2", Mark::Dots, &thrust, &column(|a| a.2))),

@@ -4,7 +4,7 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::scenario::Segment;
+use crate::scenario::Segment;
 
 /// A recorded column, ready to be replayed: times from zero, shares of the largest thrust.
 #[derive(Clone, Debug, Default)]

@@ -7,9 +7,9 @@ use kort_thruster::parameters::{Parameter as P, Parameters};
 use kort_thruster::plant::{Plant, Tick};
 use kort_thruster::rig::{Quantity, Sensors};
 
-use super::steady::{EQ18, EQ19, EQ20, LARGEST_TORQUE_N_M, efficiency_from_thrust};
-use super::{Paper, Part, Row, overshoot_pct, rise_s, settled};
-use crate::render::{Chart, Mark, Series};
+use crate::figure::{Figure, Mark, Series};
+use crate::steady::{EQ18, EQ19, EQ20, LARGEST_TORQUE_N_M, efficiency_from_thrust};
+use crate::{Paper, Part, Row, overshoot_pct, rise_s, settled};
 
 /// Figure 4's step, N m.
 const STEP_N_M: f64 = 9.2;
@@ -55,7 +55,7 @@ fn model1(paper: &Paper) -> Model1 {
     Model1::new(&p)
 }
 
-pub(super) fn one_step(paper: &Paper) -> Part {
+pub(crate) fn one_step(paper: &Paper) -> Part {
     let one = Response::of(&model1(paper), STEP_N_M, 4.0);
     let two = Response::of(&Model2::new(&paper.parameters), STEP_N_M, 4.0);
     let none = |x: f64| x < 0.1;
@@ -72,7 +72,7 @@ pub(super) fn one_step(paper: &Paper) -> Part {
     };
     let structural = "The simulation is reproduced; the recorded overshoot is what the model lacks.";
     let shown = |f: fn(&Response) -> &Vec<f64>, y: &str, caption: &str| {
-        Chart::new(caption, "time after the step [s]", y)
+        Figure::new(caption, "time after the step [s]", y)
             .with(Series::new("Model 1", Mark::Dashed, &one.time_s[..1500], &f(&one)[..1500]))
             .with(Series::new("Model 2", Mark::Line, &two.time_s[..1500], &f(&two)[..1500]))
     };
@@ -123,14 +123,14 @@ pub(super) fn one_step(paper: &Paper) -> Part {
                 "Printed as a curve only.",
             ),
         ],
-        charts: vec![
+        figures: vec![
             shown(|r| &r.thrust_n, "thrust [N]", "Thrust after a 9.2 N m step"),
             shown(|r| &r.speed_rad_s, "shaft speed [rad/s]", "Shaft speed after a 9.2 N m step"),
         ],
     }
 }
 
-pub(super) fn eighteen_steps(paper: &Paper) -> Part {
+pub(crate) fn eighteen_steps(paper: &Paper) -> Part {
     let torques: Vec<f64> = (0..18).map(|i| LARGEST_TORQUE_N_M * (1.0 - 2.0 * f64::from(i) / 17.0)).collect();
     let two: Vec<Response> =
         torques.iter().map(|q| Response::of(&Model2::new(&paper.parameters), *q, 6.0)).collect();
@@ -147,8 +147,8 @@ pub(super) fn eighteen_steps(paper: &Paper) -> Part {
         .map(|(q, r)| 100.0 * (settled(&r.thrust_n) / (EQ20 * q) - 1.0))
         .fold(0.0_f64, |a, b| if b.abs() > a.abs() { b } else { a });
     let fan = |runs: &[Response], f: fn(&Response) -> &Vec<f64>, caption: &str, y: &str| {
-        runs.iter().fold(Chart::new(caption, "time after the step [s]", y), |chart, r| {
-            chart.with(Series::new("", Mark::Line, &r.time_s[..3000], &f(r)[..3000]))
+        runs.iter().fold(Figure::new(caption, "time after the step [s]", y), |figure, r| {
+            figure.with(Series::new("", Mark::Line, &r.time_s[..3000], &f(r)[..3000]))
         })
     };
     let overshoot = |id, what: &str, over: f64| {
@@ -215,7 +215,7 @@ pub(super) fn eighteen_steps(paper: &Paper) -> Part {
                 "As in Model 2: the swirl's terms are quadratic too.",
             ),
         ],
-        charts: vec![
+        figures: vec![
             fan(&one, |r| &r.thrust_n, "Model 1, thrust, 18 steps (Figure 5, top right)", "thrust [N]"),
             fan(&one, |r| &r.speed_rad_s, "Model 1, shaft speed, 18 steps (Figure 5, bottom right)", "shaft speed [rad/s]"),
             fan(&two, |r| &r.thrust_n, "Model 2, thrust, 18 steps (Figure 6, top right)", "thrust [N]"),
@@ -289,7 +289,7 @@ fn plant_step(
     out
 }
 
-pub(super) fn overshoot(paper: &Paper) -> Part {
+pub(crate) fn overshoot(paper: &Paper) -> Part {
     let run = |name, swirl, profile_drag| {
         let p = refitted(paper, swirl, profile_drag);
         plant_step(paper, name, &p, profile_drag, STEP_N_M)
@@ -317,7 +317,7 @@ pub(super) fn overshoot(paper: &Paper) -> Part {
         ("rotational flow + profile drag", &both),
     ];
     let shown = |f: fn(&Response) -> &Vec<f64>, y: &str, caption: &str| {
-        cases.iter().fold(Chart::new(caption, "time after the step [s]", y), |c, (name, r)| {
+        cases.iter().fold(Figure::new(caption, "time after the step [s]", y), |c, (name, r)| {
             c.with(Series::new(*name, Mark::Line, &r.time_s[..1200], &f(r)[..1200]))
         })
     };
@@ -363,7 +363,7 @@ pub(super) fn overshoot(paper: &Paper) -> Part {
                 "Their sizes cannot be held against the recordings, which are not printed as numbers.",
             ),
         ],
-        charts: vec![
+        figures: vec![
             shown(|r| &r.thrust_n, "thrust [N]", "Thrust: what each omission does"),
             shown(|r| &r.speed_rad_s, "shaft speed [rad/s]", "Shaft speed: what each omission does"),
         ],

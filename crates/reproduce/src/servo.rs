@@ -9,9 +9,9 @@ use kort_thruster::models::{Model, Model3, ModelName, SpeedInput};
 use kort_thruster::parameters::Parameter as P;
 use kort_thruster::plant::{Plant, Tick};
 
-use super::steady::{EQ18, EQ20};
-use super::{Paper, Part, Row, settled};
-use crate::render::{Chart, Mark, Series};
+use crate::figure::{Figure, Mark, Series};
+use crate::steady::{EQ18, EQ20};
+use crate::{Paper, Part, Row, settled};
 
 /// Feedback gain, N m s: about 55 degrees of phase left behind the 10 ms filter and the 2 ms lag.
 const FEEDBACK_NM_S: f64 = 0.5;
@@ -79,7 +79,7 @@ fn difference_pct(a: &[f64], b: &[f64], from: usize) -> f64 {
     100.0 * (square / (a.len() - from) as f64).sqrt() / peak
 }
 
-pub(super) fn part(paper: &Paper) -> Part {
+pub(crate) fn part(paper: &Paper) -> Part {
     let step_at = 1.0;
     let step = run(paper, 4.0, 1.0, |t| if t < step_at { 0.0 } else { PEAK_RAD_S });
     let sine = |hz: f64| move |t: f64| PEAK_RAD_S * (std::f64::consts::TAU * hz * t).sin();
@@ -114,13 +114,13 @@ pub(super) fn part(paper: &Paper) -> Part {
     };
     let peak = step.model3_n.iter().copied().fold(0.0, f64::max);
     let seen = step.thrust_n.iter().copied().fold(0.0, f64::max);
-    let chart = |r: &Run, caption: &str| {
+    let figure = |r: &Run, caption: &str| {
         [
-            Chart::new(format!("{caption}: thrust"), "time [s]", "thrust [N]")
+            Figure::new(format!("{caption}: thrust"), "time [s]", "thrust [N]")
                 .with(Series::new("stand", Mark::Line, &r.time_s, &r.thrust_n))
                 .with(Series::new("Model 3, measured speed", Mark::Dashed, &r.time_s, &r.model3_measured_n))
                 .with(Series::new("Model 3, reference", Mark::Dashed, &r.time_s, &r.model3_n)),
-            Chart::new(format!("{caption}: shaft speed"), "time [s]", "shaft speed [rad/s]")
+            Figure::new(format!("{caption}: shaft speed"), "time [s]", "shaft speed [rad/s]")
                 .with(Series::new("measured", Mark::Line, &r.time_s, &r.measured_rad_s))
                 .with(Series::new("reference", Mark::Dashed, &r.time_s, &r.reference_rad_s)),
         ]
@@ -174,7 +174,7 @@ pub(super) fn part(paper: &Paper) -> Part {
                 "The printed sign is positive feedback; the runs above use kfb (Omr - Om).",
             ),
         ],
-        charts: [chart(&step, "60 rad/s step"), chart(&slow, "0.25 Hz"), chart(&fast, "1 Hz")]
+        figures: [figure(&step, "60 rad/s step"), figure(&slow, "0.25 Hz"), figure(&fast, "1 Hz")]
             .into_iter()
             .flatten()
             .collect(),

@@ -11,9 +11,9 @@ use nalgebra::{DMatrix, DVector};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::steady::{LARGEST_TORQUE_N_M, LEVELS};
-use super::{Paper, Part, Row};
-use crate::render::{Chart, Mark, Series};
+use crate::figure::{Figure, Mark, Series};
+use crate::steady::{LARGEST_TORQUE_N_M, LEVELS};
+use crate::{Paper, Part, Row};
 
 /// Repetitions of the experiment with new noise.
 const REPEATS: usize = 400;
@@ -151,10 +151,10 @@ fn statistics(values: &[f64]) -> (f64, f64) {
     (mean, (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt())
 }
 
-pub(super) fn part(paper: &Paper, seed: u64) -> Part {
+pub(crate) fn part(paper: &Paper, seed: u64) -> Part {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut rows = Vec::new();
-    let mut charts = Vec::new();
+    let mut figures = Vec::new();
     for (id, effect, words) in HIDDEN {
         let truth = levels(paper, effect);
         let fits: Vec<Fit> = (0..REPEATS).filter_map(|_| fit(paper, &with_noise(&truth, &mut rng))).collect();
@@ -173,8 +173,8 @@ pub(super) fn part(paper: &Paper, seed: u64) -> Part {
             rows.push(recovered("fig7_flux", "flux coefficient identified [1]", 1.86, &column(|f| f.flux)));
             let example = with_noise(&truth, &mut rng);
             let (x, y): (Vec<f64>, Vec<f64>) = example.iter().map(|l| (l.axial_m_s, l.thrust_n)).unzip();
-            charts.push(
-                Chart::new("One noisy set of nine levels", "axial flow [m/s]", "thrust [N]")
+            figures.push(
+                Figure::new("One noisy set of nine levels", "axial flow [m/s]", "thrust [N]")
                     .with(Series::new("levels", Mark::Dots, &x, &y)),
             );
         }
@@ -201,7 +201,7 @@ pub(super) fn part(paper: &Paper, seed: u64) -> Part {
                 "A load that seems to grow faster than the speed squared is taken up by a negative linear friction.",
             ),
             _ => Row {
-                verdict: super::Verdict::NotCheckable,
+                verdict: crate::Verdict::NotCheckable,
                 ..Row::words(
                     id,
                     &what,
@@ -222,6 +222,6 @@ pub(super) fn part(paper: &Paper, seed: u64) -> Part {
             100.0 * FLOW_SIGMA
         ),
         rows,
-        charts,
+        figures,
     }
 }

@@ -1,12 +1,10 @@
-//! Scores of one run, gathered tick by tick, and their summary over seeds.
+//! Scores of one run, gathered tick by tick.
 
 use std::collections::BTreeMap;
 
 use kort_thruster::rig::Rig;
-use serde::Serialize;
-use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use super::disc::Disc;
+use crate::disc::Disc;
 
 /// What one tick shows to the scores.
 #[derive(Clone, Copy, Debug, Default)]
@@ -371,41 +369,12 @@ impl Outcome {
     }
 }
 
-/// Mean and its interval over seeds.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Score {
-    /// Mean over seeds.
-    pub mean: f64,
-    /// 95 % interval of the mean (Student's t); both ends the mean with one seed.
-    pub ci95: [f64; 2],
-}
-
-/// Mean and 95 % interval of some values.
-pub fn summarise(values: &[f64]) -> Score {
-    let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    if values.len() < 2 {
-        return Score { mean, ci95: [mean, mean] };
-    }
-    let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
-    let t = StudentsT::new(0.0, 1.0, n - 1.0).map_or(1.96, |d| d.inverse_cdf(0.975));
-    let half = t * (variance / n).sqrt();
-    Score { mean, ci95: [mean - half, mean + half] }
-}
-
-/// Geometric mean and 95 % interval of ratios: of two laws on the same sea, seed by seed.
-pub fn summarise_ratios(values: &[f64]) -> Score {
-    let logs: Vec<f64> = values.iter().map(|v| v.ln()).collect();
-    let Score { mean, ci95: [low, high] } = summarise(&logs);
-    Score { mean: mean.exp(), ci95: [low.exp(), high.exp()] }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn tally(resistance_ohm: Option<f64>) -> Tally {
-        const RIG: &str = include_str!("../../../../config/thrusters/whitcomb-yoerger-1999.toml");
+        const RIG: &str = include_str!("../../../config/thrusters/whitcomb-yoerger-1999.toml");
         let mut tally = Tally::new(1e-3, &Rig::from_toml(RIG).unwrap(), 100.0, 0.0);
         tally.resistance_ohm = resistance_ohm;
         tally
@@ -440,14 +409,6 @@ mod tests {
     }
 
     #[test]
-    fn ratios_have_an_interval_above_zero() {
-        let s = summarise_ratios(&[0.5, 2.0]);
-        assert!(
-            (s.mean - 1.0).abs() < 1e-12 && s.ci95[0] > 0.0 && (s.ci95[0] * s.ci95[1] - 1.0).abs() < 1e-9
-        );
-    }
-
-    #[test]
     fn what_is_not_known_stays_so() {
         let mut tally = tally(None);
         tally.tick(&Sample { current_a: 3.0, ..sample(0.0, 10.0, 9.0) });
@@ -474,14 +435,5 @@ mod tests {
         assert!(!useful(30.0).contains_key("energy_per_impulse_j_n_s"));
         // 40 N on a disc of 0.0531 m2: T^1.5 / sqrt(2 rho A) = 24.57 W; 2.46 N m turn at 10 rad/s.
         assert!((useful(-40.0)["energy_over_ideal"] - 24.6 / 24.57).abs() < 2e-3);
-    }
-
-    #[test]
-    fn the_interval_is_students() {
-        let s = summarise(&[1.0, 2.0, 3.0]);
-        assert!(
-            (s.mean - 2.0).abs() < 1e-12 && (s.ci95[1] - 2.0 - 4.303 / 3f64.sqrt()).abs() < 1e-3,
-            "{s:?}"
-        );
     }
 }

@@ -5,24 +5,11 @@
 //! largest steady thrust of the rig, so that one scenario serves any thruster.
 
 use std::collections::{BTreeMap, HashMap};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use kort_thruster::models::ModelName;
 use kort_thruster::parameters::Parameter;
-use kort_thruster::rig::Rig;
-use kort_thruster::scenario;
 use serde::Deserialize;
-use thiserror::Error;
-
-/// Why a scenario cannot be run: the file and what is wrong in it.
-#[derive(Debug, Error)]
-#[error("{file}: {message}")]
-pub struct ScenarioError {
-    /// The scenario's file.
-    pub file: String,
-    /// What is wrong, with a hint.
-    pub message: String,
-}
 
 /// A scenario as written.
 #[derive(Clone, Debug, Deserialize)]
@@ -366,25 +353,20 @@ pub fn is_on(at_s: f64, for_s: f64, every_s: Option<f64>, time_s: f64) -> bool {
 }
 
 impl Scenario {
-    /// Reads and checks a scenario, and its rig.
+    /// A scenario from its text, checked.
     ///
     /// # Errors
-    /// [`ScenarioError`] names the file, the key, the value and what is allowed.
-    pub fn read(path: &Path) -> Result<(Self, Rig), ScenarioError> {
-        let error = |message: String| ScenarioError { file: path.display().to_string(), message };
-        let text = std::fs::read_to_string(path).map_err(|e| {
-            error(format!("{e}\nhint: scenarios shipped with kort are config/scenarios/soak-*.toml"))
-        })?;
-        let scenario: Self = scenario::from_toml(&text)
-            .map_err(|said| error(format!("{said}\nhint: docs/control.md lists every key")))?;
-        scenario.check().map_err(&error)?;
-        let rig_path = path.parent().unwrap_or(Path::new(".")).join(&scenario.rig);
-        let rig_error = |message: String| ScenarioError { file: rig_path.display().to_string(), message };
-        let text = std::fs::read_to_string(&rig_path).map_err(|e| {
-            rig_error(format!("{e}\nhint: `rig` in {} is taken relative to that file", path.display()))
-        })?;
-        let rig = Rig::from_toml(&text).map_err(|e| rig_error(e.to_string()))?;
-        Ok((scenario, rig))
+    /// Words that name the key, the value and what is allowed, with a hint.
+    pub fn from_toml(text: &str) -> Result<Self, String> {
+        let scenario: Self = kort_thruster::scenario::from_toml(text)
+            .map_err(|said| format!("{said}\nhint: docs/control.md lists every key"))?;
+        scenario.check()?;
+        Ok(scenario)
+    }
+
+    /// Virtual time that one law takes with one seed, s.
+    pub fn virtual_s(&self) -> f64 {
+        self.duration_s * if self.against_true_parameters { 2.0 } else { 1.0 }
     }
 }
 

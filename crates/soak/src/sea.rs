@@ -4,7 +4,7 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::scenario::{Ambient, Depth, Sag, is_on};
+use crate::scenario::{Ambient, Depth, Sag, is_on};
 
 /// Sinusoids that make a sea.
 const COMPONENTS: usize = 9;

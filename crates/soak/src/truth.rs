@@ -9,8 +9,8 @@ use kort_thruster::plant::Plant;
 use kort_thruster::rig::Rig;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::run::{Prepared, stream};
-use super::scenario::{EffectSpec, Scenario};
+use crate::run::{Prepared, stream};
+use crate::scenario::{EffectSpec, Scenario};
 
 /// The stated parameters, the scenario's factors, and a spread drawn from the seed.
 pub fn parameters(prepared: &Prepared, seed: u64) -> Parameters {

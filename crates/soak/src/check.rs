@@ -1,10 +1,10 @@
 //! Checks of a scenario's values: each message names the key, the value and what is allowed.
 
-use super::scenario::{Lie, Scenario, Segment};
+use crate::scenario::{Lie, Scenario, Segment};
 
 impl Scenario {
     /// Whether every value is one that can be meant.
-    pub(super) fn check(&self) -> Result<(), String> {
+    pub(crate) fn check(&self) -> Result<(), String> {
         let within = |key: &str, value: f64, low: f64, high: f64, hint: &str| {
             if value >= low && value <= high {
                 Ok(())

@@ -1,0 +1,246 @@
+//! One controller through one scenario with one seed, on virtual time.
+
+use std::collections::HashMap;
+
+use kort_control::{ControllerConfig, Limit, ModelError};
+use kort_thruster::parameters::{Parameter, Parameters};
+use kort_thruster::plant::{Plant, Tick};
+use kort_thruster::rig::{AmplifierKind, Rig};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use crate::chain::{Chain, Driven};
+use crate::faults::{Faults, Process};
+use crate::reference::{Player, Replayed};
+use crate::scenario::Scenario;
+use crate::score::{Outcome, Sample, Tally};
+use crate::sea::{Now, STEP_S, Sea};
+use crate::sensors::Sensors;
+use crate::truth;
+
+/// What every run of a scenario shares.
+pub struct Prepared<'a> {
+    /// The scenario.
+    pub scenario: &'a Scenario,
+    /// The rig as stated.
+    pub rig: &'a Rig,
+    /// The effects at work.
+    pub effects: &'a [truth::Hooked],
+    /// Recordings to replay, by segment.
+    pub replayed: &'a [Option<Replayed>],
+    /// Largest steady thrust that a share of 1 stands for, N.
+    pub thrust_max_n: f64,
+}
+
+/// What the controller is told of the thruster.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Knows {
+    /// What the rig states.
+    Stated,
+    /// What is true after the last change of the scenario, which is then true from the start.
+    Truth,
+}
+
+/// Told now and then how far a run is: share done, thrust RMS so far, energy so far.
+pub type Progress<'a> = &'a (dyn Fn(f64, f64, f64) + Sync);
+
+/// Runs and scores.
+///
+/// # Errors
+/// [`ModelError`] if no controller can be designed for the rig.
+pub fn run<C: Chain>(
+    prepared: &Prepared,
+    config: &ControllerConfig,
+    seed: u64,
+    knows: Knows,
+    progress: Progress,
+) -> Result<Outcome, ModelError> {
+    Bench::<C>::new(prepared, config, seed, knows)?.run(progress)
+}
+
+/// A stream of random numbers of its own for each purpose, so that a law that draws none changes
+/// nothing for the others: all laws meet the same sea.
+pub fn stream(seed: u64, purpose: u64) -> ChaCha8Rng {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    random.set_stream(purpose);
+    random
+}
+
+struct Bench<'a, C> {
+    prepared: &'a Prepared<'a>,
+    dt: f64,
+    chain: C,
+    plant: Plant,
+    truth: Parameters,
+    knows: Knows,
+    seed: u64,
+    sensors: Sensors<'a>,
+    faults: Faults<'a>,
+}
+
+impl<'a, C: Chain> Bench<'a, C> {
+    fn new(
+        prepared: &'a Prepared<'a>,
+        config: &ControllerConfig,
+        seed: u64,
+        knows: Knows,
+    ) -> Result<Self, ModelError> {
+        let scenario = prepared.scenario;
+        let dt = 1.0 / scenario.control_rate_hz;
+        let mut parameters = truth::parameters(prepared, seed);
+        let chain = match knows {
+            Knows::Stated => C::start(prepared.rig, config, dt)?,
+            Knows::Truth => {
+                for change in &scenario.truth.change {
+                    truth::change(&mut parameters, &change.factors);
+                }
+                C::start(&truth::told(prepared.rig, &parameters), config, dt)?
+            }
+        };
+        Ok(Self {
+            prepared,
+            dt,
+            plant: truth::plant(prepared, &parameters, dt),
+            truth: parameters,
+            knows,
+            seed,
+            sensors: Sensors::new(scenario, prepared.rig, chain.controller().nominal(), stream(seed, 3)),
+            faults: Faults::new(&scenario.process_faults),
+            chain,
+        })
+    }
+
+    fn run(mut self, progress: Progress) -> Result<Outcome, ModelError> {
+        let scenario = self.prepared.scenario;
+        let rig = self.prepared.rig;
+        let scale = self.prepared.thrust_max_n;
+        let mut player = Player::new(&scenario.references, self.prepared.replayed, stream(self.seed, 1));
+        let mut sea = Sea::new(
+            &scenario.ambient,
+            scenario.depth,
+            &scenario.supply_sags,
+            rig.amplifier.supply_v,
+            stream(self.seed, 2),
+        );
+        let mut tally = Tally::new(self.dt, rig, scale, scenario.settle_s);
+        let ticks = (scenario.duration_s / self.dt).round() as u64;
+        let (mut sea_from, mut sea_to) = (Now::default(), sea.at(0.0));
+        let mut sea_time = -STEP_S;
+        let changes = if self.knows == Knows::Stated { scenario.truth.change.as_slice() } else { &[] };
+        let mut changes = changes.iter().peekable();
+        let report_every = (ticks / 200).max(1);
+        for k in 0..ticks {
+            let time = k as f64 * self.dt;
+            if time >= sea_time + STEP_S {
+                sea_time += STEP_S;
+                sea_from = sea_to;
+                sea_to = sea.at(sea_time + STEP_S);
+            }
+            if let Some(change) = changes.next_if(|c| time >= c.at_s) {
+                self.change(&change.factors);
+            }
+            let reference_n = scale * player.next(self.dt);
+            let sample = self.tick(time, reference_n, (&sea_from, &sea_to), (time - sea_time) / STEP_S);
+            tally.tick(&sample);
+            if k % report_every == 0 {
+                progress(k as f64 / ticks as f64, tally.rms_n(), tally.energy_j());
+            }
+        }
+        let (injected, survived) = self.faults.counts();
+        let mut extra = vec![
+            ("faults_injected", f64::from(injected)),
+            ("faults_survived", f64::from(survived)),
+            ("trips", f64::from(self.chain.trips())),
+        ];
+        if self.chain.controller().config().estimator != kort_control::EstimatorKind::Off {
+            extra.push(("parameter_error", self.parameter_error()));
+        }
+        progress(1.0, tally.rms_n(), tally.energy_j());
+        Ok(tally.finish(&extra))
+    }
+
+    fn tick(&mut self, time: f64, reference_n: f64, sea: (&Now, &Now), part: f64) -> Sample {
+        let process = self.faults.controller(time);
+        if process == Process::Restarted {
+            self.chain.restart();
+        }
+        let (faults, sensed) = (&mut self.faults, self.plant.sensed());
+        let measured = self.sensors.measure(time, &sensed, sea.0, |until_s| faults.inject(until_s));
+        let driven = self.chain.tick(&measured, reference_n, process == Process::Alive);
+        self.plant.step(&self.water(time, driven, sea, part));
+        let truth = *self.plant.truth();
+        let sample = Sample {
+            time_s: time,
+            reference_n,
+            thrust_n: truth.thrust_n,
+            shaft_speed_rad_s: truth.shaft_speed_rad_s,
+            current_a: truth.current_a,
+            flow_m_s: truth.axial_m_s,
+            ambient_m_s: truth.ambient_m_s,
+            flow_estimate_m_s: self.chain.output().estimate.flow_m_s.value,
+            saturated: self.saturated(),
+            broken: self.broken(driven.command, truth.shaft_speed_rad_s),
+            excused: !driven.armed && self.faults.excuse(time),
+        };
+        self.faults.watch(&sample, self.prepared.thrust_max_n);
+        sample
+    }
+
+    /// What drives the plant over one tick: the command, and the water's straight line between two
+    /// instants of the sea.
+    fn water(&self, time: f64, driven: Driven, (from, to): (&Now, &Now), part: f64) -> Tick {
+        let next = part + self.dt / STEP_S;
+        let mix = |p: f64| from.ambient_m_s + (to.ambient_m_s - from.ambient_m_s) * p.min(1.0);
+        Tick {
+            time_s: time,
+            command: driven.command,
+            ambient_m_s: (mix(part), mix(next)),
+            supply_v: from.supply_v,
+            depth_m: from.depth_m.zip(to.depth_m).map(|(a, b)| a + (b - a) * part),
+            ..Tick::default()
+        }
+    }
+
+    fn saturated(&self) -> bool {
+        let limits = self.chain.output().limits;
+        [Limit::Current, Limit::Voltage, Limit::ShaftSpeed, Limit::CurrentRate]
+            .iter()
+            .any(|l| limits.contains(*l))
+    }
+
+    /// Beyond what the rig allows: never the law's to decide.
+    fn broken(&self, command: f64, speed_rad_s: f64) -> bool {
+        let model = self.chain.controller().nominal();
+        let most = match model.amplifier {
+            AmplifierKind::Current => model.current_limit_a,
+            AmplifierKind::Voltage => model.supply_v.unwrap_or(f64::INFINITY),
+            AmplifierKind::Speed => model.speed_max_rad_s,
+        };
+        !command.is_finite()
+            || command.abs() > most * (1.0 + 1e-9)
+            || speed_rad_s.abs() > 1.75 * 1.15 * model.speed_max_rad_s
+    }
+
+    fn change(&mut self, factors: &HashMap<Parameter, f64>) {
+        truth::change(&mut self.truth, factors);
+        let (at, sensed) = (*self.plant.truth(), self.plant.sensed());
+        self.plant = truth::plant(self.prepared, &self.truth, self.dt);
+        self.plant.start(at.time_s, at.shaft_speed_rad_s, at.axial_m_s, sensed.current_a, at.shaft_angle_rad);
+    }
+
+    fn parameter_error(&self) -> f64 {
+        let model = self.chain.controller().model();
+        // The flux coefficient is learnt where both sensors are fitted.
+        let sensors = &self.prepared.scenario.sensors;
+        let flux = sensors.flow && sensors.thrust;
+        let pairs = [
+            (model.blade.lift_max, Parameter::LiftMax),
+            (model.blade.drag_max, Parameter::DragMax),
+            (model.flux_coefficient, Parameter::FluxCoefficient),
+        ];
+        pairs[..if flux { 3 } else { 2 }]
+            .iter()
+            .map(|(found, parameter)| (found / self.truth.get(*parameter) - 1.0).abs())
+            .fold(0.0, f64::max)
+    }
+}
