@@ -106,15 +106,6 @@ pub struct Channel {
     pub full_scale: f64,
 }
 
-/// A jump of the command between two log rows.
-#[derive(Clone, Copy, Debug)]
-pub struct Edge {
-    /// The first row that shows the new command.
-    pub row: usize,
-    /// How many control ticks before that row's instant the command changed.
-    pub ticks_before: usize,
-}
-
 /// One recording, ready to be compared with a model.
 #[derive(Clone, Debug)]
 pub struct Prepared {
@@ -128,8 +119,10 @@ pub struct Prepared {
     pub driving: Driving,
     /// Measured responses.
     pub channels: Vec<Channel>,
-    /// Jumps of the command.
-    pub edges: Vec<Edge>,
+    /// Jumps of the command: the first row that shows each.
+    pub edges: Vec<usize>,
+    /// Whether the command is laid on the control grid (it drives, or a measured current stands for it).
+    pub commanded: bool,
     /// Command at each row.
     pub command: Vec<f64>,
     /// Control ticks a log interval (nominal).
@@ -203,6 +196,14 @@ pub enum DataError {
         /// Shortest allowed, s.
         least_s: f64,
     },
+    /// The model cannot be simulated.
+    #[error(
+        "{recording}: the simulation of the stated rig breaks down (a response is not a number or runs away)\nhint: check the rig's inertia, duct length, resistance and gains for their units; kort simulate shows what the model does"
+    )]
+    BrokeDown {
+        /// The recording.
+        recording: String,
+    },
     /// More control ticks than can be simulated.
     #[error(
         "{recording}: time_s spans {seconds} s; at most {most_s:.0} s can be compared at this control rate (the longest gap is from {} to {} s)\nhint: is time_s in seconds? cut the recording at its gaps, or take a part of it", .gap_s[0], .gap_s[1]
@@ -269,6 +270,7 @@ impl Prepared {
             driving,
             channels,
             edges: Vec::new(),
+            commanded: false,
             command: if driving == Driving::Current { steps_of(&recorded) } else { recorded },
             ticks_per_row: (row_s / tick_s).round() as usize,
             tick_s,
@@ -347,25 +349,30 @@ impl Prepared {
             if self.driving == Driving::Current {
                 smooth_between(&mut self.command, &self.edges);
             }
-            self.lay_command();
+            self.commanded = true;
         }
     }
 
-    /// Writes the command to the ticks, with the edges where `edges` says.
-    pub fn lay_command(&mut self) {
+    /// The command at every control tick, where its edges came so many ticks before their rows.
+    pub fn commands(&self, ticks_before: &[usize]) -> Vec<f64> {
+        let ticks = self.stimulus.ticks.len();
+        if !self.commanded {
+            return vec![0.0; ticks];
+        }
         let c = &self.command;
         let n = c.len();
         let mut edge_at: Vec<Option<usize>> = vec![None; n + 2];
-        self.edges.iter().for_each(|e| edge_at[e.row] = Some(e.ticks_before));
+        self.edges.iter().zip(ticks_before).for_each(|(row, before)| edge_at[*row] = Some(*before));
         let t0 = self.time_s[0];
         let mut row = 0;
-        for (i, tick) in self.stimulus.ticks.iter_mut().enumerate() {
+        let mut commands = Vec::with_capacity(ticks);
+        for i in 0..ticks {
             let t = t0 + i as f64 * self.tick_s;
             while row + 2 < n && self.time_s[row + 1] <= t + 0.02 * self.tick_s {
                 row += 1;
             }
             let (a, b) = (c[row], c[row + 1]);
-            tick.command = match edge_at[row + 1] {
+            commands.push(match edge_at[row + 1] {
                 Some(before) => {
                     let remaining = ((self.time_s[row + 1] - t) / self.tick_s).round() as usize;
                     if remaining <= before { b } else { a }
@@ -377,8 +384,9 @@ impl Prepared {
                         row > 0 && row + 2 < n && edge_at[row].is_none() && edge_at[row + 2].is_none();
                     if smooth { catmull_rom(c[row - 1], a, b, c[row + 2], u) } else { a + (b - a) * u }
                 }
-            };
+            });
         }
+        commands
     }
 
     /// Shaft speed without the stated measuring chain: from the angle where it is recorded, else
@@ -513,10 +521,10 @@ fn steps_of(current: &[f64]) -> Vec<f64> {
 
 /// Takes a measured command's noise out: a parabola through the neighbours at each row, never
 /// across an edge. Noise in the drive would pass for noise of the shaft.
-fn smooth_between(command: &mut [f64], edges: &[Edge]) {
+fn smooth_between(command: &mut [f64], edges: &[usize]) {
     const REACH: usize = 8;
     let raw = command.to_vec();
-    let mut bounds: Vec<usize> = std::iter::once(0).chain(edges.iter().map(|e| e.row)).collect();
+    let mut bounds: Vec<usize> = std::iter::once(0).chain(edges.iter().copied()).collect();
     bounds.push(raw.len());
     for segment in bounds.windows(2) {
         for (k, smooth) in command.iter_mut().enumerate().take(segment[1]).skip(segment[0]) {
@@ -537,7 +545,7 @@ fn smooth_between(command: &mut [f64], edges: &[Edge]) {
 }
 
 /// Rows where the command jumps: it holds on at least one side, so the change is a step.
-fn find_edges(command: &[f64]) -> Vec<Edge> {
+fn find_edges(command: &[f64]) -> Vec<usize> {
     let n = command.len();
     let range = command.iter().fold(0.0_f64, |m, c| m.max(c.abs()));
     let mut sizes: Vec<f64> = command.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
@@ -551,7 +559,6 @@ fn find_edges(command: &[f64]) -> Vec<Edge> {
             let after = if k + 1 < n { (command[k + 1] - command[*k]).abs() } else { 0.0 };
             jump > 0.004 * range && jump > 4.0 * before.max(after).max(usual)
         })
-        .map(|row| Edge { row, ticks_before: 0 })
         .collect()
 }
 

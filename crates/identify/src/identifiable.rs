@@ -9,7 +9,8 @@ use nalgebra::{DMatrix, SymmetricEigen};
 use serde::Serialize;
 
 use crate::data::{Driving, Response};
-use crate::fit::{Fit, Problem};
+use crate::fit::Fit;
+use crate::simulate::Problem;
 
 /// Parameters that these recordings cannot fix together.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -30,15 +31,16 @@ const USEFUL: f64 = 0.10;
 const MEMBER: f64 = 0.08;
 
 /// Groups of parameters that the data alone leave open at a fit.
-pub fn not_identifiable(problem: &Problem, fit: &mut Fit) -> Vec<NotIdentifiable> {
-    let mut jacobian = problem.jacobian(fit);
+pub fn not_identifiable(problem: &Problem, fit: &Fit) -> Vec<NotIdentifiable> {
+    // In units of the priors; from there to units of what counts as knowledge.
+    let mut information = problem.information(fit);
     let n = fit.values.len();
     for (k, free) in fit.hypothesis.free.iter().enumerate() {
-        let size = fit.values[k].abs().max(free.size);
-        let unit = free.prior.map_or(0.0, |p| p.1).max(USEFUL * size);
-        jacobian.column_mut(k).scale_mut(unit);
+        let unit = (USEFUL * fit.values[k].abs().max(free.mean.abs()) / free.sigma).max(1.0);
+        information.row_mut(k).scale_mut(unit);
+        information.column_mut(k).scale_mut(unit);
     }
-    let eigen = SymmetricEigen::new(jacobian.tr_mul(&jacobian));
+    let eigen = SymmetricEigen::new(information);
     let weak: Vec<usize> = (0..n).filter(|k| eigen.eigenvalues[*k] < 1.0).collect();
     // The projector on all weak directions does not depend on how they are turned.
     let mut joined = DMatrix::<f64>::zeros(n, n);

@@ -5,26 +5,29 @@
 //! is estimated with them. The report says which parameters the recordings cannot fix and which
 //! run would, and takes an unphysical value for what it is: a symptom.
 
+use std::collections::BTreeMap;
+
+use kort_thruster::effects::Descriptor;
 use kort_thruster::models::ModelName;
 use kort_thruster::parameters::{Parameter, Parameters};
 use kort_thruster::rig::Rig;
+use nalgebra::DMatrix;
 use rand::{Rng, SeedableRng};
 use serde::Serialize;
-use std::collections::BTreeMap;
 
 use crate::checks;
-use crate::data::{DataError, Prepared, Series, available, scale};
-use crate::diagnose::{Setup, parameters};
-use crate::errors;
-use crate::fit::{Fit, Free, Hypothesis, Problem, Target};
+use crate::data::{DataError, Prepared, Series};
+use crate::fit::Fit;
 use crate::heldout::held_out_rows;
+use crate::hypothesis::{Free, Hypothesis, Member, Target};
 use crate::identifiable::{NotIdentifiable, not_identifiable};
-use crate::report::{ChannelReport, ParameterReport};
-use crate::screen::Projector;
-use crate::search::Search;
+use crate::noise::Criterion;
+use crate::scores::{self, ChannelReport, ParameterReport, parameters};
+use crate::setup::Setup;
+use crate::simulate::Problem;
 
 /// How to identify.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Options {
     /// Model whose parameters are wanted.
     pub model: ModelName,
@@ -32,8 +35,12 @@ pub struct Options {
     pub seed: u64,
     /// Fits from different starts, the stated values being the first.
     pub starts: usize,
-    /// Fit viscous friction without a prior and across zero, stated or not.
+    /// Fit viscous friction almost without a prior and across zero, stated or not.
     pub open_friction: bool,
+    /// Effects taken as present, fitted with the model.
+    pub with: Vec<&'static Descriptor>,
+    /// The criterion's constants.
+    pub criterion: Criterion,
 }
 
 /// Two parameters that the recordings hardly part.
@@ -43,6 +50,19 @@ pub struct Correlation {
     pub parameters: [String; 2],
     /// Correlation of their errors, priors included.
     pub correlation: f64,
+}
+
+/// An effect that was fitted with the model.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FittedEffect {
+    /// Catalogue identifier.
+    pub effect: String,
+    /// Where it enters.
+    pub path: String,
+    /// Equation.
+    pub equation: String,
+    /// Fitted values.
+    pub parameters: Vec<ParameterReport>,
 }
 
 /// What the further starts said.
@@ -88,6 +108,8 @@ pub struct FitReport {
     pub seconds: f64,
     /// Fitted values; `std_error` includes the stated tolerance as prior.
     pub parameters: Vec<ParameterReport>,
+    /// Effects asked for.
+    pub effects: Vec<FittedEffect>,
     /// Errors by channel, the held-out ones from a fit without those rows.
     pub channels: BTreeMap<String, ChannelReport>,
     /// Groups that these recordings cannot fix.
@@ -117,38 +139,57 @@ pub fn identify(
     options: &Options,
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<FitReport, DataError> {
-    let Setup { mut problem, mut hypothesis, mut notes, thin } = Setup::new(series, rig, options.model)?;
+    let Setup { mut problem, mut baseline, mut notes, thin } =
+        Setup::new(series, rig, options.model, options.criterion)?;
     notes.extend(thin);
-    let scale = scale(&problem.recordings, rig);
-    open_friction(&mut hypothesis, rig, options.open_friction, scale.torque_n_m / scale.shaft_speed_rad_s);
+    let typical = problem.scale.torque_n_m / problem.scale.shaft_speed_rad_s;
+    open_friction(&mut baseline, rig, options.open_friction, typical);
+    for effect in &options.with {
+        let values = baseline.start.clone();
+        baseline = baseline.with(&values, Member::new(effect, &problem.scale), &problem.scale);
+    }
     // Estimated initial states take the place of a run-in that is left out.
     let moving: Vec<bool> = problem.recordings.iter().map(|r| r.start[0] != 0.0).collect();
-    for ((rows, one), _) in problem.masked.iter_mut().zip(series).zip(&moving).filter(|(_, m)| **m) {
-        *rows = checks::check(one, rig).masked;
+    if moving.contains(&true) {
+        let mut masked = problem.masked.clone();
+        for ((rows, one), _) in masked.iter_mut().zip(series).zip(&moving).filter(|(_, m)| **m) {
+            *rows = checks::check(one, rig).masked;
+        }
+        problem = Problem::new(problem.model, rig, problem.recordings, masked, problem.criterion);
     }
     progress("fitting from the stated values");
-    let offered = available(problem.model, series, &problem.recordings);
-    let mut search = Search::new(problem, scale, &offered);
-    let mut best = search.baseline(&hypothesis);
+    let mut best = problem.settle(&baseline, &Vec::new(), &[], ITERATIONS);
+    if best.broke_down() {
+        return Err(DataError::BrokeDown { recording: series.first().map_or_else(String::new, |s| s.name.clone()) });
+    }
     if moving.contains(&true) {
         for _ in 0..2 {
-            place_starts(&mut search.problem, &best, &moving);
-            best = search.again(&best);
+            place_starts(&mut problem, &best, &moving);
+            best = problem.settle(&best.resume(), &Vec::new(), &best.actions, ITERATIONS);
         }
-        search.problem.learn_noise(&best.hypothesis, &best.values);
-        best = search.again(&best);
     }
-    let problem = &search.problem;
-    let (starts, mut best) = several_starts(problem, &hypothesis, best, options, progress);
+    let problem = &problem;
+    let (starts, best) = several_starts(problem, best, options, progress);
 
     progress("scoring on held-out data");
-    let projector = Projector::new(problem, &mut best);
-    let std = projector.std_errors();
-    let full = problem.residual_of(&best);
-    let floor = errors::noise_floor(problem, &full);
-    let held = held_out_rows(problem, &[], None);
-    let train_residual = problem.residual_of(&problem.without(&held).again(&best, 6));
-    let parameters = parameters(&best, &std, None);
+    let std = problem.standard_errors(&best);
+    let full = problem.residual(&best.hypothesis, &best.values);
+    let floor = scores::noise_floor(problem, &full);
+    let held = held_out_rows(problem, &[&best.hypothesis]);
+    let trained = problem.without(&held).again(&best, 6);
+    let train_residual = problem.residual(&trained.hypothesis, &trained.values);
+    let effects = best
+        .hypothesis
+        .effects
+        .iter()
+        .enumerate()
+        .map(|(i, m)| FittedEffect {
+            effect: m.effect.id.into(),
+            path: m.effect.path.name().into(),
+            equation: m.effect.equation.into(),
+            parameters: parameters(&best, &std, Some(i)),
+        })
+        .collect();
     Ok(FitReport {
         schema: "kort.fit/1".into(),
         kort_version: env!("CARGO_PKG_VERSION").into(),
@@ -157,9 +198,9 @@ pub fn identify(
         model: options.model.name().into(),
         seed: options.seed,
         seconds: problem.recordings.iter().map(Prepared::duration_s).sum(),
-        channels: errors::channels(problem, &held, &train_residual, &full, &floor),
-        not_identifiable: not_identifiable(problem, &mut best),
-        correlations: correlations(&best, &projector),
+        channels: scores::channels(problem, &held, &train_residual, &full, &floor),
+        not_identifiable: not_identifiable(problem, &best),
+        correlations: correlations(&best, &problem.covariance(&best)),
         symptoms: symptoms(&best, &std),
         starts,
         initial_states: problem
@@ -173,10 +214,14 @@ pub fn identify(
                 estimated: *moving,
             })
             .collect(),
-        parameters,
+        parameters: parameters(&best, &std, None),
+        effects,
         notes,
     })
 }
+
+/// Iterations of a fit.
+const ITERATIONS: usize = 20;
 
 /// Lets viscous friction cross zero where it is fitted: a negative value is the sign of physics
 /// left out, which a bound at zero would hide. `wanted` fits it even if nothing is stated.
@@ -186,28 +231,28 @@ fn open_friction(hypothesis: &mut Hypothesis, rig: &Rig, wanted: bool, typical: 
     if let Some(free) = hypothesis.free.iter_mut().find(|f| f.target == target) {
         free.low = free.low.min(-free.high);
         if wanted {
-            *free = Free { prior: None, low: -reach, high: reach, ..*free };
+            *free = Free { sigma: reach, low: -reach, high: reach, ..*free };
         }
     } else if wanted && hypothesis.free.iter().any(|f| f.target == Target::Base(Parameter::InertiaKgM2)) {
         let p = Parameter::ViscousFrictionNmS;
+        let stated = Parameters::quantity(rig, p).map_or(0.0, |q| q.value);
         hypothesis.free.push(Free {
             target,
             name: p.name(),
             unit: p.unit(),
-            prior: None,
+            mean: stated,
+            sigma: reach,
             low: -reach,
             high: reach,
-            size: 0.02 * reach,
             acts: None,
         });
-        hypothesis.start.push(Parameters::quantity(rig, p).map_or(0.0, |q| q.value));
+        hypothesis.start.push(stated);
     }
 }
 
 /// Fits from further starts drawn within the tolerances; the best of all, and how they agree.
 fn several_starts(
     problem: &Problem,
-    hypothesis: &Hypothesis,
     first: Fit,
     options: &Options,
     progress: &(dyn Fn(&str) + Sync),
@@ -216,36 +261,46 @@ fn several_starts(
     let mut fits = vec![first];
     for k in 1..options.starts.max(1) {
         progress(&format!("fitting from start {} of {}", k + 1, options.starts));
-        let mut from = hypothesis.clone();
+        let mut from = fits[0].hypothesis.clone();
         for (free, value) in from.free.iter().zip(&mut from.start) {
-            let (mean, sigma) = free.prior.unwrap_or((*value, 2.0 * free.size));
-            let offset: f64 = rng.random_range(-2.0..2.0);
-            *value = (mean + offset * sigma).clamp(free.low, free.high);
+            if matches!(free.target, Target::Base(_)) {
+                let offset: f64 = rng.random_range(-2.0..2.0);
+                *value = (free.mean + offset * free.sigma).clamp(free.low, free.high);
+            }
         }
-        fits.push(problem.fit(&from, &[], 12));
+        let fit = problem.fit(&from, &Vec::new(), &fits[0].actions, ITERATIONS);
+        fits.push(problem.finish(fit));
     }
-    let cost = |f: &Fit| f.chi2 + f.penalty;
-    let (place, _) = fits.iter().enumerate().fold((0, cost(&fits[0])), |at, (k, f)| {
+    let (place, _) = fits.iter().enumerate().fold((0, fits[0].cost()), |at, (k, f)| {
         // The first start stands unless another is better by more than the fit's own tolerance.
-        if cost(f) < at.1 - 1.0 { (k, cost(f)) } else { at }
+        if f.cost() < at.1 - 1.0 { (k, f.cost()) } else { at }
     });
-    let mut best = fits[place].clone();
-    let std = errors::std_errors(problem, &mut best);
+    let best = fits[place].clone();
+    let std = problem.standard_errors(&best);
     let near = |f: &Fit| {
         f.values.iter().zip(&best.values).zip(&std).all(|((a, b), s)| (a - b).abs() <= s.max(1e-9 * b.abs()))
     };
     let starts = Starts {
         tried: fits.len(),
         agreed: fits.iter().filter(|f| near(f)).count(),
-        worst_gap: fits.iter().map(|f| cost(f) - cost(&best)).fold(0.0, f64::max),
+        worst_gap: fits.iter().map(|f| f.cost() - best.cost()).fold(0.0, f64::max),
     };
     (starts, best)
 }
 
 /// Gauss-Newton on shaft speed and flow at the first row of every recording that begins moving.
 fn place_starts(problem: &mut Problem, fit: &Fit, moving: &[bool]) {
+    let weights: Vec<f64> = problem
+        .spectrum
+        .bands
+        .iter()
+        .zip(&fit.noise.weight)
+        .flat_map(|(band, w)| std::iter::repeat_n(w.sqrt(), band.lines.len()))
+        .collect();
+    let weights = nalgebra::DVector::from_vec(weights);
+    let residual =
+        |p: &Problem| p.residual_lines(&fit.hypothesis, &fit.values).component_mul(&weights);
     for _ in 0..2 {
-        let residual = |p: &Problem| p.whiten(&p.residual(&p.respond(&fit.hypothesis, &fit.values)));
         for r in (0..moving.len()).filter(|r| moving[*r]) {
             let at = residual(problem);
             let before = problem.recordings[r].start;
@@ -273,8 +328,7 @@ fn place_starts(problem: &mut Problem, fit: &Fit, moving: &[bool]) {
     }
 }
 
-fn correlations(fit: &Fit, projector: &Projector) -> Vec<Correlation> {
-    let covariance = projector.covariance();
+fn correlations(fit: &Fit, covariance: &DMatrix<f64>) -> Vec<Correlation> {
     let free = &fit.hypothesis.free;
     let mut out = Vec::new();
     for i in 0..free.len() {
@@ -296,6 +350,7 @@ fn correlations(fit: &Fit, projector: &Projector) -> Vec<Correlation> {
 /// Values that say more about the model than about the thruster.
 fn symptoms(fit: &Fit, std: &[f64]) -> Vec<String> {
     let mut out = Vec::new();
+    let at_bound = fit.at_bound();
     for (k, free) in fit.hypothesis.free.iter().enumerate() {
         let value = fit.values[k];
         if free.target == Target::Base(Parameter::ViscousFrictionNmS) && value < -2.0 * std[k] {
@@ -305,19 +360,18 @@ fn symptoms(fit: &Fit, std: &[f64]) -> Vec<String> {
             ));
             continue;
         }
-        if fit.at_bound[k] {
+        if at_bound[k] {
             out.push(format!(
                 "{} = {value:.5} {} stands at the edge of what is allowed ({:.5} to {:.5}): a symptom of physics left out or of a wrong stated value, not a measurement; run `kort diagnose`",
                 free.name, free.unit, free.low, free.high
             ));
-        } else if let Some((mean, sigma)) = free.prior
-            && (value - mean).abs() > 3.0 * sigma
-        {
+        } else if matches!(free.target, Target::Base(_)) && free.score(value).abs() > 3.0 {
             out.push(format!(
-                "{} = {value:.5} {} is {:.1} sigma from the stated {mean:.5}: check the statement, or run `kort diagnose`",
+                "{} = {value:.5} {} is {:.1} sigma from the stated {:.5}: check the statement, or run `kort diagnose`",
                 free.name,
                 free.unit,
-                (value - mean).abs() / sigma
+                free.score(value).abs(),
+                free.mean
             ));
         }
     }

@@ -1,31 +1,24 @@
-//! Identification from recordings, and diagnosis: which physics did the model leave out?
+//! Identification: a model's free numbers from recordings, and what the recordings say for a hypothesis.
+//!
+//! Data go one way: recording, data (checks, edges), hypothesis (free numbers, priors, effects), simulate,
+//! noise, fit.
 
-pub mod baseline;
-pub mod changes;
 pub mod checks;
 pub mod data;
-pub mod diagnose;
 pub mod edges;
-mod equations;
-pub mod errors;
-pub mod experiment;
 pub mod fit;
 pub mod heldout;
+pub mod hypothesis;
 pub mod identifiable;
 pub mod identify;
-pub mod judge;
-pub mod library;
-pub mod locate;
-mod look;
 pub mod noise;
-mod refit;
-pub mod refuse;
-pub mod report;
-pub mod rules;
-pub mod screen;
-pub mod search;
+mod quadratic;
+mod refuse;
+mod shared_lanes;
+pub mod scores;
+pub mod setup;
+pub mod simulate;
 mod smooth;
+pub mod spectrum;
 mod step;
-mod together;
-mod verdict;
-pub mod words;
+pub use quadratic::{Minimum, Quadratic};

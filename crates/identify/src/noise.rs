@@ -1,288 +1,158 @@
-//! What the residual of a good model looks like: coloured, and larger when the propeller turns.
+//! The noise that a hypothesis leaves, and what its residual costs under it.
 //!
-//! Turbulence of the inflow and drift of the force sensor make residuals that white-noise
-//! statistics would take for physics. Each channel's residual is divided by a level that grows
-//! with shaft speed, and by the root of its smoothed spectrum; what is left is white with unit
-//! variance, and so are sums of squares chi-squared.
+//! A tempered profile Whittle likelihood. Each band's noise level is what the residual leaves there, but
+//! never below the *form error*: our equations are not exact, and a few percent of a signal, or of an
+//! effect's own action, must not count against a good name. A band of one structural error holds many
+//! lines and few facts: it counts as at most so many. The lowest bands may not explain a constant away:
+//! noise rises towards low frequency no faster than its neighbour allows.
+//!
+//! Whittle 1953 (Ark. Mat. 2:423); tempering after Gruenwald & van Ommen 2017 (Bayesian Anal. 12:1069).
 
-use std::sync::Arc;
+use serde::Deserialize;
 
-use realfft::num_complex::Complex;
-use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
+use crate::spectrum::Band;
 
-use crate::data::Response;
-use crate::fit::{Fit, Hypothesis, Problem};
-
-/// Whitens one channel of one recording.
-#[derive(Clone)]
-pub struct Whitener {
-    level: Vec<f64>,
-    shape: Option<Shape>,
+/// The criterion's few constants; see `constants.toml` for where each comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Criterion {
+    /// Error of our equations as a share of the signal at and below a frequency.
+    pub form_error: f64,
+    /// Error of an effect's equation as a share of what the effect itself does.
+    pub own_form_error: f64,
+    /// Most independent facts in a band.
+    pub facts_a_band: f64,
+    /// Standard deviation of time stamps, s.
+    pub timing_s: f64,
 }
 
-/// A spectrum to divide by.
-#[derive(Clone)]
-struct Shape {
-    /// Square root of the inverse spectrum, one value a frequency of the padded transform.
-    gain: Vec<f64>,
-    forward: Arc<dyn RealToComplex<f64>>,
-    inverse: Arc<dyn ComplexToReal<f64>>,
-}
+/// How fast noise may rise towards low frequency: by this times the square of the frequencies' ratio.
+const RISE: f64 = 3.0;
+/// Variance below which nothing is told apart, in squares of the full scale: rounding of the computation.
+const ROUNDING: f64 = 1e-14;
 
-/// Frequencies per smoothing band grow by this ratio.
-const BAND_RATIO: f64 = 1.4;
-const FEWEST_IN_BAND: usize = 4;
-/// Mean of the logarithm of noise power lies this much below the logarithm of its mean. The mean
-/// of logarithms is used because a misfit that stands out of its band (an offset, a line) must not
-/// pass for noise.
-const EULER: f64 = 0.577;
+/// Least noise by band; belongs to one hypothesis.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Floor(Vec<f64>);
 
-impl Whitener {
-    /// A whitener that only scales by one level.
-    pub fn flat(level: f64, samples: usize) -> Self {
-        Self { level: vec![level; samples], shape: None }
-    }
-
-    /// Learns level and spectrum from a residual; `activity` (0 to 1) says how hard the propeller
-    /// works at each sample, `floor` is the least level (the quantum of the sensor).
-    pub fn learn(residual: &[f64], activity: &[f64], floor: f64) -> Self {
-        let level = levels(residual, activity, floor);
-        let scaled: Vec<f64> = residual.iter().zip(&level).map(|(r, l)| r / l).collect();
-        let n = scaled.len();
-        let size = (n + n / 8 + 16).next_power_of_two();
-        let mut planner = RealFftPlanner::<f64>::new();
-        let (forward, inverse) = (planner.plan_fft_forward(size), planner.plan_fft_inverse(size));
-        let spectrum = transform(&scaled, forward.as_ref());
-        let power: Vec<f64> = spectrum.iter().map(|c| c.norm_sqr() / n as f64).collect();
-        let gain = smoothed(&power).into_iter().map(|s| 1.0 / s.max(1e-12).sqrt()).collect();
-        Self { level, shape: Some(Shape { gain, forward, inverse }) }
-    }
-
-    /// The whitened samples.
-    pub fn apply(&self, residual: &[f64]) -> Vec<f64> {
-        let scaled: Vec<f64> = residual.iter().zip(&self.level).map(|(r, l)| r / l).collect();
-        let Some(shape) = &self.shape else { return scaled };
-        let mut spectrum = transform(&scaled, shape.forward.as_ref());
-        for (c, g) in spectrum.iter_mut().zip(&shape.gain) {
-            *c *= *g;
+impl Floor {
+    /// The floor under which no hypothesis is held to account: quantisation, form error, timing.
+    pub fn of_signal(bands: &[Band], criterion: &Criterion) -> Self {
+        let mut floor = Vec::with_capacity(bands.len());
+        // Largest power times squared frequency of the bands below.
+        let mut moving = 0.0_f64;
+        let mut starts = true;
+        for band in bands {
+            if starts {
+                moving = 0.0;
+            }
+            starts = !band.continues;
+            moving = moving.max(band.signal * band.hz * band.hz);
+            let form = criterion.form_error.powi(2) * moving / (band.hz * band.hz);
+            let timing = (std::f64::consts::TAU * band.hz * criterion.timing_s).powi(2) * band.signal;
+            floor.push(band.quantisation + form + timing + ROUNDING);
         }
-        let last = spectrum.len() - 1;
-        spectrum[0].im = 0.0;
-        spectrum[last].im = 0.0;
-        let mut out = shape.inverse.make_output_vec();
-        // The planner made the lengths, so this cannot fail.
-        let _ = shape.inverse.process(&mut spectrum, &mut out);
-        let scale = 1.0 / out.len() as f64;
-        out.truncate(scaled.len());
-        out.iter_mut().for_each(|v| *v *= scale);
-        out
+        Self(floor)
     }
 
-    /// Twice the logarithm of the size of the noise, summed over the samples: what a whitener learned
-    /// from a fit's own residual says of how little that fit leaves.
-    pub fn log_size(&self) -> f64 {
-        let level: f64 = self.level.iter().map(|l| l.ln()).sum();
-        let colour = self.shape.as_ref().map_or(0.0, |s| {
-            s.gain.iter().map(|g| g.ln()).sum::<f64>() / s.gain.len() as f64 * self.level.len() as f64
-        });
-        2.0 * (level - colour)
-    }
-
-    /// Level at each sample, in the channel's unit.
-    pub fn level(&self) -> &[f64] {
-        &self.level
-    }
-}
-
-impl Problem<'_> {
-    /// Forgets what was learned of the noise: white, and the same share of full scale everywhere.
-    pub fn flat_noise(&mut self) {
-        self.whiteners = self
-            .recordings
-            .iter()
-            .map(|p| p.channels.iter().map(|c| Whitener::flat(0.02 * c.full_scale, c.rows.len())).collect())
-            .collect();
-    }
-
-    /// Takes all that a fit leaves for white noise, on every channel.
-    pub fn white_noise_of(&mut self, fit: &Fit) {
-        let residual = self.residual_of(fit);
-        self.flat_noise();
-        for (whiteners, residual) in self.whiteners.iter_mut().zip(residual) {
-            for (whitener, values) in whiteners.iter_mut().zip(residual) {
-                let mean_square = values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64;
-                let least = 1e-3 * whitener.level()[0];
-                *whitener = Whitener::flat(mean_square.sqrt().max(least), values.len());
+    /// With the form error of effects that do this to the response (mean squares by band, one list an effect).
+    pub fn with_actions(&self, actions: &[Vec<f64>], criterion: &Criterion) -> Self {
+        let mut floor = self.0.clone();
+        for action in actions {
+            for (f, power) in floor.iter_mut().zip(action) {
+                *f += criterion.own_form_error.powi(2) * power;
             }
         }
+        Self(floor)
     }
+}
 
-    /// Learns the noise from the residual of a fitted hypothesis.
-    pub fn learn_noise(&mut self, hypothesis: &Hypothesis, values: &[f64]) {
-        let rows = self.rows(hypothesis, values);
-        let whiteners = self
-            .recordings
+/// The noise that a residual shows: level and weight by band.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Noise {
+    /// Variance by band, in squares of the full scale.
+    pub level: Vec<f64>,
+    /// What a squared line counts: facts a line over the variance.
+    pub weight: Vec<f64>,
+    /// Twice the tempered negative log-likelihood of the residual under it.
+    pub misfit: f64,
+}
+
+impl Noise {
+    /// Of a residual with these mean squares by band.
+    pub fn of(bands: &[Band], powers: &[f64], floor: &Floor, criterion: &Criterion) -> Self {
+        let mut level = vec![0.0; bands.len()];
+        for b in (0..bands.len()).rev() {
+            let least = floor.0[b];
+            let mut seen = powers[b].max(least);
+            if bands[b].continues {
+                let ratio = bands[b + 1].hz / bands[b].hz;
+                seen = seen.min(RISE * ratio * ratio * level[b + 1]).max(least);
+            }
+            level[b] = seen;
+        }
+        let mut misfit = 0.0;
+        let weight = bands
             .iter()
-            .zip(&self.masked)
-            .zip(&rows)
-            .map(|((recording, masked), rows)| {
-                let top = rows.iter().fold(1e-9_f64, |m, r| m.max(r.true_speed_rad_s.abs()));
-                recording
-                    .channels
-                    .iter()
-                    .map(|c| {
-                        let residual: Vec<f64> = c
-                            .rows
-                            .iter()
-                            .zip(&c.values)
-                            .map(|(r, v)| if masked[*r] { 0.0 } else { v - c.response.of(&rows[*r]) })
-                            .collect();
-                        let activity: Vec<f64> =
-                            c.rows.iter().map(|r| (rows[*r].true_speed_rad_s / top).abs()).collect();
-                        Whitener::learn(&residual, &activity, self.quantum(c.response) + 1e-5 * c.full_scale)
-                    })
-                    .collect()
+            .zip(&level)
+            .zip(powers)
+            .map(|((band, level), power)| {
+                let n = band.lines.len() as f64;
+                let facts = n * criterion.facts_a_band / (n + criterion.facts_a_band);
+                misfit += facts * (level.ln() + power / level - 1.0);
+                facts / (n * level)
             })
             .collect();
-        self.whiteners = whiteners;
+        Self { level, weight, misfit }
     }
-
-    /// Standard deviation of a sensor's quantisation.
-    fn quantum(&self, response: Response) -> f64 {
-        let s = &self.rig.sensors;
-        let uniform = 12.0_f64.sqrt();
-        match response {
-            Response::Thrust => match (s.thrust_full_scale_n, s.thrust_bits) {
-                (Some(full), Some(bits)) => 2.0 * full / 2.0_f64.powi(bits as i32) / uniform,
-                _ => 0.0,
-            },
-            Response::ShaftSpeed => match (s.encoder_counts_per_rev, s.control_rate_hz) {
-                (Some(counts), Some(rate)) => {
-                    let raw = std::f64::consts::TAU / counts * rate;
-                    let tau = s.speed_filter_time_constant_s.unwrap_or(0.0) * rate;
-                    raw / uniform / (1.0 + 2.0 * tau).sqrt() / 3.0
-                }
-                _ => 0.0,
-            },
-            _ => 0.0,
-        }
-    }
-}
-
-fn transform(values: &[f64], forward: &dyn RealToComplex<f64>) -> Vec<Complex<f64>> {
-    let mut padded = forward.make_input_vec();
-    padded[..values.len()].copy_from_slice(values);
-    let mut spectrum = forward.make_output_vec();
-    // The planner made the lengths, so this cannot fail.
-    let _ = forward.process(&mut padded, &mut spectrum);
-    spectrum
-}
-
-/// Standard deviation as `s0 + s1 activity`, from binned robust spreads.
-fn levels(residual: &[f64], activity: &[f64], floor: f64) -> Vec<f64> {
-    const BINS: usize = 6;
-    let mut bins: Vec<Vec<f64>> = vec![Vec::new(); BINS];
-    for (r, a) in residual.iter().zip(activity) {
-        bins[((a * BINS as f64) as usize).min(BINS - 1)].push(*r);
-    }
-    // Least squares of variance on activity squared, weighted by count, both coefficients >= 0.
-    let (mut n, mut sx, mut sxx, mut sy, mut sxy) = (0.0, 0.0, 0.0, 0.0, 0.0);
-    for (i, bin) in bins.iter_mut().enumerate() {
-        if bin.len() < 20 {
-            continue;
-        }
-        let spread = rms(bin);
-        let x = ((i as f64 + 0.5) / BINS as f64).powi(2);
-        let y = spread * spread;
-        // A variance is known to a share of itself: weight by 1/y^2.
-        let w = bin.len() as f64 / (y * y).max(1e-300);
-        n += w;
-        sx += w * x;
-        sxx += w * x * x;
-        sy += w * y;
-        sxy += w * x * y;
-    }
-    let det = n * sxx - sx * sx;
-    let overall = rms(residual).max(floor).max(1e-12);
-    let (mut v0, mut v1) = if det > 1e-9 * n * sxx {
-        ((sy * sxx - sx * sxy) / det, (n * sxy - sx * sy) / det)
-    } else {
-        (overall * overall, 0.0)
-    };
-    if v1 < 0.0 {
-        (v0, v1) = (if n > 0.0 { sy / n } else { overall * overall }, 0.0);
-    }
-    if v0 < 0.0 {
-        (v0, v1) = (0.0, if sxx > 0.0 { sxy / sxx } else { overall * overall });
-    }
-    let least = floor.max(0.05 * overall).powi(2);
-    activity.iter().map(|a| (v0 + v1 * a * a).max(least).sqrt()).collect()
-}
-
-fn rms(values: &[f64]) -> f64 {
-    (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
-}
-
-/// Power in bands that widen with frequency, joined by straight lines in the logarithms.
-fn smoothed(power: &[f64]) -> Vec<f64> {
-    let n = power.len();
-    let mut knots: Vec<(f64, f64)> = Vec::new();
-    let mut from = 0;
-    while from < n {
-        let to = ((from as f64 * BAND_RATIO) as usize).max(from + FEWEST_IN_BAND).min(n);
-        let to = if n - to < FEWEST_IN_BAND { n } else { to };
-        let mean = power[from..to].iter().map(|p| p.max(1e-12).ln()).sum::<f64>() / (to - from) as f64;
-        knots.push(((0.5 * (from + to) as f64).ln(), mean + EULER));
-        from = to;
-    }
-    let mut k = 0;
-    (0..n)
-        .map(|i| {
-            let x = (i as f64 + 0.5).ln();
-            while k + 2 < knots.len() && x > knots[k + 1].0 {
-                k += 1;
-            }
-            if knots.len() < 2 {
-                return knots[0].1.exp();
-            }
-            let ((x0, y0), (x1, y1)) = (knots[k], knots[k + 1]);
-            let u = ((x - x0) / (x1 - x0)).clamp(0.0, 1.0);
-            (y0 + (y1 - y0) * u).exp()
-        })
-        .collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rand::{Rng, SeedableRng};
 
-    #[test]
-    fn coloured_noise_comes_out_white() {
-        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(5);
-        let mut slow = 0.0;
-        let residual: Vec<f64> = (0..6000)
-            .map(|_| {
-                slow = 0.98 * slow + 0.2 * rng.random_range(-1.0..1.0);
-                slow + 0.3 * rng.random_range(-1.0..1.0)
+    const CRITERION: Criterion =
+        Criterion { form_error: 0.01, own_form_error: 0.1, facts_a_band: 30.0, timing_s: 0.001 };
+
+    fn bands() -> Vec<Band> {
+        (0..12)
+            .map(|k| Band {
+                lines: 10 * k..10 * k + 10,
+                hz: 0.01 * 1.585_f64.powi(k as i32),
+                signal: if k == 3 { 1.0 } else { 1e-12 },
+                quantisation: 0.0,
+                continues: k < 11,
             })
-            .collect();
-        let whitener = Whitener::learn(&residual, &vec![0.5; 6000], 1e-6);
-        let w = whitener.apply(&residual);
-        let power = w.iter().map(|v| v * v).sum::<f64>() / 6000.0;
-        let lag = |k: usize| w.iter().zip(&w[k..]).map(|(a, b)| a * b).sum::<f64>() / 6000.0;
-        assert!((power - 1.0).abs() < 0.1, "{power}");
-        for k in [1, 2, 5, 20] {
-            assert!(lag(k).abs() < 0.06, "lag {k}: {}", lag(k));
-        }
+            .collect()
     }
 
     #[test]
-    fn level_follows_activity() {
-        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(6);
-        let activity: Vec<f64> = (0..6000).map(|k| f64::from(k % 100) / 100.0).collect();
-        let residual: Vec<f64> = activity.iter().map(|a| (0.1 + a) * rng.random_range(-1.0..1.0)).collect();
-        let w = Whitener::learn(&residual, &activity, 1e-6);
-        assert!(w.level()[95] > 3.0 * w.level()[2], "{} {}", w.level()[95], w.level()[2]);
+    fn the_form_error_falls_with_the_square_of_frequency_above_the_signal_and_is_none_below() {
+        let floor = Floor::of_signal(&bands(), &CRITERION);
+        assert!(floor.0[2] < 1e-12, "{:?}", floor.0);
+        assert!((floor.0[3] / 1e-4 - 1.0).abs() < 0.01);
+        assert!((floor.0[5] / floor.0[3] * 1.585_f64.powi(4) - 1.0).abs() < 0.01);
+    }
+
+    #[test]
+    fn a_constant_error_cannot_hide_in_its_own_noise() {
+        let floor = Floor::of_signal(&bands(), &CRITERION);
+        let mut powers = vec![1e-6; 12];
+        let quiet = Noise::of(&bands(), &powers, &floor, &CRITERION).misfit;
+        powers[0] = 1e-2;
+        let biased = Noise::of(&bands(), &powers, &floor, &CRITERION);
+        assert!(biased.level[0] < 1e-5, "{:?}", biased.level);
+        assert!(biased.misfit > quiet + 1000.0);
+    }
+
+    #[test]
+    fn many_lines_count_as_few_facts() {
+        let mut wide = bands();
+        wide.truncate(1);
+        wide[0].continues = false;
+        wide[0].lines = 0..100_000;
+        let floor = Floor::of_signal(&wide, &CRITERION);
+        let misfit = |power| Noise::of(&wide, &[power], &floor, &CRITERION).misfit;
+        assert!((misfit(1e-2) - misfit(1e-4) - 30.0 * 100.0_f64.ln()).abs() < 0.1);
     }
 }

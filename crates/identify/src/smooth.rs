@@ -6,7 +6,7 @@
 
 use kort_thruster::models::ModelName;
 use kort_thruster::parameters::Parameters;
-use kort_thruster::plant::{Course, Plant};
+use kort_thruster::plant::{Course, Plant, Tick};
 use kort_thruster::rig::Rig;
 
 use crate::data::Prepared;
@@ -27,8 +27,9 @@ impl Prepared {
         let [speed, flow, current, angle] = self.start;
         plant.start(self.time_s[0], speed, flow, current, angle);
         let (mut course, mut lasting) = (vec![[speed, flow, current]], Vec::new());
-        for tick in &self.stimulus.ticks {
-            plant.step(tick);
+        let commands = self.commands(&vec![0; self.edges.len()]);
+        for (tick, command) in self.stimulus.ticks.iter().zip(&commands) {
+            plant.step(&Tick { command: *command, ..*tick });
             let truth = plant.truth();
             course.push([truth.shaft_speed_rad_s, truth.axial_m_s, truth.current_a]);
             lasting.push(plant.fastest_decay_1_s() * self.tick_s < DIES);

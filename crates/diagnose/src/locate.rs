@@ -1,6 +1,6 @@
 //! Where does an effect act? Channel, regime and time spans of the error it removes.
 
-use crate::fit::{Problem, Stack};
+use kort_identify::simulate::{Problem, Stack};
 
 /// Where an error lies.
 #[derive(Clone, Debug, PartialEq)]
@@ -98,9 +98,9 @@ fn each(
 }
 
 /// Time since the last step of the command at each row, s; infinite before the first.
-pub fn since_edge(recording: &crate::data::Prepared) -> Vec<f64> {
+pub fn since_edge(recording: &kort_identify::data::Prepared) -> Vec<f64> {
     let mut last = f64::NEG_INFINITY;
-    let mut edges = recording.edges.iter().map(|e| e.row).peekable();
+    let mut edges = recording.edges.iter().copied().peekable();
     (0..recording.time_s.len())
         .map(|row| {
             if edges.next_if(|e| *e <= row).is_some() {

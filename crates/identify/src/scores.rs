@@ -4,8 +4,85 @@ use std::collections::BTreeMap;
 
 use rand::{Rng, SeedableRng};
 
-use crate::fit::{Fit, Problem, Stack};
-use crate::report::{BeforeAfter, ChannelReport, HeldOut};
+use serde::Serialize;
+
+use crate::fit::Fit;
+use crate::hypothesis::Target;
+use crate::simulate::{Problem, Stack};
+
+/// A parameter with its uncertainty.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ParameterReport {
+    /// Name, unit last.
+    pub name: String,
+    /// Fitted value.
+    pub value: f64,
+    /// Unit.
+    pub unit: String,
+    /// Standard error of the fit, prior included.
+    pub std_error: f64,
+    /// What the rig description states; none for an effect's value.
+    pub stated: Option<f64>,
+    /// At the edge of what is allowed: a symptom, not a value.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub at_bound: Option<bool>,
+}
+
+/// Errors of the baseline on one channel, root mean square over full scale.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ChannelReport {
+    /// On the rows fitted.
+    pub nrmse_train: f64,
+    /// On the rows held out.
+    pub nrmse_heldout: f64,
+    /// What measurement noise alone would give.
+    pub noise_floor: f64,
+    /// Whether the residual is white.
+    pub white: bool,
+}
+
+/// Errors before and after on one channel, root mean square over full scale, held-out rows.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct BeforeAfter {
+    /// Without the effect.
+    pub nrmse_before: f64,
+    /// With it.
+    pub nrmse_after: f64,
+}
+
+/// Gain on rows that were not fitted.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct HeldOut {
+    /// By channel.
+    pub channels: BTreeMap<String, BeforeAfter>,
+    /// Share of the squared error above the noise floor that goes, on the channel with most of it.
+    pub excess_error_removed: f64,
+    /// Bootstrap over blocks.
+    pub interval_95: [f64; 2],
+}
+
+/// Free numbers of a fit for a report: the baseline's, or those of one effect.
+pub fn parameters(fit: &Fit, std_errors: &[f64], effect: Option<usize>) -> Vec<ParameterReport> {
+    let at_bound = fit.at_bound();
+    fit.hypothesis
+        .free
+        .iter()
+        .enumerate()
+        .filter(|(_, f)| match (f.target, effect) {
+            (Target::Base(_), None) => true,
+            (Target::Effect(i, _), Some(wanted)) => i == wanted,
+            _ => false,
+        })
+        .map(|(k, f)| ParameterReport {
+            name: f.name.into(),
+            value: fit.values[k],
+            unit: f.unit.into(),
+            std_error: std_errors[k],
+            stated: effect.is_none().then_some(f.mean),
+            at_bound: Some(at_bound[k]),
+        })
+        .collect()
+}
 
 /// Sum of squares and count, by channel name.
 pub type Sums = BTreeMap<&'static str, (f64, usize)>;
@@ -44,8 +121,8 @@ pub fn noise_floor(problem: &Problem, residual: &Stack) -> BTreeMap<&'static str
     for (r, recording) in problem.recordings.iter().enumerate() {
         let mut near = vec![false; recording.time_s.len()];
         for edge in &recording.edges {
-            let to = (edge.row + 15).min(near.len());
-            near[edge.row.saturating_sub(1)..to].fill(true);
+            let to = (edge + 15).min(near.len());
+            near[edge.saturating_sub(1)..to].fill(true);
         }
         for (c, channel) in recording.channels.iter().enumerate() {
             let entry = out.entry(channel.response.name()).or_insert((0.0, 0));
@@ -194,10 +271,4 @@ fn pieces(
         }
     }
     out.into_values().collect()
-}
-
-/// Standard errors of a fit's free parameters, priors included.
-pub fn std_errors(problem: &Problem, fit: &mut Fit) -> Vec<f64> {
-    let projector = crate::screen::Projector::new(problem, fit);
-    projector.std_errors()
 }

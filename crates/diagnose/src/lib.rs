@@ -1,0 +1,4 @@
+//! Diagnosis: which physics did the model leave out?
+pub mod probe;
+pub mod screen;
+pub mod search;

@@ -1,0 +1,187 @@
+//! What each effect does to the baseline's response at plausible sizes, simulated once.
+//!
+//! A finite size, since friction, play and limits have no slope at nothing. Later sets of effects leave other
+//! residuals, but an effect's action on them is nearly the same: which effects are worth a closer look on top
+//! of any set is told by these without simulating.
+
+use kort_identify::Quadratic;
+use kort_identify::fit::Fit;
+use kort_identify::hypothesis::{Free, Member};
+use kort_identify::simulate::Problem;
+use kort_thruster::effects::Descriptor;
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+/// Starts of one effect with the action of each of its sizes there.
+pub struct Probe {
+    /// The effect where it was probed.
+    pub member: Member,
+    /// Its sizes, by their places among the effect's values, with what each does to the response as lines.
+    sizes: Vec<(usize, DVector<f64>)>,
+}
+
+/// What probes promise of an effect on top of a set.
+#[derive(Clone)]
+pub struct Promise {
+    /// Cost of the set with it, without the prior odds of its effects.
+    pub cost: f64,
+    /// The effect from where it would start.
+    pub member: Member,
+}
+
+/// Multiples of the catalogue's start at which one size is probed.
+const LARGER: [f64; 2] = [5.0, 25.0];
+
+/// Probes an effect on top of the fitted baseline.
+pub fn probe(problem: &Problem, baseline: &Fit, effect: &'static Descriptor) -> Vec<Probe> {
+    let whole = Member::new(effect, &problem.scale);
+    let specs = (effect.parameters)(&problem.scale);
+    if specs.iter().any(|s| s.acts.is_some()) {
+        // What changes freely with time is linear in its many sizes.
+        let hypothesis = baseline.hypothesis.with(&baseline.values, whole.clone(), &problem.scale);
+        let own: Vec<usize> = (baseline.values.len()..hypothesis.free.len()).collect();
+        let mut columns = problem.derivatives(&hypothesis, &hypothesis.start, &own);
+        columns.sort_by_key(|c| c.0);
+        let places = (0..specs.len()).filter(|j| !whole.held.contains(j) && !specs[*j].shape);
+        let places: Vec<usize> = places.collect();
+        let shapes = own.len() - places.len();
+        let sizes = places.iter().zip(columns.into_iter().skip(shapes)).map(|(j, c)| {
+            let size = whole.values[*j];
+            (*j, c.1 * if size == 0.0 { 1.0 } else { size })
+        });
+        let sizes: Vec<(usize, DVector<f64>)> = sizes.collect();
+        return vec![Probe { member: whole, sizes }];
+    }
+    let strengths: Vec<usize> = (0..specs.len()).filter(|j| !specs[*j].shape && !specs[*j].held).collect();
+    let mut starts = (effect.starts)(&problem.scale);
+    starts.insert(0, whole.values.clone());
+    for times in LARGER {
+        let mut larger = starts[0].clone();
+        for j in &strengths {
+            larger[*j] = (times * larger[*j]).clamp(0.6 * specs[*j].low, 0.6 * specs[*j].high);
+        }
+        starts.push(larger);
+    }
+    starts
+        .into_par_iter()
+        .filter_map(|start| {
+            let alone = |only: &usize| {
+                let mut values = start.clone();
+                strengths.iter().filter(|j| *j != only).for_each(|j| values[*j] = 0.0);
+                if values[*only] == 0.0 {
+                    return None;
+                }
+                let member = whole.clone().at(values);
+                let hypothesis = baseline.hypothesis.with(&baseline.values, member, &problem.scale);
+                let action = &baseline.lines - problem.residual_lines(&hypothesis, &hypothesis.start);
+                action.iter().all(|v| v.is_finite()).then_some((*only, action))
+            };
+            let sizes: Vec<_> = strengths.iter().filter_map(alone).collect();
+            (!sizes.is_empty()).then(|| Probe { member: whole.clone().at(start), sizes })
+        })
+        .collect()
+}
+
+/// The best that an effect's probes promise on top of a set, with all of its sizes or one alone. `known` are
+/// the products of the set's own derivatives.
+pub fn promise(problem: &Problem, parent: &Fit, known: &[DMatrix<f64>], probes: &[Probe]) -> Option<Promise> {
+    probes
+        .iter()
+        .flat_map(|probe| {
+            let every: Vec<usize> = (0..probe.sizes.len()).collect();
+            let alone = if every.len() > 1 && probe.sizes.len() <= MOST_ALONE {
+                every.iter().map(|k| vec![*k]).collect()
+            } else {
+                Vec::new()
+            };
+            alone.into_iter().chain(std::iter::once(every)).map(move |form| (probe, form))
+        })
+        .flat_map(|(probe, form)| {
+            let lively = if form.len() > MOST_ALONE { &LIVELINESS[..] } else { &LIVELINESS[..1] };
+            lively.iter().filter_map(move |l| of_form(problem, parent, known, probe, &form, *l))
+        })
+        .min_by(|a, b| a.cost.total_cmp(&b.cost))
+}
+
+/// Most sizes of an effect with a form.
+const MOST_ALONE: usize = 8;
+/// Standard deviations tried for what changes freely with time, over the catalogue's: how much it moves is
+/// learnt from the recording.
+const LIVELINESS: [f64; 3] = [1.0, 0.3, 0.1];
+
+fn of_form(
+    problem: &Problem,
+    parent: &Fit,
+    known: &[DMatrix<f64>],
+    probe: &Probe,
+    form: &[usize],
+    liveliness: f64,
+) -> Option<Promise> {
+    let specs = (probe.member.effect.parameters)(&problem.scale);
+    let mut free = parent.hypothesis.free.clone();
+    let mut columns: Vec<&DVector<f64>> = parent.columns.iter().flatten().map(AsRef::as_ref).collect();
+    let mut values = parent.values.clone();
+    let mut member = Member { liveliness, ..probe.member.clone() };
+    let alone = parent.hypothesis.with(&parent.values, member.clone(), &problem.scale);
+    for k in form {
+        let (place, action) = &probe.sizes[*k];
+        let own = alone.free[free_len(parent)..].iter().find(|f| f.name == specs[*place].name)?;
+        // In units of where it was probed; it starts from nothing.
+        let unit = if member.values[*place] == 0.0 { 1.0 } else { member.values[*place] };
+        let (a, b) = (own.low / unit, own.high / unit);
+        free.push(Free {
+            mean: own.mean / unit,
+            sigma: (own.sigma / unit).abs(),
+            low: a.min(b),
+            high: a.max(b),
+            ..own.clone()
+        });
+        columns.push(action);
+        values.push(0.0);
+    }
+    let model =
+        Quadratic::extended(&problem.spectrum, &problem.criterion, &parent.lines, &columns, &free, known);
+    let mut actions = parent.actions.clone();
+    actions.push(vec![0.0; problem.spectrum.bands.len()]);
+    let mut found = None;
+    // Twice: the form error of what the effect does is known once its size is.
+    for _ in 0..2 {
+        let floor = problem.floor.with_actions(&actions, &problem.criterion);
+        let minimum = model.minimise(&floor, &free, &values, 0.0);
+        let mut acts = DVector::zeros(problem.spectrum.lines);
+        for (i, k) in form.iter().enumerate() {
+            let at = free_len(parent) + i;
+            acts.axpy(minimum.step[at] * free[at].sigma, &probe.sizes[*k].1, 1.0);
+        }
+        let last = actions.len() - 1;
+        actions[last] = problem.spectrum.powers(&acts);
+        found = Some(minimum);
+    }
+    let found = found?;
+    let price = model.price(&found.noise);
+    for (j, spec) in specs.iter().enumerate() {
+        if spec.shape || spec.held {
+            continue;
+        }
+        let in_form = form.iter().position(|k| probe.sizes[*k].0 == j);
+        member.values[j] = match in_form {
+            Some(i) => {
+                let at = free_len(parent) + i;
+                let unit = if probe.member.values[j] == 0.0 { 1.0 } else { probe.member.values[j] };
+                let size = found.step[at] * free[at].sigma;
+                // At nothing there is no slope.
+                let size = if specs[j].acts.is_none() && size.abs() < 0.1 { 0.1_f64.copysign(size) } else { size };
+                (unit * size).clamp(spec.low, spec.high)
+            }
+            None => {
+                member.held.push(j);
+                0.0
+            }
+        };
+    }
+    Some(Promise { cost: found.misfit + found.penalty + price, member })
+}
+
+fn free_len(parent: &Fit) -> usize {
+    parent.hypothesis.free.len()
+}

@@ -1,0 +1,92 @@
+//! Which effects are worth an exact fit on top of a set? Those whose probes promise most are simulated there:
+//! the response is taken as linear about that point, and the criterion minimised and priced as a fit's is.
+
+use kort_identify::Quadratic;
+use kort_identify::fit::Fit;
+use kort_identify::hypothesis::{Hypothesis, Member};
+use kort_identify::simulate::Problem;
+use kort_thruster::dual::LANES;
+use kort_thruster::effects::Descriptor;
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use crate::probe::{Probe, Promise, promise};
+
+/// An effect on top of a set, as the screen sees it.
+#[derive(Clone)]
+pub struct Screened {
+    /// The effect.
+    pub effect: &'static Descriptor,
+    /// The set with it, from where the screen saw it do best.
+    pub hypothesis: Hypothesis,
+    /// Its cost there, without the prior odds of its effects.
+    pub cost: f64,
+    /// What the effect does to the response there: mean square by band.
+    pub action: Vec<f64>,
+}
+
+/// Effects looked at closely on top of one set.
+const CLOSELY: usize = 10;
+
+/// Screens effects on top of a fit, cheapest first. Effects that break the simulation down are left out.
+pub fn screen(problem: &Problem, parent: &Fit, probes: &[&[Probe]]) -> Vec<Screened> {
+    let known = problem.about(&parent.lines, &parent.columns, &parent.hypothesis);
+    let known = known.curvature();
+    let mut promises: Vec<Promise> =
+        probes.par_iter().filter_map(|probes| promise(problem, parent, known, probes)).collect();
+    promises.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    promises.truncate(CLOSELY);
+    let mut all: Vec<Screened> =
+        promises.into_par_iter().filter_map(|p| at(problem, parent, known, p.member)).collect();
+    all.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    all
+}
+
+fn at(problem: &Problem, parent: &Fit, known: &[DMatrix<f64>], member: Member) -> Option<Screened> {
+    let effect = member.effect;
+    let hypothesis = parent.hypothesis.with(&parent.values, member, &problem.scale);
+    let own: Vec<usize> = (parent.values.len()..hypothesis.free.len()).collect();
+    let (lines, new) = if own.len() <= LANES {
+        problem.residual_with_derivatives(&hypothesis, &hypothesis.start, &own)
+    } else {
+        let mut new = problem.derivatives(&hypothesis, &hypothesis.start, &own);
+        new.sort_by_key(|c| c.0);
+        (problem.residual_lines(&hypothesis, &hypothesis.start), new.into_iter().map(|c| c.1).collect())
+    };
+    let finite = |v: &DVector<f64>| v.iter().all(|x| x.is_finite());
+    if !finite(&lines) || !new.iter().all(finite) {
+        return None;
+    }
+    let columns: Vec<&DVector<f64>> = parent.columns.iter().flatten().map(AsRef::as_ref).chain(&new).collect();
+    let model =
+        Quadratic::extended(&problem.spectrum, &problem.criterion, &lines, &columns, &hypothesis.free, known);
+    let mut actions = parent.actions.clone();
+    actions.push(vec![0.0; problem.spectrum.bands.len()]);
+    // Twice: the form error of what the effect does is known once its size is.
+    let mut minimum = None;
+    for _ in 0..2 {
+        let floor = problem.floor.with_actions(&actions, &problem.criterion);
+        let found = model.minimise(&floor, &hypothesis.free, &hypothesis.start, 0.0);
+        let mut acts = &parent.lines - &lines;
+        for (k, column) in own.iter().zip(&new) {
+            acts.axpy(found.step[*k] * hypothesis.free[*k].sigma, column, 1.0);
+        }
+        let last = actions.len() - 1;
+        actions[last] = problem.spectrum.powers(&acts);
+        minimum = Some(found);
+    }
+    let minimum = minimum?;
+    let price = model.price(&minimum.noise);
+    let start = hypothesis
+        .free
+        .iter()
+        .enumerate()
+        .map(|(k, free)| (hypothesis.start[k] + minimum.step[k] * free.sigma).clamp(free.low, free.high))
+        .collect();
+    Some(Screened {
+        effect,
+        hypothesis: Hypothesis { start, ..hypothesis },
+        cost: minimum.misfit + minimum.penalty + price,
+        action: actions.pop()?,
+    })
+}

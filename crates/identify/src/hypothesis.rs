@@ -1,0 +1,305 @@
+//! A hypothesis: a baseline model, effects added to it, and what is free in them.
+//!
+//! Every free number has a proper prior: the rig's stated value and tolerance for the baseline, the
+//! catalogue's typical size for an effect. A coefficient may move by so many of its tolerances and no
+//! further: beyond them it would not be the coefficient that was stated.
+
+use std::sync::Arc;
+
+use kort_thruster::effects::{Descriptor, Scale, Spec, Stretch};
+use kort_thruster::models::ModelName;
+use kort_thruster::parameters::{Parameter as P, Parameters};
+use kort_thruster::rig::{Quantity, Rig};
+
+use crate::data::Prepared;
+
+/// Relative uncertainty (two sigma) of a coefficient in a rig that states no tolerance at all.
+pub const UNSTATED_TOL: f64 = 0.5;
+
+/// How far a coefficient may move, in stated tolerances (two sigma each).
+const REACH: f64 = 1.5;
+
+/// What a free number changes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Target {
+    /// A parameter of the baseline.
+    Base(P),
+    /// A value of an effect: which effect of the hypothesis, which value.
+    Effect(usize, usize),
+}
+
+/// A free number.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Free {
+    /// What it changes.
+    pub target: Target,
+    /// Name for reports.
+    pub name: &'static str,
+    /// Unit for reports.
+    pub unit: &'static str,
+    /// Prior mean.
+    pub mean: f64,
+    /// Prior standard deviation.
+    pub sigma: f64,
+    /// Least value allowed.
+    pub low: f64,
+    /// Greatest value allowed.
+    pub high: f64,
+    /// When it acts, if only for a while.
+    pub acts: Option<Stretch>,
+}
+
+impl Free {
+    /// Distance of a value from the prior's mean, in standard deviations.
+    pub fn score(&self, value: f64) -> f64 {
+        (value - self.mean) / self.sigma
+    }
+
+    /// Whether a value stands at the edge of what is allowed.
+    pub fn at_bound(&self, value: f64) -> bool {
+        let slack = 1e-6 * (self.high - self.low);
+        value <= self.low + slack || value >= self.high - slack
+    }
+}
+
+/// An effect as it stands in a hypothesis.
+#[derive(Clone)]
+pub struct Member {
+    /// The effect.
+    pub effect: &'static Descriptor,
+    /// Its values.
+    pub values: Vec<f64>,
+    /// Places of values that are not fitted.
+    pub held: Vec<usize>,
+    /// Prior standard deviations over the catalogue's, for what changes freely with time.
+    pub liveliness: f64,
+}
+
+impl Member {
+    /// An effect at its catalogue's start, all of it free.
+    pub fn new(effect: &'static Descriptor, scale: &Scale) -> Self {
+        let specs = (effect.parameters)(scale);
+        Self {
+            effect,
+            held: (0..specs.len()).filter(|j| specs[*j].held || specs[*j].low == specs[*j].high).collect(),
+            values: specs.iter().map(|s| s.start).collect(),
+            liveliness: 1.0,
+        }
+    }
+
+    /// The same from other values.
+    pub fn at(self, values: Vec<f64>) -> Self {
+        Self { values, ..self }
+    }
+}
+
+/// Where inside its log interval each step of the command happened: control ticks before the row that
+/// first shows it, by recording and edge.
+pub type Edges = Vec<Vec<usize>>;
+
+/// The command on the control grid, with its steps where `edges` says.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Inputs {
+    /// Where the steps lie.
+    pub edges: Edges,
+    /// Command by recording and control tick.
+    pub commands: Vec<Vec<f64>>,
+}
+
+impl Inputs {
+    /// Lays the recorded commands out.
+    pub fn new(recordings: &[Prepared], edges: Edges) -> Self {
+        let commands = recordings.iter().zip(&edges).map(|(r, e)| r.commands(e)).collect();
+        Self { edges, commands }
+    }
+
+    /// Every step at the row that first shows it.
+    pub fn late(recordings: &[Prepared]) -> Self {
+        Self::new(recordings, recordings.iter().map(|r| vec![0; r.edges.len()]).collect())
+    }
+}
+
+/// A baseline model with effects added to it.
+#[derive(Clone)]
+pub struct Hypothesis {
+    /// Effects in order; values here are where they entered.
+    pub effects: Vec<Member>,
+    /// Free numbers: baseline first, then the effects' in order.
+    pub free: Vec<Free>,
+    /// Values where a fit starts.
+    pub start: Vec<f64>,
+    /// The command as it reached the drive.
+    pub inputs: Arc<Inputs>,
+}
+
+/// Parameters that shape a model's response.
+fn used(model: ModelName, dry: bool, shaft_prescribed: bool) -> Vec<P> {
+    let shaft = [
+        P::InertiaKgM2,
+        P::TorqueConstantNmA,
+        P::ViscousFrictionNmS,
+        P::WindingResistanceOhm,
+        P::TimeConstantS,
+    ];
+    let water = [
+        P::PitchRad,
+        P::LiftMax,
+        P::DragMax,
+        P::FluxCoefficient,
+        P::AddedMassCoefficient,
+        P::DensityKgM3,
+        P::RadiusM,
+        P::DuctLengthM,
+    ];
+    let mut list: Vec<P> = match model {
+        _ if dry => Vec::new(),
+        ModelName::Model0 => vec![P::ThrustCoefficientNS2, P::TorqueCoefficientNmS2],
+        ModelName::Model1 => vec![
+            P::Efficiency,
+            P::AddedMassCoefficient,
+            P::PitchRad,
+            P::RadiusM,
+            P::DuctLengthM,
+            P::DensityKgM3,
+        ],
+        ModelName::Model2 | ModelName::Model3 => water.to_vec(),
+        ModelName::RotationalFlow => {
+            water.into_iter().chain([P::SwirlFluxCoefficient, P::SwirlMassCoefficient]).collect()
+        }
+    };
+    if !shaft_prescribed {
+        list.extend(shaft);
+    }
+    list
+}
+
+/// What a rig states of a parameter for this model; coefficients that no rig description holds
+/// (Model 0, Model 1, swirl) are as uncertain as a rig without tolerances.
+fn stated(rig: &Rig, parameter: P, values: &Parameters) -> Option<Quantity> {
+    let loose = |tol| Some(Quantity { value: values.get(parameter), tol: Some(tol) });
+    match parameter {
+        P::ThrustCoefficientNS2 | P::TorqueCoefficientNmS2 | P::Efficiency => loose(0.5),
+        // The larger the flux, the less the wake turns: up to hardly at all.
+        P::SwirlFluxCoefficient => loose(200.0),
+        P::SwirlMassCoefficient => loose(1.5),
+        _ => Parameters::quantity(rig, parameter),
+    }
+}
+
+/// True when the rig gives no tolerance for any parameter: then coefficients are taken as
+/// uncertain by [`UNSTATED_TOL`], and the report says so.
+pub fn nothing_stated(rig: &Rig) -> bool {
+    P::ALL.iter().all(|p| Parameters::quantity(rig, *p).is_none_or(|q| q.tol.is_none()))
+}
+
+impl Hypothesis {
+    /// The baseline alone. `current_seen`: whether the current is a response, without which the drive's lag
+    /// is as stated.
+    pub fn baseline(
+        model: ModelName,
+        rig: &Rig,
+        shaft_prescribed: bool,
+        current_seen: bool,
+        inputs: Arc<Inputs>,
+    ) -> Self {
+        let values = Parameters::stated(rig);
+        let unstated = nothing_stated(rig);
+        let coefficient = |p: P| {
+            matches!(
+                p,
+                P::LiftMax
+                    | P::DragMax
+                    | P::FluxCoefficient
+                    | P::AddedMassCoefficient
+                    | P::InertiaKgM2
+                    | P::TorqueConstantNmA
+            )
+        };
+        let (mut free, mut start) = (Vec::new(), Vec::new());
+        for parameter in used(model, rig.propeller.is_none(), shaft_prescribed) {
+            let Some(mut quantity) = stated(rig, parameter, &values) else { continue };
+            if unstated && coefficient(parameter) && quantity.tol.is_none() {
+                quantity.tol = Some(UNSTATED_TOL);
+            }
+            let Some(tol) = quantity.tol else { continue };
+            if quantity.value == 0.0 || (parameter == P::TimeConstantS && !current_seen) {
+                continue;
+            }
+            let reach = REACH * tol * quantity.value.abs();
+            let low = quantity.value - reach;
+            free.push(Free {
+                target: Target::Base(parameter),
+                name: parameter.name(),
+                unit: parameter.unit(),
+                mean: quantity.value,
+                sigma: quantity.sigma(),
+                low: if parameter.positive() { low.max(0.02 * quantity.value) } else { low },
+                high: quantity.value + reach,
+                acts: None,
+            });
+            start.push(quantity.value);
+        }
+        Self { effects: Vec::new(), free, start, inputs }
+    }
+
+    /// The same with one more effect, from these values of what is free so far.
+    pub fn with(&self, values: &[f64], member: Member, scale: &Scale) -> Self {
+        let mut larger = self.clone();
+        larger.start = values.to_vec();
+        let slot = larger.effects.len();
+        for (j, spec) in (member.effect.parameters)(scale).into_iter().enumerate() {
+            if member.held.contains(&j) {
+                continue;
+            }
+            let (mean, sigma) = prior(&spec);
+            larger.free.push(Free {
+                target: Target::Effect(slot, j),
+                name: spec.name,
+                unit: spec.unit,
+                mean,
+                sigma: if spec.acts.is_some() { sigma * member.liveliness } else { sigma },
+                low: spec.low,
+                high: spec.high,
+                acts: spec.acts,
+            });
+            larger.start.push(member.values[j].clamp(spec.low, spec.high));
+        }
+        larger.effects.push(member);
+        larger
+    }
+
+    /// Parameters and values of effects from the vector of free numbers.
+    pub fn assemble<T: kort_thruster::real::Real>(
+        &self,
+        stated: &Parameters,
+        values: &[T],
+    ) -> (Parameters<T>, Vec<Vec<T>>) {
+        let mut parameters = Parameters::lift(stated);
+        let mut effects: Vec<Vec<T>> =
+            self.effects.iter().map(|m| m.values.iter().map(|v| T::from(*v)).collect()).collect();
+        for (free, value) in self.free.iter().zip(values) {
+            match free.target {
+                Target::Base(p) => parameters.set(p, *value),
+                Target::Effect(i, j) => effects[i][j] = *value,
+            }
+        }
+        (parameters, effects)
+    }
+
+    /// Squared distance of values from the priors' means, in standard deviations.
+    pub fn penalty(&self, values: &[f64]) -> f64 {
+        self.free.iter().zip(values).map(|(f, v)| f.score(*v).powi(2)).sum()
+    }
+}
+
+/// Prior mean and standard deviation of an effect's value.
+fn prior(spec: &Spec) -> (f64, f64) {
+    if spec.acts.is_some() {
+        return (0.0, 0.3 * spec.high);
+    }
+    if spec.shape {
+        let sigma = (0.7 * spec.start.abs()).max(0.1 * (spec.high - spec.low)).min(0.5 * (spec.high - spec.low));
+        return (spec.start, sigma);
+    }
+    (0.0, (5.0 * spec.start.abs()).min(0.5 * (spec.high - spec.low)))
+}

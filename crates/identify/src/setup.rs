@@ -1,0 +1,111 @@
+//! Recordings of one rig made ready to compare with a model: what `fit` and `diagnose` start from.
+
+use std::sync::Arc;
+
+use kort_thruster::models::ModelName;
+use kort_thruster::parameters::Parameters;
+use kort_thruster::rig::Rig;
+
+use crate::checks;
+use crate::data::{DataError, Driving, Prepared, Response, Series};
+use crate::hypothesis::{Hypothesis, Inputs, UNSTATED_TOL, nothing_stated};
+use crate::noise::Criterion;
+use crate::simulate::Problem;
+
+/// A problem ready to fit.
+pub struct Setup<'a> {
+    /// The problem.
+    pub problem: Problem<'a>,
+    /// The baseline with its free numbers.
+    pub baseline: Hypothesis,
+    /// Words from the checks.
+    pub notes: Vec<String>,
+    /// Why the recordings cannot tell anything, if so.
+    pub thin: Option<String>,
+}
+
+impl<'a> Setup<'a> {
+    /// Prepares recordings for a model.
+    ///
+    /// # Errors
+    /// [`DataError`] if a recording cannot be compared with a model at all.
+    pub fn new(series: &[Series], rig: &'a Rig, model: ModelName, criterion: Criterion) -> Result<Self, DataError> {
+        let mut recordings: Vec<Prepared> = series
+            .iter()
+            .map(|s| Prepared::new(s, rig, model == ModelName::Model3))
+            .collect::<Result<_, _>>()?;
+        let (mut notes, mut masked) = (Vec::new(), Vec::new());
+        for (one, prepared) in series.iter().zip(&recordings) {
+            let checked = checks::check(one, rig);
+            notes.extend(checked.notes);
+            let mut rows = checked.masked;
+            if prepared.start[0] != 0.0 {
+                // The state before the first row is not known: let it settle.
+                let until = prepared.time_s[0] + (0.1 * prepared.duration_s()).min(2.0);
+                prepared.time_s.iter().zip(&mut rows).for_each(|(t, m)| *m |= *t < until);
+            }
+            masked.push(rows);
+        }
+        if nothing_stated(rig) {
+            notes.push(format!(
+                "the rig description states no tolerance: coefficients are taken as uncertain by {:.0} % (two sigma)",
+                100.0 * UNSTATED_TOL
+            ));
+        }
+        if settled(&recordings) {
+            notes.push(
+                "a table of settled points: nothing in it accelerates, so inertia, added mass, lags and delays do not show; in bollard pull every point has the same angle of attack. kort fit-table makes a rig from such a table and says what it cannot fix"
+                    .into(),
+            );
+        }
+        let thin = too_thin(&recordings);
+        let prescribed = recordings.iter().all(|p| p.driving == Driving::Speed);
+        let current_seen =
+            recordings.iter().any(|p| p.channels.iter().any(|c| c.response == Response::Current));
+        let stated = Parameters::stated(rig);
+        recordings.iter_mut().for_each(|r| r.mark_smooth(model, rig, &stated));
+        let inputs = Arc::new(Inputs::late(&recordings));
+        let baseline = Hypothesis::baseline(model, rig, prescribed, current_seen, inputs);
+        let problem = Problem::new(model, rig, recordings, masked, criterion);
+        Ok(Self { problem, baseline, notes, thin })
+    }
+}
+
+/// Fewest rows in all that noise can be learnt from.
+const FEWEST_ROWS: usize = 200;
+
+/// Recordings without enough change to tell anything.
+fn too_thin(recordings: &[Prepared]) -> Option<String> {
+    let samples: usize = recordings.iter().map(|r| r.time_s.len()).sum();
+    if samples < FEWEST_ROWS {
+        return Some(format!("{samples} rows in all are too few to learn the noise and hold data out"));
+    }
+    let changes: usize = recordings
+        .iter()
+        .map(|r| {
+            let top = r.command.iter().fold(0.0_f64, |m, c| m.max(c.abs()));
+            let mut at = r.command[0];
+            let mut moves = 0;
+            for c in &r.command {
+                if (c - at).abs() > 0.1 * top {
+                    moves += 1;
+                    at = *c;
+                }
+            }
+            moves
+        })
+        .sum();
+    (changes < 3)
+        .then(|| "the driving signal hardly changes: steady data cannot part physics from parameters".into())
+}
+
+/// One sample a step of the command, each just before the next: a table of settled points.
+fn settled(recordings: &[Prepared]) -> bool {
+    recordings.iter().all(|r| {
+        r.channels.iter().all(|c| {
+            let last = c.rows.iter().filter(|k| r.command.get(**k + 1).is_none_or(|n| *n != r.command[**k]));
+            let alone = c.rows.windows(2).all(|w| w[1] > w[0] + 1);
+            alone && last.count() as f64 > 0.8 * c.rows.len() as f64
+        })
+    })
+}

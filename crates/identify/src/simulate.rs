@@ -1,0 +1,263 @@
+//! Responses of hypotheses to the recorded inputs, and their derivatives.
+//!
+//! The derivative is exact: the plant runs on numbers that carry it along, several free numbers a
+//! simulation; those that act at different times share one.
+
+use kort_thruster::dual::{Dual, LANES};
+use kort_thruster::effects::{Descriptor, Scale, Stretch};
+use kort_thruster::models::ModelName;
+use kort_thruster::parameters::Parameters;
+use kort_thruster::plant::{Plant, Sensed, Tick};
+use kort_thruster::real::Real;
+use kort_thruster::rig::Rig;
+use nalgebra::DVector;
+use rayon::prelude::*;
+
+use crate::data::Prepared;
+use crate::hypothesis::{Hypothesis, Member};
+use crate::noise::{Criterion, Floor};
+use crate::shared_lanes::{groups, last_acting};
+use crate::spectrum::Spectrum;
+
+/// Samples of all channels: `[recording][channel][sample]`.
+pub type Stack = Vec<Vec<Vec<f64>>>;
+
+/// Everything that stays the same while hypotheses are compared.
+#[derive(Clone)]
+pub struct Problem<'a> {
+    /// Baseline model.
+    pub model: ModelName,
+    /// The stated rig.
+    pub rig: &'a Rig,
+    /// Stated parameters.
+    pub stated: Parameters,
+    /// Recordings.
+    pub recordings: Vec<Prepared>,
+    /// Rows left out of every comparison (flagged data, run-in), by recording.
+    pub masked: Vec<Vec<bool>>,
+    /// Sizes in use.
+    pub scale: Scale,
+    /// The criterion's constants.
+    pub criterion: Criterion,
+    /// Frequencies of the samples in use.
+    pub spectrum: Spectrum,
+    /// Noise floor of any hypothesis.
+    pub floor: Floor,
+}
+
+impl<'a> Problem<'a> {
+    /// Recordings to compare with a model.
+    pub fn new(
+        model: ModelName,
+        rig: &'a Rig,
+        recordings: Vec<Prepared>,
+        masked: Vec<Vec<bool>>,
+        criterion: Criterion,
+    ) -> Self {
+        let spectrum = Spectrum::new(&recordings, &masked);
+        let floor = Floor::of_signal(&spectrum.bands, &criterion);
+        let scale = crate::data::scale(&recordings, rig);
+        Self { model, rig, stated: Parameters::stated(rig), recordings, masked, scale, criterion, spectrum, floor }
+    }
+
+    /// The problem without some rows: its training part.
+    pub fn without(&self, held: &[Vec<bool>]) -> Self {
+        let mut masked = self.masked.clone();
+        for (mask, held) in masked.iter_mut().zip(held) {
+            mask.iter_mut().zip(held).for_each(|(m, h)| *m |= *h);
+        }
+        Self { scale: self.scale, ..Self::new(self.model, self.rig, self.recordings.clone(), masked, self.criterion) }
+    }
+
+    /// The response of a hypothesis at values of its free numbers.
+    pub fn respond(&self, hypothesis: &Hypothesis, values: &[f64]) -> Stack {
+        let [stack] = self.stacks(hypothesis, values, |v| [v]);
+        stack
+    }
+
+    /// Measured less simulated, by sample.
+    pub fn residual(&self, hypothesis: &Hypothesis, values: &[f64]) -> Stack {
+        let mut stack = self.respond(hypothesis, values);
+        self.from_measured(&mut stack);
+        stack
+    }
+
+    /// Measured less these.
+    fn from_measured(&self, stack: &mut Stack) {
+        for (recording, channels) in self.recordings.iter().zip(stack) {
+            for (channel, samples) in recording.channels.iter().zip(channels) {
+                samples.iter_mut().zip(&channel.values).for_each(|(s, m)| *s = m - *s);
+            }
+        }
+    }
+
+    /// Measured less simulated, by line of the spectrum.
+    pub fn residual_lines(&self, hypothesis: &Hypothesis, values: &[f64]) -> DVector<f64> {
+        self.spectrum.transform(&self.residual(hypothesis, values))
+    }
+
+    /// Simulated rows of all recordings.
+    pub fn rows(&self, hypothesis: &Hypothesis, values: &[f64]) -> Vec<Vec<Sensed>> {
+        let mut all: Vec<Vec<Sensed>> = vec![Vec::new(); self.recordings.len()];
+        self.simulate(hypothesis, values, |r, _, sensed| all[r].push(*sensed));
+        all
+    }
+
+    /// The members of a hypothesis at values of its free numbers.
+    pub fn members(&self, hypothesis: &Hypothesis, values: &[f64]) -> Vec<Member> {
+        let (_, effects) = hypothesis.assemble(&self.stated, values);
+        hypothesis.effects.iter().cloned().zip(effects).map(|(m, v)| m.at(v)).collect()
+    }
+
+    /// Simulates all recordings; what the sensors show goes on by recording and row.
+    fn simulate<T: Real>(
+        &self,
+        hypothesis: &Hypothesis,
+        values: &[T],
+        mut show: impl FnMut(usize, usize, &Sensed<T>),
+    ) {
+        let (parameters, effects) = hypothesis.assemble(&self.stated, values);
+        let hooked: Vec<(&Descriptor, &[T])> =
+            hypothesis.effects.iter().map(|m| m.effect).zip(effects.iter().map(Vec::as_slice)).collect();
+        for (r, recording) in self.recordings.iter().enumerate() {
+            let mut plant = Plant::new(self.model, self.rig, &parameters, &hooked, recording.tick_s);
+            let [speed, flow, current, angle] = recording.start;
+            plant.start(recording.time_s[0], speed, flow, current, angle);
+            run(&mut plant, recording, &hypothesis.inputs.commands[r], |row, sensed| show(r, row, sensed));
+        }
+    }
+
+    /// Some numbers of every sample of every channel, a stack each.
+    fn stacks<T: Real, const K: usize>(
+        &self,
+        hypothesis: &Hypothesis,
+        values: &[T],
+        numbers: impl Fn(T) -> [f64; K],
+    ) -> [Stack; K] {
+        let room = |r: &Prepared| r.channels.iter().map(|c| Vec::with_capacity(c.rows.len())).collect();
+        let mut stacks: [Stack; K] = std::array::from_fn(|_| self.recordings.iter().map(room).collect());
+        self.simulate(hypothesis, values, |r, row, sensed| {
+            for (c, channel) in self.recordings[r].channels.iter().enumerate() {
+                // Samples come in order of their rows; a row may have none.
+                if channel.rows.get(stacks[0][r][c].len()) == Some(&row) {
+                    let all = numbers(channel.response.of(sensed));
+                    stacks.iter_mut().zip(all).for_each(|(stack, one)| stack[r][c].push(one));
+                }
+            }
+        });
+        stacks
+    }
+
+    /// Derivatives of the response by some of the free numbers, as lines of the spectrum.
+    pub fn derivatives(
+        &self,
+        hypothesis: &Hypothesis,
+        values: &[f64],
+        wanted: &[usize],
+    ) -> Vec<(usize, DVector<f64>)> {
+        let always = Stretch { from_s: 0.0, length_s: 0.0, period_s: 0.0 };
+        let (some, all): (Vec<usize>, Vec<usize>) =
+            wanted.iter().partition(|k| hypothesis.free[**k].acts.is_some());
+        let tasks: Vec<Vec<(usize, Stretch)>> = all
+            .into_iter()
+            .map(|k| vec![(k, always)])
+            .chain(groups(some.iter().filter_map(|k| Some((*k, hypothesis.free[*k].acts?))).collect()))
+            .collect();
+        tasks
+            .par_chunks(LANES)
+            .flat_map_iter(|groups| self.lanes(hypothesis, values, groups))
+            .map(|(k, stack)| (k, self.spectrum.transform(&stack)))
+            .collect()
+    }
+
+    /// The residual and its derivatives by up to four free numbers, as lines, by one simulation.
+    pub fn residual_with_derivatives(
+        &self,
+        hypothesis: &Hypothesis,
+        values: &[f64],
+        wanted: &[usize],
+    ) -> (DVector<f64>, Vec<DVector<f64>>) {
+        let mut moved: Vec<Dual> = values.iter().map(|v| Dual::from(*v)).collect();
+        for (lane, k) in wanted.iter().enumerate() {
+            moved[*k] = Dual::parameter(values[*k], lane);
+        }
+        let [mut stack, a, b, c, d] = self.stacks(hypothesis, &moved, |v: Dual| {
+            let [a, b, c, d] = v.slopes();
+            [v.value, a, b, c, d]
+        });
+        self.from_measured(&mut stack);
+        let columns = [a, b, c, d].iter().take(wanted.len()).map(|s| self.spectrum.transform(s)).collect();
+        (self.spectrum.transform(&stack), columns)
+    }
+
+    /// Derivatives by one simulation: a lane a group of numbers that do not meet in time.
+    fn lanes(
+        &self,
+        hypothesis: &Hypothesis,
+        values: &[f64],
+        groups: &[Vec<(usize, Stretch)>],
+    ) -> Vec<(usize, Stack)> {
+        let mut moved: Vec<Dual> = values.iter().map(|v| Dual::from(*v)).collect();
+        for (lane, group) in groups.iter().enumerate() {
+            for (k, _) in group {
+                moved[*k] = Dual::parameter(values[*k], lane);
+            }
+        }
+        let changes = self.stacks(hypothesis, &moved, Dual::slopes);
+        let one = |(group, change): (&Vec<(usize, Stretch)>, Stack)| {
+            group.iter().map(|(k, _)| *k).zip(self.shares(change, group)).collect::<Vec<_>>()
+        };
+        groups.iter().zip(changes).flat_map(one).collect()
+    }
+
+    /// Splits the change that a group made together: each sample to the member that acted last.
+    fn shares(&self, change: Stack, group: &[(usize, Stretch)]) -> Vec<Stack> {
+        if group.len() == 1 {
+            return vec![change];
+        }
+        let nothing: Stack =
+            change.iter().map(|r| r.iter().map(|c| vec![0.0; c.len()]).collect()).collect();
+        let mut shares = vec![nothing; group.len()];
+        for (r, recording) in self.recordings.iter().enumerate() {
+            for (c, channel) in recording.channels.iter().enumerate() {
+                for (i, row) in channel.rows.iter().enumerate() {
+                    let owner = last_acting(group, recording.time_s[*row]);
+                    shares[owner][r][c][i] = change[r][c][i];
+                }
+            }
+        }
+        shares
+    }
+}
+
+/// Steps the plant through a recording's ticks under these commands and shows every log instant.
+fn run<T: Real>(
+    plant: &mut Plant<T>,
+    recording: &Prepared,
+    commands: &[f64],
+    mut show: impl FnMut(usize, &Sensed<T>),
+) {
+    let stimulus = &recording.stimulus;
+    let mut next = stimulus.logs.iter().enumerate().peekable();
+    // An instant on the grid shows the state before that tick's command acts.
+    while let Some((row, _)) = next.next_if(|(_, (tick, part))| *tick == 0 && *part == 0.0) {
+        show(row, &plant.sensed());
+    }
+    for (i, (tick, command)) in stimulus.ticks.iter().zip(commands).enumerate() {
+        let Some((_, (at, part))) = next.peek() else { break };
+        let before = (*at == i && *part > 0.0).then(|| plant.sensed());
+        plant.step(&Tick { command: *command, ..*tick });
+        while let Some((row, (_, part))) =
+            next.next_if(|(_, (at, part))| *at == i && *part > 0.0 || *at == i + 1 && *part == 0.0)
+        {
+            match &before {
+                Some(before) if *part > 0.0 => show(row, &before.between(&plant.sensed(), *part)),
+                _ => show(row, &plant.sensed()),
+            }
+        }
+    }
+    // Instants past the last tick see the last state.
+    for (row, _) in next {
+        show(row, &plant.sensed());
+    }
+}

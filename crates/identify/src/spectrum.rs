@@ -1,0 +1,191 @@
+//! Residuals line by line in frequency: what a criterion can weigh without one error counting many times.
+//!
+//! Every channel of every recording is a frame. Its samples in use go through an orthonormal cosine
+//! transform (DCT-II: no leakage round the ends), in units of the channel's full scale. Lines are collected
+//! in bands, five a decade; the constant is a band of its own.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use nalgebra::DVector;
+use rustdct::{DctPlanner, TransformType2And3};
+
+use crate::data::Prepared;
+use crate::simulate::Stack;
+
+/// Bands a decade of frequency.
+const BANDS_A_DECADE: f64 = 5.0;
+
+/// Lines next to each other in frequency, of one channel of one recording.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Band {
+    /// Its lines.
+    pub lines: Range<usize>,
+    /// Mean frequency, Hz.
+    pub hz: f64,
+    /// Mean square of the measured signal there, in full scales.
+    pub signal: f64,
+    /// Variance of the channel's quantisation, in full scales.
+    pub quantisation: f64,
+    /// Whether the next band continues this channel at higher frequency.
+    pub continues: bool,
+}
+
+/// One channel of one recording.
+#[derive(Clone)]
+struct Frame {
+    /// Samples in use.
+    picks: Vec<usize>,
+    full_scale: f64,
+    transform: Arc<dyn TransformType2And3<f64>>,
+    lines: Range<usize>,
+}
+
+/// All channels of all recordings.
+#[derive(Clone)]
+pub struct Spectrum {
+    frames: Vec<Vec<Frame>>,
+    /// Bands of all frames, low to high frequency within each.
+    pub bands: Vec<Band>,
+    /// Number of lines in all.
+    pub lines: usize,
+}
+
+impl Spectrum {
+    /// For recordings of which `masked` rows are left out.
+    pub fn new(recordings: &[Prepared], masked: &[Vec<bool>]) -> Self {
+        let mut planner = DctPlanner::new();
+        let (mut frames, mut bands, mut lines) = (Vec::new(), Vec::new(), 0);
+        for (recording, masked) in recordings.iter().zip(masked) {
+            let mut own = Vec::new();
+            for channel in &recording.channels {
+                let picks: Vec<usize> =
+                    (0..channel.rows.len()).filter(|k| !masked[channel.rows[*k]]).collect();
+                let n = picks.len();
+                let frame = Frame {
+                    full_scale: channel.full_scale,
+                    transform: planner.plan_dct2(n.max(1)),
+                    lines: lines..lines + n,
+                    picks,
+                };
+                let times: Vec<f64> =
+                    frame.picks.iter().map(|k| recording.time_s[channel.rows[*k]]).collect();
+                let interval_s = median_interval(&times);
+                let mut signal = vec![0.0; n];
+                frame.transform(&channel.values, &mut signal);
+                let quantisation = (quantum(&channel.values) / channel.full_scale).powi(2) / 12.0;
+                let ranges = band_ranges(n);
+                for (i, range) in ranges.iter().enumerate() {
+                    let power: f64 = signal[range.clone()].iter().map(|v| v * v).sum();
+                    // The constant counts as half of the lowest frequency.
+                    let middle = (0.5 * (range.start + range.end - 1) as f64).max(0.5);
+                    bands.push(Band {
+                        lines: lines + range.start..lines + range.end,
+                        hz: middle / (2.0 * n as f64 * interval_s),
+                        signal: power / range.len() as f64,
+                        quantisation,
+                        continues: i + 1 < ranges.len(),
+                    });
+                }
+                lines += n;
+                own.push(frame);
+            }
+            frames.push(own);
+        }
+        Self { frames, bands, lines }
+    }
+
+    /// The lines of a stack of samples.
+    pub fn transform(&self, stack: &Stack) -> DVector<f64> {
+        let mut out = DVector::zeros(self.lines);
+        for (frames, channels) in self.frames.iter().zip(stack) {
+            for (frame, samples) in frames.iter().zip(channels) {
+                frame.transform(samples, &mut out.as_mut_slice()[frame.lines.clone()]);
+            }
+        }
+        out
+    }
+
+    /// Mean square of each band.
+    pub fn powers(&self, lines: &DVector<f64>) -> Vec<f64> {
+        let all = lines.as_slice();
+        self.bands
+            .iter()
+            .map(|b| all[b.lines.clone()].iter().map(|v| v * v).sum::<f64>() / b.lines.len() as f64)
+            .collect()
+    }
+}
+
+impl Frame {
+    fn transform(&self, samples: &[f64], lines: &mut [f64]) {
+        let n = self.picks.len();
+        for (line, k) in lines.iter_mut().zip(&self.picks) {
+            *line = samples[*k] / self.full_scale;
+        }
+        if n == 0 {
+            return;
+        }
+        self.transform.process_dct2(lines);
+        // From rustdct's scaling to the orthonormal one.
+        let scale = (2.0 / n as f64).sqrt();
+        lines.iter_mut().for_each(|v| *v *= scale);
+        lines[0] *= std::f64::consts::FRAC_1_SQRT_2;
+    }
+}
+
+/// Lines of each band: the constant, then five bands a decade.
+fn band_ranges(lines: usize) -> Vec<Range<usize>> {
+    let mut ranges = Vec::new();
+    if lines > 0 {
+        ranges.push(0..1);
+    }
+    let (mut from, mut edge) = (1, 1.0_f64);
+    while from < lines {
+        edge *= 10.0_f64.powf(1.0 / BANDS_A_DECADE);
+        let to = (edge.round() as usize).max(from + 1).min(lines);
+        edge = edge.max(to as f64);
+        ranges.push(from..to);
+        from = to;
+    }
+    ranges
+}
+
+fn median_interval(times: &[f64]) -> f64 {
+    let mut steps: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).collect();
+    steps.sort_by(f64::total_cmp);
+    steps.get(steps.len() / 2).copied().unwrap_or(1.0)
+}
+
+/// Least distance between two different values: the step of a coarse converter, nearly nothing of a fine one.
+fn quantum(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let mut steps: Vec<f64> = sorted.windows(2).map(|w| w[1] - w[0]).filter(|d| *d > 0.0).collect();
+    steps.sort_by(f64::total_cmp);
+    steps.get(steps.len() / 50).copied().unwrap_or(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bands_cover_every_line_once_and_widen() {
+        for n in [1, 2, 7, 600, 6500] {
+            let ranges = band_ranges(n);
+            assert_eq!(ranges[0], 0..1);
+            assert!(ranges.windows(2).all(|w| w[0].end == w[1].start), "{ranges:?}");
+            assert_eq!(ranges.last().unwrap().end, n);
+        }
+        let ranges = band_ranges(6500);
+        assert!(ranges.len() < 22, "{}", ranges.len());
+    }
+
+    #[test]
+    fn a_coarse_converter_has_its_step_and_a_fine_one_hardly_any() {
+        let coarse: Vec<f64> = (0..1000).map(|k| (f64::from(k) * 0.37).sin()).map(|v| (v / 0.1).round() * 0.1).collect();
+        assert!((quantum(&coarse) - 0.1).abs() < 1e-9);
+        let fine: Vec<f64> = (0..1000).map(|k| (f64::from(k) * 0.37).sin()).collect();
+        assert!(quantum(&fine) < 0.01);
+    }
+}
