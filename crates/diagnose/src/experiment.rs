@@ -3,18 +3,16 @@
 
 use std::collections::BTreeMap;
 
+use kort_identify::fit::Fit;
 use kort_thruster::effects::{Descriptor, Scale};
 use kort_thruster::parameters::Parameter;
 use kort_thruster::rig::Rig;
 use kort_thruster::scenario::{EffectUse, NoReplays, Run, Scenario};
 
-use crate::baseline::{Member, members, recompose};
-use crate::fit::Fit;
-use crate::judge::{Outcome, Place};
-use crate::library::is_term;
+use crate::decide::Decision;
+use crate::flexible::is_term;
 use crate::report::NextExperiment;
-use crate::search::Search;
-use crate::verdict::kin_of;
+use crate::search::{Search, Set};
 
 /// Test signals to choose from: shipped scenario, what it does in an engineer's words.
 const SIGNALS: &[(&str, &str)] = &[
@@ -34,64 +32,44 @@ const SIGNALS: &[(&str, &str)] = &[
     (include_str!("../../../config/scenarios/tow.toml"), "steps while towed ahead and astern"),
 ];
 
-/// Two explanations that this recording leaves open.
-struct Open<'a> {
-    place: &'a Place,
-    rival: &'static Descriptor,
-    mine: Vec<Member>,
-    theirs: Vec<Member>,
-    all: Vec<&'static str>,
-}
-
-impl<'a> Open<'a> {
-    fn of(search: &Search, outcome: &'a Outcome) -> Option<Self> {
-        let all = members(&search.problem, &outcome.last);
-        let without = |id: &str| -> Vec<Member> { all.iter().filter(|m| m.0.id != id).cloned().collect() };
-        if let Some(place) = outcome.places.iter().find(|p| !p.rivals.is_empty()) {
-            let (rival, _) = place.rivals.first()?;
-            let mut theirs = all.clone();
-            *theirs.iter_mut().find(|m| m.0.id == place.chosen.id)? = rival.clone();
-            let names = std::iter::once(place.chosen.id).chain(place.rivals.iter().map(|r| r.0.0.id));
-            return Some(Self { place, rival: rival.0, mine: all.clone(), theirs, all: names.collect() });
-        }
-        let (place, other) = kin_of(&outcome.places).next()?;
-        let (mine, theirs) = (without(other.chosen.id), without(place.chosen.id));
-        Some(Self { place, rival: other.chosen, mine, theirs, all: vec![place.chosen.id, other.chosen.id] })
-    }
-}
-
 /// The next experiment, if anything is left open.
-pub fn next(search: &Search, outcome: &Outcome, rig: &Rig) -> Option<NextExperiment> {
-    let Some(open) = Open::of(search, outcome) else { return unexplained(outcome) };
-    let fitted = |list: &[Member]| {
-        let (hypothesis, columns) = recompose(&outcome.last, list, &search.scale);
-        search.problem.fit(&hypothesis, &columns, 4)
+pub fn next(search: &Search, decision: &Decision, best: &Set, rig: &Rig) -> Option<NextExperiment> {
+    let Some(place) = decision.named.iter().find(|n| !n.rivals.is_empty() && best.contains(&n.effect)) else {
+        return unexplained(search, decision);
     };
-    let (mine, theirs) = (fitted(&open.mine), fitted(&open.theirs));
-    let best = SIGNALS
+    let rival = *place.rivals.first()?;
+    let mut other: Set = best.iter().copied().filter(|id| *id != place.effect).collect();
+    other.push(rival);
+    other.sort_unstable();
+    let (mine, theirs) = (search.fits.get(best)?, search.fits.get(&other)?);
+    let (chosen, rival) = (search.descriptor(place.effect)?, search.descriptor(rival)?);
+    let best_signal = SIGNALS
         .iter()
         .filter_map(|(text, words)| {
             let scenario: Scenario = toml::from_str(text).ok()?;
-            let a = respond(&scenario, rig, search, &mine)?;
-            let b = respond(&scenario, rig, search, &theirs)?;
-            Some((difference(&a, &b, &search.scale), scenario, *words))
+            let a = respond(&scenario, rig, search, mine)?;
+            let b = respond(&scenario, rig, search, theirs)?;
+            Some((difference(&a, &b, &search.problem.scale), scenario, *words))
         })
         .max_by(|x, y| x.0.total_cmp(&y.0))?;
-    let (chosen, rival) = (open.place.chosen, open.rival);
-    let mut scenario = with_effects(best.1, search, &mine);
-    scenario.what = format!("Parts {} from {}: {}", chosen.id, rival.id, best.2);
+    let mut scenario = with_effects(best_signal.1, search, mine);
+    scenario.what = format!("Parts {} from {}: {}", chosen.id, rival.id, best_signal.2);
     scenario.name = format!("separate-{}-{}", chosen.id, rival.id).replace('_', "-");
+    let separates = std::iter::once(place.effect).chain(place.rivals.iter().copied());
     Some(NextExperiment {
-        separates: open.all.iter().map(|id| (*id).to_string()).collect(),
-        excitation: best.2.into(),
-        why: why(search, chosen, rival, best.0),
+        separates: separates.map(str::to_string).collect(),
+        excitation: best_signal.2.into(),
+        why: why(search, chosen, rival, best_signal.0),
         scenario: serde_json::to_value(&scenario).ok()?,
     })
 }
 
 fn why(search: &Search, chosen: &Descriptor, rival: &Descriptor, difference: f64) -> String {
     let percent = 100.0 * difference;
-    let (sizes, advice) = match (search.free_in_time(chosen), search.free_in_time(rival)) {
+    let (sizes, advice) = match (
+        free_in_time(chosen, &search.problem.scale),
+        free_in_time(rival, &search.problem.scale),
+    ) {
         (false, false) => (
             format!(
                 "fitted to this recording, {} and {} would then differ by {percent:.1} % of full scale on the channel where they differ most",
@@ -120,20 +98,15 @@ fn why(search: &Search, chosen: &Descriptor, rival: &Descriptor, difference: f64
 }
 
 /// A real mismatch without a name: the richest signal there is, both ways.
-fn unexplained(outcome: &Outcome) -> Option<NextExperiment> {
-    let term = outcome.places.iter().map(|p| p.chosen).find(|e| is_term(e));
-    let why = match term {
-        Some(term) if crate::changes::is_change(term) => {
-            "with the change in force and without it, current recorded: a load takes the same torque at every level, a drive that loses gain a share of it".into()
-        }
-        Some(term) => format!(
-            "steady levels both ways show on the {} path how the unknown term goes with speed and direction; then repeat this run to see whether it stays",
+fn unexplained(search: &Search, decision: &Decision) -> Option<NextExperiment> {
+    let term = search.descriptor(decision.term?)?;
+    let why = if term.id == "unknown_shaft_step" {
+        "with the change in force and without it, current recorded: a load takes the same torque at every level, a drive that loses gain a share of it".to_string()
+    } else {
+        format!(
+            "steady levels both ways show on the {} path how the unknown goes with speed and direction; then repeat this run to see whether it stays",
             term.path.name()
-        ),
-        None if outcome.excess.is_some() && outcome.places.is_empty() => {
-            "steady levels both ways show whether what is left follows speed and direction at all; then repeat this run to see whether it stays".into()
-        }
-        None => return None,
+        )
     };
     let (text, words) = SIGNALS[1];
     let mut scenario: Scenario = toml::from_str(text).ok()?;
@@ -146,8 +119,13 @@ fn unexplained(outcome: &Outcome) -> Option<NextExperiment> {
     })
 }
 
+/// Whether an effect changes freely with time, and so comes again another way.
+fn free_in_time(effect: &Descriptor, scale: &Scale) -> bool {
+    (effect.parameters)(scale).iter().any(|s| s.acts.is_some())
+}
+
 fn respond(scenario: &Scenario, rig: &Rig, search: &Search, fit: &Fit) -> Option<Vec<Vec<f64>>> {
-    let (parameters, _) = search.problem.assemble(&fit.hypothesis, &fit.values);
+    let (parameters, _) = fit.hypothesis.assemble(&search.problem.stated, &fit.values);
     let mut run = with_effects(scenario.clone(), search, fit);
     run.noise = 0.0;
     run.turbulence = None;
@@ -185,28 +163,17 @@ fn difference(a: &[Vec<f64>], b: &[Vec<f64>], scale: &Scale) -> f64 {
 /// A scenario with what was found in force. What changes freely with time stays out: it does not come again
 /// as it came.
 fn with_effects(mut scenario: Scenario, search: &Search, fit: &Fit) -> Scenario {
-    scenario.effects = members(&search.problem, fit)
+    let scale = &search.problem.scale;
+    scenario.effects = search
+        .problem
+        .members(&fit.hypothesis, &fit.values)
         .iter()
-        .filter(|m| !is_term(m.0) && !search.free_in_time(m.0))
-        .map(|(effect, values)| EffectUse { effect: effect.id.into(), parameters: named(effect, values) })
+        .filter(|m| !is_term(m.effect.id) && !free_in_time(m.effect, scale))
+        .map(|m| EffectUse { effect: m.effect.id.into(), parameters: named(m.effect, &m.values, scale) })
         .collect();
     scenario
 }
 
-fn named(effect: &kort_thruster::effects::Descriptor, values: &[f64]) -> BTreeMap<String, f64> {
-    // Only names are wanted here, and they do not depend on the scale.
-    let unit = Scale {
-        shaft_speed_rad_s: 1.0,
-        torque_n_m: 1.0,
-        thrust_n: 1.0,
-        flow_m_s: 1.0,
-        current_a: 1.0,
-        command: 1.0,
-        supply_v: 1.0,
-        winding_resistance_ohm: 1.0,
-        inertia_kg_m2: 1.0,
-        tick_s: 0.002,
-        duration_s: 60.0,
-    };
-    (effect.parameters)(&unit).iter().map(|s| s.name.to_string()).zip(values.iter().copied()).collect()
+fn named(effect: &Descriptor, values: &[f64], scale: &Scale) -> BTreeMap<String, f64> {
+    (effect.parameters)(scale).iter().map(|s| s.name.to_string()).zip(values.iter().copied()).collect()
 }

@@ -1,4 +1,19 @@
 //! Diagnosis: which physics did the model leave out?
-pub mod probe;
-pub mod screen;
-pub mod search;
+//!
+//! Data go one way: probes and screens say which effects are worth a fit, the search fits sets of them, the
+//! posterior weighs the sets, one function decides, and words come last.
+
+pub mod constants;
+pub mod decide;
+pub mod diagnose;
+mod experiment;
+pub mod flexible;
+mod locate;
+pub mod posterior;
+mod probe;
+pub mod report;
+mod screen;
+mod search;
+pub mod traces;
+mod unknown;
+mod words;

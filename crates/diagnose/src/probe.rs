@@ -170,7 +170,8 @@ fn of_form(
                 let unit = if probe.member.values[j] == 0.0 { 1.0 } else { probe.member.values[j] };
                 let size = found.step[at] * free[at].sigma;
                 // At nothing there is no slope.
-                let size = if specs[j].acts.is_none() && size.abs() < 0.1 { 0.1_f64.copysign(size) } else { size };
+                let size =
+                    if specs[j].acts.is_none() && size.abs() < 0.1 { 0.1_f64.copysign(size) } else { size };
                 (unit * size).clamp(spec.low, spec.high)
             }
             None => {

@@ -1,7 +1,9 @@
-//! The diagnosis report: the JSON of `kort diagnose`, schema `kort.diagnosis/1`.
+//! The diagnosis report: the JSON of `kort diagnose`, schema `kort.diagnosis/2`.
 
-use serde::Serialize;
 use std::collections::BTreeMap;
+
+pub use kort_identify::scores::{BeforeAfter, ChannelReport, HeldOut, ParameterReport};
+use serde::Serialize;
 
 /// Outcome of a diagnosis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -11,43 +13,14 @@ pub enum Verdict {
     NoMismatch,
     /// Named effects explain it, and no rival comes close.
     Explained,
+    /// Named effects are probable, and real mismatch is left.
+    PartlyExplained,
     /// Several named effects explain it and this excitation cannot part them.
     Ambiguous,
     /// The mismatch is real and no named effect explains it.
     Unexplained,
     /// The recording cannot tell.
     InsufficientData,
-}
-
-/// A parameter with its uncertainty.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct ParameterReport {
-    /// Name, unit last.
-    pub name: String,
-    /// Fitted value.
-    pub value: f64,
-    /// Unit.
-    pub unit: String,
-    /// Standard error of the fit, prior included.
-    pub std_error: f64,
-    /// What the rig description states; none where the fit has no prior.
-    pub stated: Option<f64>,
-    /// At the edge of what is allowed: a symptom, not a value.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub at_bound: Option<bool>,
-}
-
-/// Errors of the baseline on one channel, root mean square over full scale.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct ChannelReport {
-    /// On the rows fitted.
-    pub nrmse_train: f64,
-    /// On the rows held out.
-    pub nrmse_heldout: f64,
-    /// What measurement noise alone would give.
-    pub noise_floor: f64,
-    /// Whether the residual is white.
-    pub white: bool,
 }
 
 /// The re-fitted baseline.
@@ -78,26 +51,6 @@ pub struct Mismatch {
     pub share_of_excess_error: f64,
 }
 
-/// Errors before and after on one channel, root mean square over full scale, held-out rows.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct BeforeAfter {
-    /// Without the effect.
-    pub nrmse_before: f64,
-    /// With it.
-    pub nrmse_after: f64,
-}
-
-/// Gain on rows that were not fitted.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct HeldOut {
-    /// By channel.
-    pub channels: BTreeMap<String, BeforeAfter>,
-    /// Share of the squared error above the noise floor that goes, on the channel with most of it.
-    pub excess_error_removed: f64,
-    /// Bootstrap over blocks.
-    pub interval_95: [f64; 2],
-}
-
 /// A named effect that explains the mismatch.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Finding {
@@ -119,6 +72,30 @@ pub struct Finding {
     pub confounded_with: Vec<String>,
     /// Why.
     pub evidence: Vec<String>,
+}
+
+/// A set of effects that explains the recording.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SetReport {
+    /// Its effects; none is the baseline alone.
+    pub effects: Vec<String>,
+    /// Its probability.
+    pub probability: f64,
+}
+
+/// What the named effects leave.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Remainder {
+    /// Of the squared error above the noise.
+    pub share_of_excess_error: f64,
+    /// Where it acts, as far as a term that bends to anything tells.
+    pub path: String,
+    /// The column where it shows most.
+    pub channel: String,
+    /// Words: when and where.
+    pub regime: String,
+    /// Root mean square over full scale by channel, everything named taken into account.
+    pub nrmse: BTreeMap<String, f64>,
 }
 
 /// An effect that was tried and set aside.
@@ -165,7 +142,7 @@ pub struct NextExperiment {
 /// The whole report.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
-    /// `kort.diagnosis/1`
+    /// `kort.diagnosis/2`
     pub schema: String,
     /// Version of kort.
     pub kort_version: String,
@@ -187,6 +164,10 @@ pub struct Report {
     pub mismatch: Vec<Mismatch>,
     /// Named effects.
     pub findings: Vec<Finding>,
+    /// Sets of effects, likeliest first, until 0.95 is reached.
+    pub explanations: Vec<SetReport>,
+    /// What is left, where that is real.
+    pub remainder: Option<Remainder>,
     /// Effects set aside.
     pub alternatives: Vec<Alternative>,
     /// What is known where no name fits.

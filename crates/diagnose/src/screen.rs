@@ -57,7 +57,8 @@ fn at(problem: &Problem, parent: &Fit, known: &[DMatrix<f64>], member: Member) -
     if !finite(&lines) || !new.iter().all(finite) {
         return None;
     }
-    let columns: Vec<&DVector<f64>> = parent.columns.iter().flatten().map(AsRef::as_ref).chain(&new).collect();
+    let columns: Vec<&DVector<f64>> =
+        parent.columns.iter().flatten().map(AsRef::as_ref).chain(&new).collect();
     let model =
         Quadratic::extended(&problem.spectrum, &problem.criterion, &lines, &columns, &hypothesis.free, known);
     let mut actions = parent.actions.clone();

@@ -3,12 +3,14 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use kort_identify::fit::Fit;
+use kort_identify::fit::{Columns, Fit};
 use kort_identify::hypothesis::{Hypothesis, Member};
 use kort_identify::simulate::Problem;
 use kort_thruster::effects::Descriptor;
 use rayon::prelude::*;
 
+use crate::constants::SearchConstants;
+use crate::flexible::TERMS;
 use crate::probe::{Probe, probe};
 use crate::screen::{Screened, screen};
 
@@ -18,20 +20,9 @@ pub type Set = Vec<&'static str>;
 /// Most effects in a set.
 const MOST_EFFECTS: usize = 8;
 /// Doubt of a screen's cost, as a share of what it promises.
-const SCREEN_DOUBT: f64 = 0.3;
+const SCREEN_DOUBT: f64 = 0.15;
 /// Iterations of an exact fit.
 const ITERATIONS: usize = 12;
-
-/// What the search may spend and asks for.
-#[derive(Clone, Copy, Debug)]
-pub struct Reach {
-    /// Effects of a screen that are fitted exactly.
-    pub exact: usize,
-    /// Sets within this cost of the best count as its rivals; screened ones within it are fitted exactly.
-    pub rivals: f64,
-    /// Cost of one more effect.
-    pub per_effect: f64,
-}
 
 /// The search's memory.
 pub struct Search<'a, 'p> {
@@ -41,21 +32,56 @@ pub struct Search<'a, 'p> {
     pub effects: Vec<&'static Descriptor>,
     /// Every set fitted.
     pub fits: BTreeMap<Set, Fit>,
-    pub screens: BTreeMap<Set, Vec<Screened>>,
+    screens: BTreeMap<Set, Vec<Screened>>,
     dropped: BTreeSet<(Set, Set)>,
     probes: Vec<Vec<Probe>>,
-    reach: Reach,
+    constants: SearchConstants,
 }
 
 impl<'a, 'p> Search<'a, 'p> {
     /// Before anything is fitted.
-    pub fn new(problem: &'a Problem<'p>, effects: Vec<&'static Descriptor>, reach: Reach) -> Self {
-        Self { problem, effects, fits: BTreeMap::new(), screens: BTreeMap::new(), dropped: BTreeSet::new(), probes: Vec::new(), reach }
+    pub fn new(
+        problem: &'a Problem<'p>,
+        effects: Vec<&'static Descriptor>,
+        constants: SearchConstants,
+    ) -> Self {
+        Self {
+            problem,
+            effects,
+            fits: BTreeMap::new(),
+            screens: BTreeMap::new(),
+            dropped: BTreeSet::new(),
+            probes: Vec::new(),
+            constants,
+        }
     }
 
     /// Cost of a set: of its fit, and of the prior odds of each effect.
     pub fn cost(&self, set: &Set) -> f64 {
-        self.fits.get(set).map_or(f64::INFINITY, |fit| fit.cost() + self.reach.per_effect * set.len() as f64)
+        self.fits.get(set).map_or(f64::INFINITY, |fit| fit.cost() + self.per_effect() * set.len() as f64)
+    }
+
+    /// Cost of one more effect: one of the catalogue at equal odds, and what chance alone may gain.
+    pub fn per_effect(&self) -> f64 {
+        2.0 * (self.effects.len().max(1) as f64).ln() + self.constants.per_effect
+    }
+
+    /// An effect or term of any set.
+    pub fn descriptor(&self, id: &str) -> Option<&'static Descriptor> {
+        self.effects.iter().chain(TERMS).copied().find(|e| e.id == id)
+    }
+
+    /// Fits a set from a hypothesis and keeps it if it does better than what is known of it.
+    pub fn fit_set(&mut self, set: Set, from: &Hypothesis, columns: &Columns, actions: &[Vec<f64>]) {
+        let mut actions = actions.to_vec();
+        actions.resize(from.effects.len(), vec![0.0; self.problem.spectrum.bands.len()]);
+        let fit = self.problem.settle(from, columns, &actions, ITERATIONS);
+        self.keep(set, fit);
+    }
+
+    /// Exchanges and leaves out members of a set as long as that helps; the best set.
+    pub fn refine(&mut self, set: &Set) -> Set {
+        self.backward(set.clone())
     }
 
     /// Searches from the baseline; the best set.
@@ -64,18 +90,27 @@ impl<'a, 'p> Search<'a, 'p> {
         let first = self.problem.settle(baseline, &Vec::new(), &[], 2 * ITERATIONS);
         let second = self.problem.settle(&first.resume(), &first.columns, &[], ITERATIONS);
         self.fits.insert(Vec::new(), second);
-        let mut best: Set = Vec::new();
+        let best: Set = Vec::new();
         let baseline = &self.fits[&best];
         if baseline.broke_down() {
             return best;
         }
         progress("trying every effect");
         self.probes = self.effects.par_iter().map(|e| probe(self.problem, baseline, e)).collect();
+        self.climb(best, progress)
+    }
+
+    /// Forward, swap and backward steps from a set that is fitted, until none helps; the best set.
+    pub fn climb(&mut self, from: Set, progress: &(dyn Fn(&str) + Sync)) -> Set {
+        let mut best = from;
         loop {
             progress(&format!("on top of {}", words(&best)));
             let mut next = best.clone();
             if best.len() < MOST_EFFECTS {
                 next = self.forward(&best);
+            }
+            if next == best {
+                return best;
             }
             next = self.swap(next, progress);
             next = self.backward(next);
@@ -88,7 +123,7 @@ impl<'a, 'p> Search<'a, 'p> {
 
     /// The best set with one more effect, or the same.
     fn forward(&mut self, set: &Set) -> Set {
-        let tried = self.expand(set, self.reach.exact);
+        let tried = self.expand(set, self.cost(set));
         self.better(set.clone(), tried)
     }
 
@@ -103,7 +138,7 @@ impl<'a, 'p> Search<'a, 'p> {
                 let rest: Set = best.iter().copied().filter(|m| *m != member).collect();
                 progress(&format!("instead of {member} beside {}", words(&rest)));
                 self.ensure(&rest, &best);
-                let tried = self.expand(&rest, self.reach.exact.min(3));
+                let tried = self.expand(&rest, self.cost(&best));
                 let better = self.better(best.clone(), tried);
                 if better != best {
                     best = better;
@@ -133,7 +168,9 @@ impl<'a, 'p> Search<'a, 'p> {
     }
 
     fn better(&self, set: Set, others: Vec<Set>) -> Set {
-        others.into_iter().fold(set, |best, other| if self.cost(&other) < self.cost(&best) { other } else { best })
+        others
+            .into_iter()
+            .fold(set, |best, other| if self.cost(&other) < self.cost(&best) { other } else { best })
     }
 
     /// Fits a set from where a larger one that holds it ended: a member that only led the others to a better
@@ -151,8 +188,8 @@ impl<'a, 'p> Search<'a, 'p> {
         self.keep(set.clone(), fit);
     }
 
-    /// Screens all effects on top of a set and fits the first ones exactly; the sets fitted.
-    fn expand(&mut self, set: &Set, exact: usize) -> Vec<Set> {
+    /// Screens all effects on top of a set and fits exactly those that may come near a cost; the sets fitted.
+    fn expand(&mut self, set: &Set, bar: f64) -> Vec<Set> {
         let Some(parent) = self.fits.get(set) else { return Vec::new() };
         if !self.screens.contains_key(set) {
             let rest: Vec<&[Probe]> = self
@@ -173,11 +210,14 @@ impl<'a, 'p> Search<'a, 'p> {
         };
         let screened = &self.screens[set];
         let best = screened.first().map_or(f64::INFINITY, |s| s.cost);
-        // What a screen promises is off by its share of the gain where the response bends.
-        let near = best + self.reach.rivals + SCREEN_DOUBT * (parent.cost() - best).max(0.0);
-        let worth = parent.cost() - self.reach.per_effect + self.reach.rivals;
-        let chosen: Vec<&Screened> =
-            screened.iter().take(exact).filter(|s| s.cost < worth && s.cost < near).collect();
+        // What a screen promises is off by a share of the gain where the response bends.
+        let doubt = self.constants.rivals + SCREEN_DOUBT * (parent.cost() - best).max(0.0);
+        let prior = self.per_effect() * (set.len() + 1) as f64;
+        let chosen: Vec<&Screened> = screened
+            .iter()
+            .take(self.constants.exact)
+            .filter(|s| s.cost < best + doubt && s.cost + prior < bar + doubt)
+            .collect();
         let sets: Vec<Set> = chosen.iter().map(|s| with(s.effect)).collect();
         let new: Vec<(Set, Fit)> = chosen
             .par_iter()

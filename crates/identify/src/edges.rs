@@ -17,13 +17,15 @@ const WINDOW_ROWS: usize = 12;
 impl Problem<'_> {
     /// The command with its steps where they suit a fit best; none if that is where they are.
     pub fn place_edges(&self, fit: &Fit) -> Option<Inputs> {
-        let movable = |r: &Prepared| r.driving != Driving::Speed && !r.edges.is_empty() && r.ticks_per_row > 1;
+        let movable =
+            |r: &Prepared| r.driving != Driving::Speed && !r.edges.is_empty() && r.ticks_per_row > 1;
         let most = self.recordings.iter().filter(|r| movable(r)).map(|r| r.ticks_per_row).max()?;
         let level = self.levels(fit);
         // Cost of every edge for every tick it may lie on, all edges moved together.
         let costs: Vec<Vec<Vec<f64>>> = (0..most)
             .map(|ticks| {
-                let edges = self.recordings.iter().map(|r| vec![ticks.min(r.ticks_per_row - 1); r.edges.len()]);
+                let edges =
+                    self.recordings.iter().map(|r| vec![ticks.min(r.ticks_per_row - 1); r.edges.len()]);
                 let inputs = Arc::new(Inputs::new(&self.recordings, edges.collect()));
                 let residual = self.residual(&Hypothesis { inputs, ..fit.hypothesis.clone() }, &fit.values);
                 let of = |(r, one): (usize, &Prepared)| edge_costs(one, &residual[r], &level[r]);

@@ -69,7 +69,13 @@ impl Problem<'_> {
     /// Fits a hypothesis from its start, under the form error of what its effects are known to do.
     /// `known` holds derivatives from a nearby fit; they serve until a step falls short of what they
     /// promise, which saves most simulations while hypotheses are compared.
-    pub fn fit(&self, hypothesis: &Hypothesis, known: &Columns, actions: &[Vec<f64>], iterations: usize) -> Fit {
+    pub fn fit(
+        &self,
+        hypothesis: &Hypothesis,
+        known: &Columns,
+        actions: &[Vec<f64>],
+        iterations: usize,
+    ) -> Fit {
         let floor = self.floor.with_actions(actions, &self.criterion);
         let free = &hypothesis.free;
         let n = free.len();
@@ -143,7 +149,13 @@ impl Problem<'_> {
 
     /// A fit to a finish: from its start, with the steps of the command placed for it, the form error of its
     /// effects' own actions counted, and its price known.
-    pub fn settle(&self, hypothesis: &Hypothesis, known: &Columns, actions: &[Vec<f64>], iterations: usize) -> Fit {
+    pub fn settle(
+        &self,
+        hypothesis: &Hypothesis,
+        known: &Columns,
+        actions: &[Vec<f64>],
+        iterations: usize,
+    ) -> Fit {
         let mut fit = self.fit(hypothesis, known, actions, iterations);
         for _ in 0..PLACINGS {
             let Some(inputs) = self.place_edges(&fit) else { break };

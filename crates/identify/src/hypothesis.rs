@@ -298,7 +298,8 @@ fn prior(spec: &Spec) -> (f64, f64) {
         return (0.0, 0.3 * spec.high);
     }
     if spec.shape {
-        let sigma = (0.7 * spec.start.abs()).max(0.1 * (spec.high - spec.low)).min(0.5 * (spec.high - spec.low));
+        let sigma =
+            (0.7 * spec.start.abs()).max(0.1 * (spec.high - spec.low)).min(0.5 * (spec.high - spec.low));
         return (spec.start, sigma);
     }
     (0.0, (5.0 * spec.start.abs()).min(0.5 * (spec.high - spec.low)))

@@ -160,7 +160,9 @@ pub fn identify(
     progress("fitting from the stated values");
     let mut best = problem.settle(&baseline, &Vec::new(), &[], ITERATIONS);
     if best.broke_down() {
-        return Err(DataError::BrokeDown { recording: series.first().map_or_else(String::new, |s| s.name.clone()) });
+        return Err(DataError::BrokeDown {
+            recording: series.first().map_or_else(String::new, |s| s.name.clone()),
+        });
     }
     if moving.contains(&true) {
         for _ in 0..2 {
@@ -298,8 +300,7 @@ fn place_starts(problem: &mut Problem, fit: &Fit, moving: &[bool]) {
         .flat_map(|(band, w)| std::iter::repeat_n(w.sqrt(), band.lines.len()))
         .collect();
     let weights = nalgebra::DVector::from_vec(weights);
-    let residual =
-        |p: &Problem| p.residual_lines(&fit.hypothesis, &fit.values).component_mul(&weights);
+    let residual = |p: &Problem| p.residual_lines(&fit.hypothesis, &fit.values).component_mul(&weights);
     for _ in 0..2 {
         for r in (0..moving.len()).filter(|r| moving[*r]) {
             let at = residual(problem);

@@ -29,7 +29,12 @@ impl<'a> Setup<'a> {
     ///
     /// # Errors
     /// [`DataError`] if a recording cannot be compared with a model at all.
-    pub fn new(series: &[Series], rig: &'a Rig, model: ModelName, criterion: Criterion) -> Result<Self, DataError> {
+    pub fn new(
+        series: &[Series],
+        rig: &'a Rig,
+        model: ModelName,
+        criterion: Criterion,
+    ) -> Result<Self, DataError> {
         let mut recordings: Vec<Prepared> = series
             .iter()
             .map(|s| Prepared::new(s, rig, model == ModelName::Model3))

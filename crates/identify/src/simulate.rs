@@ -57,7 +57,17 @@ impl<'a> Problem<'a> {
         let spectrum = Spectrum::new(&recordings, &masked);
         let floor = Floor::of_signal(&spectrum.bands, &criterion);
         let scale = crate::data::scale(&recordings, rig);
-        Self { model, rig, stated: Parameters::stated(rig), recordings, masked, scale, criterion, spectrum, floor }
+        Self {
+            model,
+            rig,
+            stated: Parameters::stated(rig),
+            recordings,
+            masked,
+            scale,
+            criterion,
+            spectrum,
+            floor,
+        }
     }
 
     /// The problem without some rows: its training part.
@@ -66,7 +76,10 @@ impl<'a> Problem<'a> {
         for (mask, held) in masked.iter_mut().zip(held) {
             mask.iter_mut().zip(held).for_each(|(m, h)| *m |= *h);
         }
-        Self { scale: self.scale, ..Self::new(self.model, self.rig, self.recordings.clone(), masked, self.criterion) }
+        Self {
+            scale: self.scale,
+            ..Self::new(self.model, self.rig, self.recordings.clone(), masked, self.criterion)
+        }
     }
 
     /// The response of a hypothesis at values of its free numbers.
@@ -215,8 +228,7 @@ impl<'a> Problem<'a> {
         if group.len() == 1 {
             return vec![change];
         }
-        let nothing: Stack =
-            change.iter().map(|r| r.iter().map(|c| vec![0.0; c.len()]).collect()).collect();
+        let nothing: Stack = change.iter().map(|r| r.iter().map(|c| vec![0.0; c.len()]).collect()).collect();
         let mut shares = vec![nothing; group.len()];
         for (r, recording) in self.recordings.iter().enumerate() {
             for (c, channel) in recording.channels.iter().enumerate() {

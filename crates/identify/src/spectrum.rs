@@ -183,7 +183,8 @@ mod tests {
 
     #[test]
     fn a_coarse_converter_has_its_step_and_a_fine_one_hardly_any() {
-        let coarse: Vec<f64> = (0..1000).map(|k| (f64::from(k) * 0.37).sin()).map(|v| (v / 0.1).round() * 0.1).collect();
+        let coarse: Vec<f64> =
+            (0..1000).map(|k| (f64::from(k) * 0.37).sin()).map(|v| (v / 0.1).round() * 0.1).collect();
         assert!((quantum(&coarse) - 0.1).abs() < 1e-9);
         let fine: Vec<f64> = (0..1000).map(|k| (f64::from(k) * 0.37).sin()).collect();
         assert!(quantum(&fine) < 0.01);

@@ -1,7 +1,7 @@
 //! A rig description with fitted values in place of stated ones; comments, order and everything
 //! that was not fitted stay as they are.
 
-use kort_identify::report::ParameterReport;
+use kort_diagnose::report::ParameterReport;
 use kort_thruster::rig::Rig;
 use toml_edit::{DocumentMut, InlineTable, Item, Value};
 

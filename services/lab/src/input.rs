@@ -6,6 +6,7 @@ use clap::Args;
 use kort_identify::checks;
 use kort_identify::data::Series;
 use kort_recording::{ColumnMap, Recording};
+use kort_thruster::effects::{self, Descriptor};
 use kort_thruster::models::ModelName;
 use kort_thruster::rig::Rig;
 
@@ -26,6 +27,9 @@ pub struct Input {
     /// Column map for foreign logs: a shipped one or a TOML file
     #[arg(long, value_name = "NAME")]
     pub columns: Option<String>,
+    /// Effects taken as present and fitted with the model, by their ids (`kort explain` lists them)
+    #[arg(long, value_name = "EFFECT,…", value_delimiter = ',')]
+    pub with: Vec<String>,
     /// Seed of everything drawn at random
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
@@ -47,6 +51,25 @@ pub struct Loaded {
 }
 
 impl Input {
+    /// The effects named by `--with`.
+    ///
+    /// # Errors
+    /// An id that the catalogue does not have, with the nearest that it has.
+    pub fn known_effects(&self) -> Result<Vec<&'static Descriptor>, Failure> {
+        let one = |id: &String| {
+            effects::find(id).ok_or_else(|| {
+                let near = effects::ALL
+                    .iter()
+                    .max_by(|a, b| strsim::jaro_winkler(a.id, id).total_cmp(&strsim::jaro_winkler(b.id, id)))
+                    .map_or("", |e| e.id);
+                Failure::input(format!(
+                    "--with {id}: no effect of the catalogue\nhint: did you mean {near}? `kort explain` lists all"
+                ))
+            })
+        };
+        self.with.iter().map(one).collect()
+    }
+
     /// Reads all files.
     ///
     /// # Errors

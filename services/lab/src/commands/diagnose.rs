@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use kort_identify::diagnose::{Options, diagnose};
+use kort_diagnose::diagnose::{Options, diagnose};
 
 use crate::failure::{Failure, Outcome, print, print_json, write_text};
 use crate::input::Input;
@@ -23,7 +23,7 @@ How to read the report: docs/reading-a-report.md";
 pub struct Diagnose {
     #[command(flatten)]
     input: Input,
-    /// Print one JSON document (kort.diagnosis/1)
+    /// Print one JSON document (kort.diagnosis/2)
     #[arg(long)]
     json: bool,
     /// Write the report as one self-contained page
@@ -38,7 +38,8 @@ impl Diagnose {
     /// Unreadable input, or an output file that cannot be written.
     pub fn run(self) -> Result<Outcome, Failure> {
         let loaded = self.input.load()?;
-        let options = Options { model: self.input.model, seed: self.input.seed };
+        let options =
+            Options { model: self.input.model, seed: self.input.seed, with: self.input.known_effects()? };
         let spinner = progress::spinner();
         let told = |text: &str| spinner.set_message(text.to_string());
         let diagnosis = self.input.on_threads(|| diagnose(&loaded.series, &loaded.rig, &options, &told))?;

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use kort_diagnose::constants::Constants;
 use kort_identify::identify::{Options, identify};
 
 use crate::failure::{Failure, Outcome, print, print_json, write_text};
@@ -50,6 +51,8 @@ impl Fit {
             seed: self.input.seed,
             starts: usize::from(self.starts),
             open_friction: self.free_friction,
+            with: self.input.known_effects()?,
+            criterion: Constants::built_in().criterion,
         };
         let spinner = progress::spinner();
         let told = |text: &str| spinner.set_message(text.to_string());

@@ -1,6 +1,7 @@
 //! Curves of a diagnosis: measured, baseline, explained; residuals by time and by regime.
 
-use kort_identify::diagnose::{Diagnosis, Trace};
+use kort_diagnose::diagnose::Diagnosis;
+use kort_diagnose::traces::Trace;
 use maud::{Markup, html};
 
 use super::{Chart, Mark, Series};

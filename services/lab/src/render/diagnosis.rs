@@ -1,12 +1,12 @@
 //! The diagnosis as one self-contained page.
 
-use kort_identify::diagnose::Diagnosis;
-use kort_identify::report::{EmpiricalTerm, Finding, HeldOut, ParameterReport, Report};
+use kort_diagnose::diagnose::Diagnosis;
+use kort_diagnose::report::{EmpiricalTerm, Finding, HeldOut, ParameterReport, Report};
 use kort_thruster::rig::Rig;
 use maud::{Markup, html};
 
 use super::text::error_rows;
-use super::verdict::{SHOWN, badge, gain, percent, plain, scenario, spans};
+use super::verdict::{SHOWN, badge, gain, percent, plain, scenario, set, spans};
 use super::{Page, curves, facts, note, number, table};
 
 /// The page.
@@ -31,6 +31,9 @@ pub fn page(diagnosis: &Diagnosis, rig: &Rig) -> String {
     }
     if let Some(term) = &report.empirical_term {
         page.section("What is known of it, without a name", empirical(term));
+    }
+    if report.explanations.len() > 1 {
+        page.section("Sets of effects that explain it", explanations(report));
     }
     page.section("Measured, modelled, explained", curves::all(diagnosis));
     page.section("The re-fitted baseline", baseline(report, rig));
@@ -172,6 +175,23 @@ fn baseline(report: &Report, rig: &Rig) -> Markup {
         p { "Parameters of " (report.baseline.model) ", free within their stated tolerances, nothing added." }
         (table(&["parameter", "stated", "fitted", "standard error", "unit", "moved", ""], &rows))
         (table(&["error, % of full scale", "on fitted rows", "on held-out rows", "noise alone", "residual white"], &errors))
+    }
+}
+
+/// Sets of effects with their probabilities, and what the likeliest leaves.
+fn explanations(report: &Report) -> Markup {
+    let rows: Vec<Vec<String>> = report
+        .explanations
+        .iter()
+        .take(SHOWN)
+        .map(|e| vec![set(&e.effects), format!("{:.2}", e.probability)])
+        .collect();
+    html! {
+        (table(&["effects", "probability"], &rows))
+        @if let Some(left) = &report.remainder {
+            p { "The names leave " (percent(left.share_of_excess_error)) " of the error above the noise, on the "
+                (left.path) " path, most in " (left.channel) ", " (left.regime) "." }
+        }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use kort_identify::report::{ChannelReport, ParameterReport};
+use kort_diagnose::report::{ChannelReport, ParameterReport};
 use kort_thruster::rig::Rig;
 
 use super::number;

@@ -1,6 +1,6 @@
 //! The diagnosis in words: what the text and the page say alike, and the text itself.
 
-use kort_identify::report::{Finding, HeldOut, ParameterReport, Report, Verdict};
+use kort_diagnose::report::{Finding, HeldOut, ParameterReport, Report, Verdict};
 
 use kort_thruster::parameters::{Parameter, Parameters};
 use kort_thruster::rig::Rig;
@@ -13,6 +13,7 @@ pub fn badge(verdict: Verdict) -> (&'static str, &'static str) {
     match verdict {
         Verdict::NoMismatch => ("No mismatch", "good"),
         Verdict::Explained => ("Mismatch explained", "good"),
+        Verdict::PartlyExplained => ("Mismatch partly explained", "warn"),
         Verdict::Ambiguous => ("Explained, name ambiguous", "warn"),
         Verdict::Unexplained => ("Mismatch unexplained", "bad"),
         Verdict::InsufficientData => ("Insufficient data", "warn"),
@@ -110,6 +111,22 @@ pub fn text(report: &Report, rig: &Rig) -> String {
         sheet.more(&gain(&term.heldout));
         heldout(&mut sheet, &term.heldout);
     }
+    if let Some(left) = &report.remainder {
+        sheet.heading("What is left");
+        sheet.item(&format!(
+            "{} of the error above the noise, {} path, most in {}, {}",
+            percent(left.share_of_excess_error),
+            left.path,
+            left.channel,
+            left.regime
+        ));
+    }
+    if report.explanations.len() > 1 {
+        sheet.heading("Sets of effects that explain it");
+        for e in report.explanations.iter().take(SHOWN) {
+            sheet.item(&format!("{}: {}", short(e.probability), set(&e.effects)));
+        }
+    }
     if !report.alternatives.is_empty() {
         sheet.heading("Tried and set aside");
         for a in &report.alternatives {
@@ -150,6 +167,14 @@ pub fn text(report: &Report, rig: &Rig) -> String {
         report.notes.iter().for_each(|n| sheet.item(n));
     }
     sheet.into_text()
+}
+
+/// A set of effects in words.
+pub fn set(effects: &[String]) -> String {
+    if effects.is_empty() {
+        return "the baseline alone".into();
+    }
+    effects.iter().map(|e| plain(e)).collect::<Vec<_>>().join(" and ")
 }
 
 fn short(p: f64) -> String {

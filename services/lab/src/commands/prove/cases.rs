@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use kort_identify::data::Series;
-use kort_identify::diagnose::{Options, diagnose};
+use kort_diagnose::diagnose::{Options, diagnose};
 use kort_recording::Recording;
 use kort_thruster::models::ModelName;
 use kort_thruster::rig::Rig;
@@ -45,7 +45,7 @@ fn report(recording_csv: &str, rig_toml: &str) -> Result<Value, String> {
         time_s: recording.time_s,
         columns: recording.columns.into_iter().map(|column| (column.name, column.values)).collect(),
     };
-    let options = Options { model: ModelName::Model2, seed: 1 };
+    let options = Options { model: ModelName::Model2, seed: 1, with: Vec::new() };
     let diagnosis = diagnose(&[series], &rig, &options, &|_| ()).map_err(|error| error.to_string())?;
     serde_json::to_value(&diagnosis.report).map_err(|error| error.to_string())
 }

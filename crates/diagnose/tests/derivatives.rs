@@ -6,13 +6,13 @@
 mod bench;
 
 use bench::by_every_value;
-use kort_identify::library::{COLUMN_TERMS, TERMS};
+use kort_diagnose::flexible::TERMS;
 use kort_thruster::models::ModelName;
 use kort_thruster::rig::AmplifierKind;
 
 #[test]
 fn by_every_value_of_every_term() {
-    for term in TERMS.iter().chain(COLUMN_TERMS) {
+    for term in TERMS {
         by_every_value(term, ModelName::Model2, AmplifierKind::Current);
     }
 }

@@ -1,0 +1,77 @@
+//! The inference's constants, from `constants.toml`.
+
+use kort_identify::noise::Criterion;
+use serde::Deserialize;
+
+/// All of them.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Constants {
+    /// Of the likelihood.
+    pub criterion: Criterion,
+    /// Of the search.
+    pub search: SearchConstants,
+    /// Of the odds.
+    pub posterior: PosteriorConstants,
+}
+
+/// What the search asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SearchConstants {
+    /// Cost of one more effect, beyond its share of the catalogue.
+    pub per_effect: f64,
+    /// Sets within this cost of the best are fitted exactly and can be its rivals.
+    pub rivals: f64,
+    /// Effects of one screen that are fitted exactly at most.
+    pub exact: usize,
+}
+
+/// How costs become odds.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PosteriorConstants {
+    /// Odds of two sets are `exp(-difference of cost / (2 temper))`.
+    pub temper: f64,
+    /// Probability that no set that was fitted is right.
+    pub surprise: f64,
+    /// Factor on a name in a set that needs a nameless term: the world then holds what the catalogue does not.
+    pub beside_unknown: f64,
+}
+
+/// The constants' file, as it was built in: its hash names them.
+pub const TEXT: &str = include_str!("../constants.toml");
+
+impl Constants {
+    /// The constants built in.
+    ///
+    /// # Panics
+    /// Never: a test reads the file.
+    pub fn built_in() -> Self {
+        toml::from_str(TEXT).expect("constants.toml is read by a test")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_file_is_read_and_every_constant_is_positive() {
+        let c = Constants::built_in();
+        for value in [
+            c.criterion.form_error,
+            c.criterion.own_form_error,
+            c.criterion.facts_a_band,
+            c.criterion.timing_s,
+            c.search.per_effect,
+            c.search.rivals,
+            c.posterior.temper,
+            c.posterior.surprise,
+            c.posterior.beside_unknown,
+        ] {
+            assert!(value > 0.0);
+        }
+        assert!(c.posterior.surprise < 0.5 && c.search.exact > 1);
+    }
+}

@@ -1,0 +1,157 @@
+//! What the posterior comes to: names, rivals, verdict. One pure function; words come later and decide nothing.
+
+use crate::flexible::is_term;
+use crate::posterior::{Explanation, presence};
+use crate::report::Verdict;
+use crate::search::Set;
+
+/// A name that stands in the report, with those that this recording cannot part from it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Named {
+    /// The effect.
+    pub effect: &'static str,
+    /// Probability that it is present.
+    pub probability: f64,
+    /// Effects that would do as well in its place.
+    pub rivals: Vec<&'static str>,
+}
+
+/// What was decided.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Decision {
+    /// The outcome.
+    pub verdict: Verdict,
+    /// Names, members of the likeliest set each followed by its rivals.
+    pub named: Vec<Named>,
+    /// The nameless term that the likeliest set holds, if any.
+    pub term: Option<&'static str>,
+}
+
+/// A name below this probability is not stated as one.
+const STATED: f64 = 0.05;
+/// From this probability on a name is believed.
+const BELIEVED: f64 = 0.7;
+/// A remainder below this share of what was to be explained is of no practical size.
+const PRACTICAL: f64 = 0.1;
+
+/// What is known before deciding.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Circumstances {
+    /// The recordings have too little in them.
+    pub thin: bool,
+    /// The simulation breaks down on the stated rig.
+    pub broke_down: bool,
+    /// Share of the squared error above the noise that the likeliest set's names leave.
+    pub left: f64,
+    /// Factor on names beside a nameless term.
+    pub beside_unknown: f64,
+}
+
+/// Decides from the posterior over sets, likeliest first.
+pub fn decide(explanations: &[Explanation], circumstances: Circumstances) -> Decision {
+    let empty: Set = Vec::new();
+    let best = explanations.first().map_or(&empty, |e| &e.set);
+    let term = best.iter().copied().find(|id| is_term(id));
+    let members: Vec<&'static str> = best.iter().copied().filter(|id| !is_term(id)).collect();
+    let mut named: Vec<Named> = Vec::new();
+    for member in &members {
+        let rivals = rivals(explanations, best, member);
+        let others = |own: &'static str| -> Vec<&'static str> {
+            std::iter::once(*member).chain(rivals.iter().copied()).filter(|r| *r != own).collect()
+        };
+        for effect in std::iter::once(*member).chain(rivals.iter().copied()) {
+            if !named.iter().any(|n| n.effect == effect) {
+                let probability = presence(explanations, effect, circumstances.beside_unknown);
+                named.push(Named { effect, probability, rivals: others(effect) });
+            }
+        }
+    }
+    let believed = |n: &Named| n.probability >= BELIEVED && n.rivals.is_empty();
+    let verdict = if circumstances.broke_down || circumstances.thin && !named.iter().any(believed) {
+        Verdict::InsufficientData
+    } else if named.is_empty() {
+        if term.is_some() { Verdict::Unexplained } else { Verdict::NoMismatch }
+    } else if named.iter().any(|n| !n.rivals.is_empty()) {
+        Verdict::Ambiguous
+    } else if !named.iter().all(believed) {
+        if named.iter().any(believed) { Verdict::PartlyExplained } else { Verdict::Unexplained }
+    } else if term.is_some() && circumstances.left > PRACTICAL {
+        Verdict::PartlyExplained
+    } else {
+        Verdict::Explained
+    };
+    Decision { verdict, named, term }
+}
+
+/// Effects that stand in a member's place in sets that are else the same and likely enough to be stated.
+fn rivals(explanations: &[Explanation], best: &Set, member: &str) -> Vec<&'static str> {
+    let rest: Vec<&str> = best.iter().copied().filter(|id| *id != member).collect();
+    let mut out = Vec::new();
+    for other in explanations.iter().filter(|e| e.set.len() == best.len()) {
+        let new: Vec<&'static str> = other.set.iter().copied().filter(|id| !best.contains(id)).collect();
+        if let [new] = new[..]
+            && rest.iter().all(|id| other.set.contains(id))
+            && !is_term(new)
+            && presence(explanations, new, 1.0) >= STATED
+            && !out.contains(&new)
+        {
+            out.push(new);
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::posterior::posterior;
+
+    fn decided(costs: &[(&[&'static str], f64)], circumstances: Circumstances) -> Decision {
+        let costs = costs.iter().map(|(set, cost)| (set.to_vec(), *cost)).collect();
+        decide(&posterior(costs, 3.0, 0.03), circumstances)
+    }
+
+    #[test]
+    fn verdicts_follow_from_the_posterior() {
+        let usual = Circumstances { beside_unknown: 0.75, ..Circumstances::default() };
+        let left = Circumstances { left: 0.4, ..usual };
+        let thin = Circumstances { thin: true, ..usual };
+        let broke_down = Circumstances { broke_down: true, ..usual };
+        type Case<'a> = (&'a [(&'a [&'static str], f64)], Circumstances, Verdict);
+        let table: &[Case] = &[
+            (&[(&[], 0.0), (&["windage_drag"], 12.0)], usual, Verdict::NoMismatch),
+            (&[(&["windage_drag"], 0.0), (&[], 80.0)], usual, Verdict::Explained),
+            (&[(&["windage_drag"], 0.0), (&["duct_loss"], 2.0), (&[], 80.0)], usual, Verdict::Ambiguous),
+            (&[(&["unknown_shaft_step"], 0.0), (&["windage_drag"], 90.0)], usual, Verdict::Unexplained),
+            (&[(&["unknown_shaft_step", "windage_drag"], 0.0)], left, Verdict::PartlyExplained),
+            (&[(&["unknown_shaft_step", "windage_drag"], 0.0)], usual, Verdict::Explained),
+            (
+                &[(&["unknown_shaft_step", "windage_drag"], 0.0), (&["unknown_shaft_step"], 1.0)],
+                left,
+                Verdict::Unexplained,
+            ),
+            (&[(&[], 0.0)], thin, Verdict::InsufficientData),
+            (&[], broke_down, Verdict::InsufficientData),
+        ];
+        for (costs, circumstances, verdict) in table {
+            assert_eq!(decided(costs, *circumstances).verdict, *verdict, "{costs:?}");
+        }
+    }
+
+    #[test]
+    fn a_rival_stands_behind_its_place_and_each_names_the_other() {
+        let decision = decided(
+            &[
+                (&["duct_loss", "windage_drag"], 0.0),
+                (&["duct_loss", "coulomb_friction"], 1.0),
+                (&["duct_loss"], 70.0),
+            ],
+            Circumstances { beside_unknown: 0.75, ..Circumstances::default() },
+        );
+        let names: Vec<&str> = decision.named.iter().map(|n| n.effect).collect();
+        assert_eq!(names, ["duct_loss", "windage_drag", "coulomb_friction"]);
+        assert!(decision.named[0].rivals.is_empty() && decision.named[0].probability > 0.9);
+        assert_eq!(decision.named[1].rivals, ["coulomb_friction"]);
+        assert_eq!(decision.named[2].rivals, ["windage_drag"]);
+    }
+}

@@ -1,0 +1,362 @@
+//! Terms that bend to anything, one for each place where physics may be missing: the alternative of last
+//! resort. They have no form of their own, so they pay for all their numbers, and win only where no set of
+//! named effects comes near. What they show is said as a table of numbers, not as a law.
+
+use kort_thruster::both;
+use kort_thruster::effects::{
+    Available, Context, Descriptor, Effect, Hooks, Path, Spec, commanded, free_shaft, one_start,
+    thrust_measured, wet,
+};
+use kort_thruster::plant::{Balance, Drive, Local, Sensed, Tick};
+use kort_thruster::real::Real;
+use kort_thruster::rig::Rig;
+
+/// Every term.
+pub const TERMS: &[&Descriptor] = &[
+    &SHAFT_OVER_SPEED,
+    &SHAFT_OVER_FLOW,
+    &SHAFT_OVER_TIME,
+    &SHAFT_STEP,
+    &DRIVE_OVER_COMMAND,
+    &DRIVE_OVER_TIME,
+    &BLADE_OVER_SPEED,
+    &BLADE_OVER_FLOW,
+    &FLOW_OVER_FLOW,
+    &FLOW_OVER_TIME,
+    &SENSOR_OVER_THRUST,
+    &SENSOR_OVER_TIME,
+];
+
+/// Whether an effect is one of these.
+pub fn is_term(id: &str) -> bool {
+    id.starts_with("unknown_")
+}
+
+/// Points of a piecewise linear curve.
+const POINTS: usize = 8;
+const NAMES: [&str; POINTS] = ["at_1", "at_2", "at_3", "at_4", "at_5", "at_6", "at_7", "at_8"];
+
+/// Where the points of a curve over `-reach` to `reach` lie.
+fn over(reach: f64) -> [f64; POINTS] {
+    std::array::from_fn(|k| reach * (2.0 * k as f64 / (POINTS - 1) as f64 - 1.0))
+}
+
+/// Where the points of a curve over time lie.
+fn in_time(duration_s: f64) -> [f64; POINTS] {
+    std::array::from_fn(|k| duration_s * k as f64 / (POINTS - 1) as f64)
+}
+
+/// A straight piece between points; held beyond the ends.
+fn curve<T: Real>(values: &[T], points: &[f64; POINTS], at: T) -> T {
+    let last = POINTS - 1;
+    if at.re() <= points[0] {
+        return values[0];
+    }
+    if at.re() >= points[last] {
+        return values[last];
+    }
+    let k = (0..last).find(|k| at.re() < points[k + 1]).unwrap_or(last - 1);
+    let part = (at - points[k]) / (points[k + 1] - points[k]);
+    values[k] + (values[k + 1] - values[k]) * part
+}
+
+/// Heights of a curve, each about as large as `size` may be, then the reach it is laid over.
+fn heights(unit: &'static str, size: f64, reach: f64) -> Vec<Spec> {
+    let mut specs: Vec<Spec> =
+        NAMES.iter().map(|name| Spec::strength(name, unit, 0.2 * size, -20.0 * size, 20.0 * size)).collect();
+    specs.push(Spec::held("reach", "1", reach, reach, reach));
+    specs
+}
+
+/// What a term acts on.
+#[derive(Clone, Copy)]
+enum Place {
+    ShaftOverSpeed,
+    ShaftOverFlow,
+    ShaftOverTime,
+    DriveOverCommand,
+    DriveOverTime,
+    BladeOverSpeed,
+    BladeOverFlow,
+    FlowOverFlow,
+    FlowOverTime,
+    SensorOverThrust,
+    SensorOverTime,
+}
+
+struct Term<T> {
+    place: Place,
+    values: Vec<T>,
+    points: [f64; POINTS],
+}
+
+impl<T: Real> Term<T> {
+    fn boxed(place: Place, values: &[T]) -> Box<dyn Effect<T>> {
+        let reach = values[POINTS].re();
+        let timed = matches!(
+            place,
+            Place::ShaftOverTime | Place::DriveOverTime | Place::FlowOverTime | Place::SensorOverTime
+        );
+        let points = if timed { in_time(reach) } else { over(reach) };
+        Box::new(Self { place, values: values[..POINTS].to_vec(), points })
+    }
+
+    fn at(&self, x: T) -> T {
+        curve(&self.values, &self.points, x)
+    }
+}
+
+impl<T: Real> Effect<T> for Term<T> {
+    fn hooks(&self) -> Hooks {
+        match self.place {
+            Place::DriveOverCommand | Place::DriveOverTime => Hooks::DRIVE,
+            Place::SensorOverThrust | Place::SensorOverTime => Hooks::SENSE,
+            _ => Hooks::BALANCE,
+        }
+    }
+
+    fn drive(&mut self, tick: &Tick, drive: &mut Drive<T>) {
+        drive.command = match self.place {
+            Place::DriveOverTime => drive.command * (self.at(T::from(tick.time_s)) + 1.0),
+            _ => drive.command + self.at(drive.command),
+        };
+    }
+
+    fn balance(&self, at: &Local<T>, _: &[T], balance: &mut Balance<T>, _: &mut [T]) {
+        let (speed, flow, time) = (at.shaft_speed_rad_s, at.axial_m_s, T::from(at.time_s));
+        match self.place {
+            Place::ShaftOverSpeed => balance.shaft_torque_n_m += self.at(speed),
+            Place::ShaftOverFlow => balance.shaft_torque_n_m += self.at(flow),
+            Place::ShaftOverTime => balance.shaft_torque_n_m += self.at(time),
+            Place::BladeOverSpeed => balance.thrust_n += self.at(speed),
+            Place::BladeOverFlow => balance.thrust_n += self.at(flow),
+            Place::FlowOverFlow => balance.momentum_n += self.at(flow),
+            Place::FlowOverTime => balance.ambient_m_s += self.at(time),
+            _ => {}
+        }
+    }
+
+    fn sense(&mut self, tick: &Tick, sensed: &mut Sensed<T>) {
+        sensed.thrust_n += match self.place {
+            Place::SensorOverTime => self.at(T::from(tick.time_s)),
+            _ => self.at(sensed.thrust_n),
+        };
+    }
+}
+
+/// A load on the shaft that comes on at one instant and stays.
+struct Step<T> {
+    torque_n_m: T,
+    at_s: T,
+}
+
+/// How long a step takes, s: short against anything that is logged, long against a tick.
+const RISE_S: f64 = 0.02;
+
+impl<T: Real> Effect<T> for Step<T> {
+    fn hooks(&self) -> Hooks {
+        Hooks::BALANCE
+    }
+
+    fn balance(&self, at: &Local<T>, _: &[T], balance: &mut Balance<T>, _: &mut [T]) {
+        let on = (((T::from(at.time_s) - self.at_s) / RISE_S).tanh() + 1.0) * 0.5;
+        balance.shaft_torque_n_m += self.torque_n_m * on;
+    }
+}
+
+macro_rules! term {
+    ($const:ident, $id:literal, $path:ident, $equation:literal, $needs:expr, $parameters:expr, $place:ident) => {
+        const $const: Descriptor = Descriptor {
+            id: $id,
+            path: Path::$path,
+            what: "a term without a name",
+            equation: $equation,
+            signature: "",
+            confused_with: &[],
+            separated_by: "",
+            reference: "",
+            parameters: $parameters,
+            starts: one_start,
+            needs: $needs,
+            build: both!(|values, _: &Context<_>| Term::boxed(Place::$place, values)),
+        };
+    };
+}
+
+fn flow_seen(rig: &Rig, available: &Available) -> Result<(), &'static str> {
+    wet(rig, available)?;
+    if available.axial_flow_modelled { Ok(()) } else { Err("the baseline has no axial flow") }
+}
+
+fn shaft_and_flow(rig: &Rig, available: &Available) -> Result<(), &'static str> {
+    free_shaft(rig, available)?;
+    flow_seen(rig, available)
+}
+
+term!(
+    SHAFT_OVER_SPEED,
+    "unknown_shaft_over_speed",
+    Shaft,
+    "shaft torque [N m] over shaft_speed_rad_s",
+    free_shaft,
+    |s| heights("N m", 0.1 * s.torque_n_m, s.shaft_speed_rad_s),
+    ShaftOverSpeed
+);
+term!(
+    SHAFT_OVER_FLOW,
+    "unknown_shaft_over_flow",
+    Shaft,
+    "shaft torque [N m] over flow_m_s",
+    shaft_and_flow,
+    |s| heights("N m", 0.1 * s.torque_n_m, s.flow_m_s),
+    ShaftOverFlow
+);
+term!(
+    SHAFT_OVER_TIME,
+    "unknown_shaft_over_time",
+    Shaft,
+    "shaft torque [N m] over time_s",
+    free_shaft,
+    |s| heights("N m", 0.1 * s.torque_n_m, s.duration_s),
+    ShaftOverTime
+);
+term!(
+    DRIVE_OVER_COMMAND,
+    "unknown_drive_over_command",
+    Drive,
+    "addition to the command over the command",
+    commanded,
+    |s| heights("of the command", 0.1 * s.command, s.command),
+    DriveOverCommand
+);
+term!(
+    DRIVE_OVER_TIME,
+    "unknown_drive_over_time",
+    Drive,
+    "relative addition to the command over time_s",
+    commanded,
+    |s| heights("1", 0.1, s.duration_s),
+    DriveOverTime
+);
+term!(
+    BLADE_OVER_SPEED,
+    "unknown_blade_over_speed",
+    Blade,
+    "thrust [N] over shaft_speed_rad_s",
+    wet,
+    |s| heights("N", 0.1 * s.thrust_n, s.shaft_speed_rad_s),
+    BladeOverSpeed
+);
+term!(
+    BLADE_OVER_FLOW,
+    "unknown_blade_over_flow",
+    Blade,
+    "thrust [N] over flow_m_s",
+    flow_seen,
+    |s| heights("N", 0.1 * s.thrust_n, s.flow_m_s),
+    BladeOverFlow
+);
+term!(
+    FLOW_OVER_FLOW,
+    "unknown_flow_over_flow",
+    Flow,
+    "force on the axial flow [N] over flow_m_s",
+    flow_seen,
+    |s| heights("N", 0.1 * s.thrust_n, s.flow_m_s),
+    FlowOverFlow
+);
+term!(
+    FLOW_OVER_TIME,
+    "unknown_flow_over_time",
+    Flow,
+    "ambient flow [m/s] over time_s",
+    flow_seen,
+    |s| heights("m/s", 0.1 * s.flow_m_s, s.duration_s),
+    FlowOverTime
+);
+term!(
+    SENSOR_OVER_THRUST,
+    "unknown_sensor_over_thrust",
+    Sensor,
+    "addition to the thrust reading [N] over thrust_n",
+    thrust_measured,
+    |s| heights("N", 0.1 * s.thrust_n, s.thrust_n),
+    SensorOverThrust
+);
+term!(
+    SENSOR_OVER_TIME,
+    "unknown_sensor_over_time",
+    Sensor,
+    "addition to the thrust reading [N] over time_s",
+    thrust_measured,
+    |s| heights("N", 0.1 * s.thrust_n, s.duration_s),
+    SensorOverTime
+);
+
+const SHAFT_STEP: Descriptor = Descriptor {
+    id: "unknown_shaft_step",
+    path: Path::Shaft,
+    what: "a load that comes on at one instant",
+    equation: "shaft torque [N m] from an instant on",
+    signature: "",
+    confused_with: &[],
+    separated_by: "",
+    reference: "",
+    parameters: |s| {
+        vec![
+            Spec::strength("torque_n_m", "N m", 0.02 * s.torque_n_m, -s.torque_n_m, s.torque_n_m),
+            Spec::shape("from_s", "s", 0.5 * s.duration_s, 0.0, s.duration_s),
+        ]
+    },
+    starts: |s| {
+        let at = |k: usize| vec![0.02 * s.torque_n_m, s.duration_s * (k as f64 + 0.5) / INSTANTS as f64];
+        (0..INSTANTS).map(at).collect()
+    },
+    needs: free_shaft,
+    build: both!(|values, _: &Context<_>| Box::new(Step { torque_n_m: values[0], at_s: values[1] })),
+};
+
+/// Instants at which a step is tried.
+const INSTANTS: usize = 24;
+
+/// A term's numbers as words: variable and height of every point, or size and instant of a step.
+pub fn expression(term: &Descriptor, values: &[f64]) -> String {
+    if term.id == SHAFT_STEP.id {
+        return format!("{:+.4} N m from t = {:.2} s on", values[0], values[1]);
+    }
+    let reach = values[POINTS];
+    let points = if term.id.ends_with("over_time") { in_time(reach) } else { over(reach) };
+    let pairs: Vec<String> = points.iter().zip(values).map(|(x, y)| format!("{y:+.4} at {x:.3}")).collect();
+    format!("straight between {}", pairs.join(", "))
+}
+
+/// What a term enters, and over what.
+pub fn enters(term: &Descriptor) -> (&'static str, &'static str) {
+    if term.id == SHAFT_STEP.id {
+        return ("shaft torque [N m]", "time_s");
+    }
+    term.equation.split_once(" over ").unwrap_or((term.equation, "time_s"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_curve_goes_through_its_points_and_is_held_beyond_them() {
+        let values: Vec<f64> = (0..POINTS).map(|k| k as f64).collect();
+        let points = over(7.0);
+        assert_eq!(curve(&values, &points, -9.0), 0.0);
+        assert_eq!(curve(&values, &points, 9.0), 7.0);
+        assert!((curve(&values, &points, 0.0) - 3.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn every_term_is_listed_once_and_named_as_one() {
+        let mut ids: Vec<&str> = TERMS.iter().map(|t| t.id).collect();
+        ids.sort_unstable();
+        ids.dedup();
+        assert_eq!(ids.len(), TERMS.len());
+        assert!(ids.iter().all(|id| is_term(id)));
+    }
+}

@@ -1,0 +1,70 @@
+//! From costs of sets to probabilities, of sets and of effects.
+
+use crate::flexible::is_term;
+use crate::search::Set;
+
+/// A set of effects with what speaks for it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Explanation {
+    /// The set; empty is the baseline alone.
+    pub set: Set,
+    /// Its cost: twice the negative log of evidence and prior.
+    pub cost: f64,
+    /// Its probability.
+    pub probability: f64,
+}
+
+/// Probabilities of sets, likeliest first: in proportion to `exp(-cost / (2 temper))`, `surprise` left for
+/// sets that were not fitted. A temper above one says that costs differ by more than the truth behind them,
+/// since no form is exact.
+pub fn posterior(costs: Vec<(Set, f64)>, temper: f64, surprise: f64) -> Vec<Explanation> {
+    let least = costs.iter().map(|c| c.1).fold(f64::INFINITY, f64::min);
+    let weight = |cost: f64| (-(cost - least) / (2.0 * temper)).exp();
+    let total: f64 = costs.iter().map(|c| weight(c.1)).sum();
+    let mut all: Vec<Explanation> = costs
+        .into_iter()
+        .map(|(set, cost)| Explanation { probability: (1.0 - surprise) * weight(cost) / total, set, cost })
+        .collect();
+    all.sort_by(|a, b| a.cost.total_cmp(&b.cost).then_with(|| a.set.cmp(&b.set)));
+    all
+}
+
+/// Probability that an effect is present: the sum over the sets that hold it, those that need a nameless term
+/// counted by `beside_unknown`.
+pub fn presence(explanations: &[Explanation], effect: &str, beside_unknown: f64) -> f64 {
+    explanations
+        .iter()
+        .filter(|e| e.set.contains(&effect))
+        .map(
+            |e| {
+                if e.set.iter().any(|id| is_term(id)) {
+                    beside_unknown * e.probability
+                } else {
+                    e.probability
+                }
+            },
+        )
+        .sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equal_sets_share_and_a_far_one_has_nothing() {
+        let costs = vec![(vec!["a"], 10.0), (vec!["b"], 10.0), (vec![], 500.0)];
+        let all = posterior(costs, 3.0, 0.04);
+        assert!((presence(&all, "a", 0.7) - 0.48).abs() < 1e-12);
+        assert!((presence(&all, "b", 0.7) - 0.48).abs() < 1e-12);
+        assert!(all[2].probability < 1e-12);
+    }
+
+    #[test]
+    fn an_effect_in_every_likely_set_is_as_sure_as_all_of_them() {
+        let costs = vec![(vec!["a", "b"], 0.0), (vec!["a", "c"], 1.0), (vec!["a"], 60.0)];
+        let all = posterior(costs, 3.0, 0.03);
+        assert!((presence(&all, "a", 0.7) - 0.97).abs() < 1e-3);
+        assert!(presence(&all, "b", 0.7) > presence(&all, "c", 0.7));
+    }
+}

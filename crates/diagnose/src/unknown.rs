@@ -1,0 +1,107 @@
+//! Is something left that no name explains? A term that bends to anything is put on each place where physics
+//! may be missing, on top of the best set and instead of its members. It pays for all its numbers.
+
+use kort_identify::Quadratic;
+use kort_identify::fit::Fit;
+use kort_identify::hypothesis::{Hypothesis, Member};
+use kort_thruster::effects::{Available, Descriptor};
+use kort_thruster::rig::Rig;
+use nalgebra::DVector;
+use rayon::prelude::*;
+
+use crate::flexible::TERMS;
+use crate::search::{Search, Set};
+
+/// Looks for what has no name beside a set, and keeps the sets with it that do better, or as well with fewer
+/// names.
+pub fn look(
+    search: &mut Search,
+    best: &Set,
+    rig: &Rig,
+    offered: &Available,
+    progress: &(dyn Fn(&str) + Sync),
+) {
+    let terms: Vec<&'static Descriptor> =
+        TERMS.iter().copied().filter(|t| (t.needs)(rig, offered).is_ok()).collect();
+    let Some(beside) = put_on(search, best, &terms) else { return };
+    // Names that only stood for it, and names that show once it is there.
+    search.refine(&beside);
+    if !best.is_empty()
+        && let Some(alone) = put_on(search, &Set::new(), &terms)
+    {
+        search.climb(alone, progress);
+    }
+}
+
+/// Fits the term that promises most on top of a set; the set with it, if it earns its price.
+fn put_on(search: &mut Search, set: &Set, terms: &[&'static Descriptor]) -> Option<Set> {
+    let parent = search.fits.get(set)?;
+    let promised: Vec<(f64, &'static Descriptor, Hypothesis)> =
+        terms.par_iter().filter_map(|term| promise(search, parent, term)).collect();
+    let (cost, term, hypothesis) = promised.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
+    if cost + search.per_effect() >= parent.cost() {
+        return None;
+    }
+    let (columns, actions) = (parent.columns.clone(), parent.actions.clone());
+    let mut larger = set.clone();
+    larger.push(term.id);
+    larger.sort_unstable();
+    search.fit_set(larger.clone(), &hypothesis, &columns, &actions);
+    search.fits.contains_key(&larger).then_some(larger)
+}
+
+/// Cost of a set with a term on it, to first order; and the set from there.
+fn promise(
+    search: &Search,
+    parent: &Fit,
+    term: &'static Descriptor,
+) -> Option<(f64, &'static Descriptor, Hypothesis)> {
+    let problem = search.problem;
+    let whole = Member::new(term, &problem.scale);
+    let specs = (term.parameters)(&problem.scale);
+    let shapes = specs.iter().any(|s| s.shape && !s.held);
+    let mut starts = (term.starts)(&problem.scale);
+    if starts.is_empty() {
+        // Linear in all its heights: from nothing.
+        starts.push(specs.iter().map(|s| if s.shape { s.start } else { 0.0 }).collect());
+    }
+    let known = problem.about(&parent.lines, &parent.columns, &parent.hypothesis);
+    starts
+        .into_iter()
+        .filter_map(|start| {
+            let hypothesis = parent.hypothesis.with(&parent.values, whole.clone().at(start), &problem.scale);
+            let own: Vec<usize> = (parent.values.len()..hypothesis.free.len()).collect();
+            let lines = if shapes {
+                problem.residual_lines(&hypothesis, &hypothesis.start)
+            } else {
+                parent.lines.clone()
+            };
+            let mut new = problem.derivatives(&hypothesis, &hypothesis.start, &own);
+            new.sort_by_key(|c| c.0);
+            if !new.iter().all(|c| c.1.iter().all(|v| v.is_finite())) || !lines.iter().all(|v| v.is_finite())
+            {
+                return None;
+            }
+            let columns: Vec<&DVector<f64>> =
+                parent.columns.iter().flatten().map(AsRef::as_ref).chain(new.iter().map(|c| &c.1)).collect();
+            let model = Quadratic::extended(
+                &problem.spectrum,
+                &problem.criterion,
+                &lines,
+                &columns,
+                &hypothesis.free,
+                known.curvature(),
+            );
+            let floor = problem.floor.with_actions(&parent.actions, &problem.criterion);
+            let found = model.minimise(&floor, &hypothesis.free, &hypothesis.start, 0.0);
+            let cost = found.misfit + found.penalty + model.price(&found.noise);
+            let start = hypothesis
+                .free
+                .iter()
+                .enumerate()
+                .map(|(k, f)| (hypothesis.start[k] + found.step[k] * f.sigma).clamp(f.low, f.high))
+                .collect();
+            Some((cost, term, Hypothesis { start, ..hypothesis }))
+        })
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+}
