@@ -13,7 +13,7 @@ use kort_thruster::rig::Rig;
 use nalgebra::DVector;
 use rayon::prelude::*;
 
-use crate::data::Prepared;
+use crate::data::{Prepared, Response, rates};
 use crate::hypothesis::{Hypothesis, Member};
 use crate::noise::{Criterion, Floor};
 use crate::shared_lanes::{groups, last_acting};
@@ -133,7 +133,8 @@ impl<'a> Problem<'a> {
         let hooked: Vec<(&Descriptor, &[T])> =
             hypothesis.effects.iter().map(|m| m.effect).zip(effects.iter().map(Vec::as_slice)).collect();
         for (r, recording) in self.recordings.iter().enumerate() {
-            let mut plant = Plant::new(self.model, self.rig, &parameters, &hooked, recording.tick_s);
+            let mut plant = Plant::new(self.model, self.rig, &parameters, &hooked, recording.tick_s)
+                .with_observer(recording.observer_rad_s);
             let [speed, flow, current, angle] = recording.start;
             plant.start(recording.time_s[0], speed, flow, current, angle);
             run(&mut plant, recording, &hypothesis.inputs.commands[r], |row, sensed| show(r, row, sensed));
@@ -158,6 +159,13 @@ impl<'a> Problem<'a> {
                 }
             }
         });
+        for (r, recording) in self.recordings.iter().enumerate() {
+            for (c, channel) in recording.channels.iter().enumerate() {
+                if channel.response == Response::ShaftAngle {
+                    stacks.iter_mut().for_each(|s| rates(&mut s[r][c], &channel.rows, &recording.time_s));
+                }
+            }
+        }
         stacks
     }
 

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use nalgebra::DVector;
 use rustdct::{DctPlanner, TransformType2And3};
 
-use crate::data::Prepared;
+use crate::data::{Prepared, Response};
 use crate::simulate::Stack;
 
 /// Bands a decade of frequency.
@@ -37,6 +37,9 @@ struct Frame {
     /// Samples in use.
     picks: Vec<usize>,
     full_scale: f64,
+    /// Another channel of the recording that is taken off first, where both show the same signal: what they
+    /// share must not count twice.
+    less: Option<usize>,
     transform: Arc<dyn TransformType2And3<f64>>,
     lines: Range<usize>,
 }
@@ -62,8 +65,14 @@ impl Spectrum {
                 let picks: Vec<usize> =
                     (0..channel.rows.len()).filter(|k| !masked[channel.rows[*k]]).collect();
                 let n = picks.len();
+                let angle = recording.channels.iter().position(|c| {
+                    c.response == Response::ShaftAngle
+                        && channel.response == Response::ShaftSpeed
+                        && c.rows == channel.rows
+                });
                 let frame = Frame {
                     full_scale: channel.full_scale,
+                    less: angle,
                     transform: planner.plan_dct2(n.max(1)),
                     lines: lines..lines + n,
                     picks,
@@ -72,7 +81,8 @@ impl Spectrum {
                     frame.picks.iter().map(|k| recording.time_s[channel.rows[*k]]).collect();
                 let interval_s = median_interval(&times);
                 let mut signal = vec![0.0; n];
-                frame.transform(&channel.values, &mut signal);
+                let less = frame.less.map(|c| recording.channels[c].values.as_slice());
+                frame.transform(&channel.values, less, &mut signal);
                 let quantisation = (quantum(&channel.values) / channel.full_scale).powi(2) / 12.0;
                 let ranges = band_ranges(n);
                 for (i, range) in ranges.iter().enumerate() {
@@ -100,7 +110,8 @@ impl Spectrum {
         let mut out = DVector::zeros(self.lines);
         for (frames, channels) in self.frames.iter().zip(stack) {
             for (frame, samples) in frames.iter().zip(channels) {
-                frame.transform(samples, &mut out.as_mut_slice()[frame.lines.clone()]);
+                let less = frame.less.map(|c| channels[c].as_slice());
+                frame.transform(samples, less, &mut out.as_mut_slice()[frame.lines.clone()]);
             }
         }
         out
@@ -117,10 +128,10 @@ impl Spectrum {
 }
 
 impl Frame {
-    fn transform(&self, samples: &[f64], lines: &mut [f64]) {
+    fn transform(&self, samples: &[f64], less: Option<&[f64]>, lines: &mut [f64]) {
         let n = self.picks.len();
         for (line, k) in lines.iter_mut().zip(&self.picks) {
-            *line = samples[*k] / self.full_scale;
+            *line = (samples[*k] - less.map_or(0.0, |l| l[*k])) / self.full_scale;
         }
         if n == 0 {
             return;

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use kort_identify::data::Series;
 use kort_diagnose::diagnose::{Options, diagnose};
+use kort_identify::data::Series;
 use kort_recording::Recording;
 use kort_thruster::models::ModelName;
 use kort_thruster::rig::Rig;

@@ -1,0 +1,88 @@
+//! Why a recording cannot be compared with a model.
+
+/// Why a recording cannot be compared with a model.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum DataError {
+    /// No column to drive the model.
+    #[error(
+        "{recording}: no driving column\nhint: one of current_cmd_a, voltage_cmd_v, duty_cmd, speed_cmd_rad_s, or a measured current_a or shaft_speed_rad_s must be there and vary"
+    )]
+    NoDriving {
+        /// The recording.
+        recording: String,
+    },
+    /// Nothing to compare with.
+    #[error(
+        "{recording}: driven by {driving}, but no measured response beside it: {found}\nhint: record shaft_speed_rad_s, thrust_n, torque_n_m or flow_m_s as well; a log of commands alone can be replayed (kort simulate, a segment of kind \"replay\"), not diagnosed"
+    )]
+    NoResponse {
+        /// The recording.
+        recording: String,
+        /// The driving column.
+        driving: &'static str,
+        /// What there is instead.
+        found: String,
+    },
+    /// Too short.
+    #[error(
+        "{recording}: {rows} rows are too few to compare with a model; at least {least} are needed\nhint: record at least a few seconds with changes of the command"
+    )]
+    TooShort {
+        /// The recording.
+        recording: String,
+        /// Rows found.
+        rows: usize,
+        /// Rows needed.
+        least: usize,
+    },
+    /// A value that no thruster gives.
+    #[error(
+        "{recording}: {column} = {value:e} at {time_s} s is outside what is allowed: -{most:e} to {most:e}\nhint: is the unit right? a value not measured is an empty cell"
+    )]
+    Implausible {
+        /// The recording.
+        recording: String,
+        /// The column.
+        column: String,
+        /// When.
+        time_s: f64,
+        /// The value found.
+        value: f64,
+        /// Largest size allowed.
+        most: f64,
+    },
+    /// Rows closer together than any log writes them.
+    #[error(
+        "{recording}: rows are usually {interval_s:e} s apart; at least {least_s:e} s are needed\nhint: is time_s in seconds?"
+    )]
+    TooFast {
+        /// The recording.
+        recording: String,
+        /// Median time between rows, s.
+        interval_s: f64,
+        /// Shortest allowed, s.
+        least_s: f64,
+    },
+    /// The model cannot be simulated.
+    #[error(
+        "{recording}: the simulation of the stated rig breaks down (a response is not a number or runs away)\nhint: check the rig's inertia, duct length, resistance and gains for their units; kort simulate shows what the model does"
+    )]
+    BrokeDown {
+        /// The recording.
+        recording: String,
+    },
+    /// More control ticks than can be simulated.
+    #[error(
+        "{recording}: time_s spans {seconds} s; at most {most_s:.0} s can be compared at this control rate (the longest gap is from {} to {} s)\nhint: is time_s in seconds? cut the recording at its gaps, or take a part of it", .gap_s[0], .gap_s[1]
+    )]
+    TooLong {
+        /// The recording.
+        recording: String,
+        /// Span found, s.
+        seconds: f64,
+        /// Longest allowed, s.
+        most_s: f64,
+        /// The longest gap, from and to, s.
+        gap_s: [f64; 2],
+    },
+}

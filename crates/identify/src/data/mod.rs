@@ -1,0 +1,333 @@
+//! A recording made ready for simulation: inputs on the control grid, responses on the log grid.
+
+use kort_thruster::plant::{Course, Driven, Stimulus, Tick};
+use kort_thruster::rig::{AmplifierKind, Rig};
+
+use crate::refuse;
+
+mod channel;
+mod columns;
+mod command;
+mod driving;
+mod error;
+mod fill;
+mod scale;
+mod start;
+
+pub use channel::{Channel, rates};
+pub use columns::{KNOWN, possible_drivers};
+pub use error::DataError;
+pub use scale::{available, scale};
+
+use command::{find_edges, smooth_between, steps_of};
+use driving::{choose_driving, instead};
+use fill::{filled, held, linear, median_step};
+use start::start_state;
+
+/// A measured response that a model can be compared with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Response {
+    /// `current_a`
+    Current,
+    /// `shaft_speed_rad_s`
+    ShaftSpeed,
+    /// `thrust_n`
+    Thrust,
+    /// `torque_n_m`
+    Torque,
+    /// `flow_m_s`
+    Flow,
+    /// `shaft_angle_rad`, compared as its mean rate from sample to sample: an angle itself only drifts.
+    ShaftAngle,
+}
+
+impl Response {
+    /// Every response.
+    pub const ALL: [Self; 6] =
+        [Self::Current, Self::ShaftSpeed, Self::Thrust, Self::Torque, Self::Flow, Self::ShaftAngle];
+
+    /// The recording's column.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Current => "current_a",
+            Self::ShaftSpeed => "shaft_speed_rad_s",
+            Self::Thrust => "thrust_n",
+            Self::Torque => "torque_n_m",
+            Self::Flow => "flow_m_s",
+            Self::ShaftAngle => "shaft_angle_rad",
+        }
+    }
+
+    /// Its value in a simulated row.
+    pub fn of<T: Copy>(self, row: &kort_thruster::plant::Sensed<T>) -> T {
+        match self {
+            Self::Current => row.current_a,
+            Self::ShaftSpeed => row.shaft_speed_rad_s,
+            Self::Thrust => row.thrust_n,
+            Self::Torque => row.torque_n_m,
+            Self::Flow => row.flow_m_s,
+            Self::ShaftAngle => row.shaft_angle_rad,
+        }
+    }
+}
+
+/// Columns of a recording as numbers; NaN means "not sampled then".
+#[derive(Clone, Debug, Default)]
+pub struct Series {
+    /// Name for messages and the report.
+    pub name: String,
+    /// Strictly increasing, s.
+    pub time_s: Vec<f64>,
+    /// Columns by name.
+    pub columns: Vec<(String, Vec<f64>)>,
+}
+
+impl Series {
+    /// A column with at least one sample.
+    pub fn column(&self, name: &str) -> Option<&[f64]> {
+        self.columns
+            .iter()
+            .find(|c| c.0 == name)
+            .map(|c| c.1.as_slice())
+            .filter(|c| c.iter().any(|v| v.is_finite()))
+    }
+}
+
+/// What drives the model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Driving {
+    /// A command column.
+    Command(&'static str),
+    /// Measured current.
+    Current,
+    /// Measured shaft speed.
+    Speed,
+}
+
+impl Driving {
+    /// The column's name.
+    pub const fn column(self) -> &'static str {
+        match self {
+            Self::Command(name) => name,
+            Self::Current => "current_a",
+            Self::Speed => "shaft_speed_rad_s",
+        }
+    }
+}
+
+/// One recording, ready to be compared with a model.
+#[derive(Clone, Debug)]
+pub struct Prepared {
+    /// Name for the report.
+    pub name: String,
+    /// Log instants, s.
+    pub time_s: Vec<f64>,
+    /// Inputs on the control grid.
+    pub stimulus: Stimulus,
+    /// What drives.
+    pub driving: Driving,
+    /// Measured responses.
+    pub channels: Vec<Channel>,
+    /// Jumps of the command: the first row that shows each.
+    pub edges: Vec<usize>,
+    /// Whether the command is laid on the control grid (it drives, or a measured current stands for it).
+    pub commanded: bool,
+    /// Command at each row.
+    pub command: Vec<f64>,
+    /// Control ticks a log interval (nominal).
+    pub ticks_per_row: usize,
+    /// Control period, s.
+    pub tick_s: f64,
+    /// State at the first row: shaft speed, axial flow, current, angle.
+    pub start: [f64; 4],
+    /// Bandwidth with which the simulated shaft is kept with the recorded one, rad/s; 0 where it runs freely.
+    pub observer_rad_s: f64,
+}
+
+/// Whether a rig shows a response. A dry shaft has no water to feel; its angle tells what a filtered speed
+/// hides, which beside a propeller thrust and flow do.
+fn shown(rig: &Rig, driving: Driving, response: Response) -> bool {
+    match response {
+        Response::Current | Response::ShaftSpeed => true,
+        Response::ShaftAngle => rig.propeller.is_none() && driving != Driving::Speed,
+        _ => rig.propeller.is_some(),
+    }
+}
+
+/// Bandwidth of the observer on a shaft that nothing brings back to its course, rad/s: 1 Hz.
+const OBSERVER_RAD_S: f64 = std::f64::consts::TAU;
+
+/// Whether a disturbed shaft returns to its course by itself: blades brake it, or the back-EMF under a
+/// voltage does, within a few tenths of a second. A dry shaft under a current integrates, and drifts.
+fn returns(rig: &Rig, driving: Driving) -> bool {
+    if rig.propeller.is_some() || driving == Driving::Speed {
+        return true;
+    }
+    let (motor, voltage) = (&rig.motor, rig.amplifier.kind == AmplifierKind::Voltage);
+    let braking = match (motor.winding_resistance_ohm, driving) {
+        (Some(ohm), Driving::Command(_)) if voltage => motor.torque_constant_nm_a.value.powi(2) / ohm.value,
+        _ => 0.0,
+    };
+    rig.amplifier.kind == AmplifierKind::Speed || braking / motor.inertia_kg_m2.value > OBSERVER_RAD_S
+}
+
+/// The coarsest step at which the plant is integrated, s.
+const COARSEST_TICK_S: f64 = 0.002;
+const FEWEST_ROWS: usize = 20;
+
+impl Prepared {
+    /// Prepares a recording for a rig. A shaft-speed drive is chosen only where `speed_driven`
+    /// asks for it (Model 3) or nothing else can drive.
+    ///
+    /// # Errors
+    /// [`DataError`] if nothing drives, nothing responds, or it is too short.
+    pub fn new(series: &Series, rig: &Rig, speed_driven: bool) -> Result<Self, DataError> {
+        let recording = series.name.clone();
+        let rows = series.time_s.len();
+        if rows < FEWEST_ROWS {
+            return Err(DataError::TooShort { recording, rows, least: FEWEST_ROWS });
+        }
+        let row_s = median_step(&series.time_s);
+        refuse::implausible(series, row_s)?;
+        let driving = choose_driving(series, rig, speed_driven)
+            .ok_or(DataError::NoDriving { recording: recording.clone() })?;
+        let channels: Vec<Channel> = Response::ALL
+            .into_iter()
+            .filter(|r| {
+                r.name() != driving.column() && !(driving == Driving::Speed && *r == Response::Current)
+            })
+            .filter(|r| shown(rig, driving, *r))
+            .filter_map(|r| Channel::new(series, r))
+            .collect();
+        if !channels.iter().any(|c| c.response != Response::Current) {
+            let found = instead(series, driving.column());
+            return Err(DataError::NoResponse { recording, driving: driving.column(), found });
+        }
+        let tick_s = match rig.sensors.control_rate_hz {
+            Some(rate) if 1.0 / rate <= row_s * 1.001 => {
+                let tick = 1.0 / rate;
+                tick / (tick / COARSEST_TICK_S).ceil().max(1.0)
+            }
+            _ => row_s / (row_s / COARSEST_TICK_S).ceil().max(1.0),
+        };
+        refuse::too_long(series, tick_s)?;
+        let column = series.column(driving.column()).unwrap_or(&[]);
+        // A command stands until the next; a response moves on between its samples.
+        let recorded = if let Driving::Command(_) = driving { held(column) } else { filled(column) };
+        let mut prepared = Self {
+            name: recording,
+            time_s: series.time_s.clone(),
+            stimulus: Stimulus::default(),
+            driving,
+            channels,
+            edges: Vec::new(),
+            commanded: false,
+            command: if driving == Driving::Current { steps_of(&recorded) } else { recorded },
+            ticks_per_row: (row_s / tick_s).round() as usize,
+            tick_s,
+            start: [0.0; 4],
+            observer_rad_s: if returns(rig, driving) { 0.0 } else { OBSERVER_RAD_S },
+        };
+        if let Driving::Command("duty_cmd") = driving {
+            // A duty of the supply is a voltage: of the recorded supply, or else the nominal one.
+            let nominal = vec![rig.amplifier.supply_v.unwrap_or(1.0); rows];
+            let supply = series.column("supply_v").map_or(nominal, filled);
+            prepared.command.iter_mut().zip(supply).for_each(|(c, v)| *c *= v);
+        }
+        prepared.lay_out(series, rig);
+        prepared.start = start_state(series, &prepared);
+        Ok(prepared)
+    }
+
+    /// Lays the recorded inputs on the control grid.
+    fn lay_out(&mut self, series: &Series, rig: &Rig) {
+        let t0 = self.time_s[0];
+        let end = (self.time_s[self.time_s.len() - 1] - t0) / self.tick_s;
+        let count = (end - 1e-6).ceil().max(1.0) as usize;
+        self.stimulus.logs = self
+            .time_s
+            .iter()
+            .map(|t| {
+                let at = (t - t0) / self.tick_s;
+                let near = at.round();
+                if (at - near).abs() < 0.02 {
+                    (near as usize, 0.0)
+                } else {
+                    (at.floor() as usize, at - at.floor())
+                }
+            })
+            .collect();
+        let ambient = series.column("ambient_m_s").map(filled);
+        let supply = series.column("supply_v").map(filled);
+        let angle = series.column("shaft_angle_rad").map(filled);
+        let depth = series.column("depth_m").map(filled);
+        let temperature = series.column("temperature_c").map(filled);
+        let measured_speed = series.column("shaft_speed_rad_s").map(filled);
+        let enabled = series.column("torque_enable").map(held);
+        let speed = (self.driving == Driving::Speed).then(|| self.driving_speed(series, rig));
+        let mut ticks = Vec::with_capacity(count);
+        let mut row = 0;
+        for i in 0..count {
+            let time_s = t0 + i as f64 * self.tick_s;
+            let next_s = time_s + self.tick_s;
+            while row + 2 < self.time_s.len() && self.time_s[row + 1] <= time_s + 0.02 * self.tick_s {
+                row += 1;
+            }
+            let at = |column: &[f64], t: f64| linear(&self.time_s, column, row, t);
+            ticks.push(Tick {
+                time_s,
+                command: 0.0,
+                driven: match self.driving {
+                    Driving::Command(_) => Driven::Command,
+                    Driving::Current => Driven::Current(at(&self.command, time_s), at(&self.command, next_s)),
+                    Driving::Speed => {
+                        let s = speed.as_deref().unwrap_or(&[]);
+                        Driven::Speed(at(s, time_s), at(s, next_s))
+                    }
+                },
+                ambient_m_s: ambient.as_deref().map_or((0.0, 0.0), |a| (at(a, time_s), at(a, next_s))),
+                supply_v: supply.as_deref().map(|s| at(s, time_s)),
+                shaft_angle_rad: angle.as_deref().map(|a| (at(a, time_s), at(a, next_s))),
+                depth_m: depth.as_deref().map(|d| at(d, time_s)),
+                temperature_c: temperature.as_deref().map(|d| at(d, time_s)),
+                extra: 0.0,
+                released: enabled.as_deref().is_some_and(|e| e[row] < 0.5),
+                observed_angle_rad: angle.as_deref().map(|a| at(a, next_s)),
+                observed_speed_rad_s: measured_speed.as_deref().map(|s| at(s, next_s)),
+                course: Course::Any,
+            });
+        }
+        self.stimulus.ticks = ticks;
+        let stepped = matches!(self.driving, Driving::Command(_))
+            || self.driving == Driving::Current && rig.amplifier.kind == AmplifierKind::Current;
+        if stepped {
+            self.edges = find_edges(&self.command);
+            if self.driving == Driving::Current {
+                smooth_between(&mut self.command, &self.edges);
+            }
+            self.commanded = true;
+        }
+    }
+
+    /// Shaft speed without the stated measuring chain: from the angle where it is recorded, else
+    /// the filtered speed with the filter's lag taken back.
+    fn driving_speed(&self, series: &Series, rig: &Rig) -> Vec<f64> {
+        let t = &self.time_s;
+        let n = t.len();
+        let slope = |y: &[f64], k: usize| {
+            let (a, b) = (k.saturating_sub(1), (k + 1).min(n - 1));
+            (y[b] - y[a]) / (t[b] - t[a])
+        };
+        if let Some(angle) = series.column("shaft_angle_rad").map(filled) {
+            return (0..n).map(|k| slope(&angle, k)).collect();
+        }
+        let tau = rig.sensors.speed_filter_time_constant_s.unwrap_or(0.0)
+            + if rig.sensors.encoder_counts_per_rev.is_some() { 0.5 * self.tick_s } else { 0.0 };
+        (0..n).map(|k| self.command[k] + tau * slope(&self.command, k)).collect()
+    }
+
+    /// Length, s.
+    pub fn duration_s(&self) -> f64 {
+        self.time_s[self.time_s.len() - 1] - self.time_s[0]
+    }
+}

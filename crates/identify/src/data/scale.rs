@@ -1,0 +1,82 @@
+//! Sizes in use, and what recordings offer to effects.
+
+use kort_thruster::effects::{Available, Scale};
+use kort_thruster::models::ModelName;
+use kort_thruster::rig::{AmplifierKind, Rig};
+
+use super::{Driving, Prepared, Response, Series};
+
+/// Sizes in use over all recordings, for the scale of the effects' parameters.
+pub fn scale(all: &[Prepared], rig: &Rig) -> Scale {
+    let full = |r: Response| {
+        all.iter()
+            .flat_map(|p| &p.channels)
+            .filter(|c| c.response == r)
+            .map(|c| c.full_scale)
+            .fold(0.0, f64::max)
+    };
+    let stated = kort_thruster::parameters::Parameters::stated(rig);
+    let kt = rig.motor.torque_constant_nm_a.value;
+    let command = all.iter().flat_map(|p| &p.command).fold(0.0_f64, |m, c| m.max(c.abs()));
+    let (ct, cq) = if rig.propeller.is_some() { stated.bollard_coefficients() } else { (0.0, 0.0) };
+    let driven_by = |name: &str| all.iter().any(|p| p.driving.column() == name);
+    let current =
+        if driven_by("current_cmd_a") || driven_by("current_a") { command } else { full(Response::Current) };
+    let mut speed = full(Response::ShaftSpeed);
+    if driven_by("shaft_speed_rad_s") || driven_by("speed_cmd_rad_s") {
+        speed = speed.max(command);
+    }
+    if speed == 0.0 && cq > 0.0 {
+        speed = (kt * current / cq).sqrt();
+    }
+    let thrust = Some(full(Response::Thrust)).filter(|t| *t > 0.0).unwrap_or(ct * speed * speed);
+    let flux = stated.get(kort_thruster::parameters::Parameter::FluxCoefficient)
+        * stated.get(kort_thruster::parameters::Parameter::DensityKgM3)
+        * stated.area_m2();
+    let ohm = stated.get(kort_thruster::parameters::Parameter::WindingResistanceOhm);
+    let torque = if current > 0.0 {
+        kt * current
+    } else if cq > 0.0 {
+        cq * speed * speed
+    } else if ohm > 0.0 && rig.amplifier.kind == AmplifierKind::Voltage {
+        // A dry shaft without a current: what the largest voltage gives at standstill.
+        kt * command / ohm
+    } else {
+        // ... or what brings it to speed within a second.
+        rig.motor.inertia_kg_m2.value * speed
+    };
+    Scale {
+        shaft_speed_rad_s: speed.max(1e-6),
+        torque_n_m: torque.max(1e-9),
+        thrust_n: thrust.max(1e-9),
+        flow_m_s: if flux > 0.0 { (thrust / flux).sqrt() } else { 1.0 },
+        current_a: current.max(1e-9),
+        command: command.max(1e-9),
+        supply_v: rig.amplifier.supply_v.unwrap_or(0.0),
+        winding_resistance_ohm: rig.motor.winding_resistance_ohm.map_or(0.0, |r| r.value),
+        inertia_kg_m2: rig.motor.inertia_kg_m2.value,
+        tick_s: all.first().map_or(0.002, |p| p.tick_s),
+        duration_s: all.iter().map(Prepared::duration_s).fold(0.0, f64::max),
+    }
+}
+
+/// What the recordings offer, for the effects' `needs`.
+pub fn available(model: ModelName, series: &[Series], all: &[Prepared]) -> Available {
+    let mut columns: Vec<String> = series
+        .iter()
+        .flat_map(|s| s.columns.iter().filter(|c| s.column(&c.0).is_some()).map(|c| c.0.clone()))
+        .collect();
+    columns.sort();
+    columns.dedup();
+    Available {
+        columns,
+        shaft_prescribed: all.iter().all(|p| p.driving == Driving::Speed),
+        current_prescribed: all.iter().all(|p| p.driving == Driving::Current),
+        axial_flow_modelled: !matches!(model, ModelName::Model0 | ModelName::Model1),
+        supply_sag_share: series
+            .iter()
+            .map(|s| crate::checks::supply_sag(s).map(|sag| sag.share()))
+            .collect::<Option<Vec<f64>>>()
+            .map(|shares| shares.into_iter().fold(0.0, f64::max)),
+    }
+}

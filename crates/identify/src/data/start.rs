@@ -1,0 +1,33 @@
+//! The state at the first row.
+
+use super::{Driving, Prepared, Series};
+
+/// Share of the largest command below which a standing shaft may be held by friction.
+const STANDING_SHARE: f64 = 0.1;
+
+/// Shaft speed, axial flow, current and shaft angle at the first row.
+pub(super) fn start_state(series: &Series, prepared: &Prepared) -> [f64; 4] {
+    let first =
+        |name: &str| series.column(name).and_then(|c| c.iter().take(10).copied().find(|v| v.is_finite()));
+    let speed_scale = series
+        .column("shaft_speed_rad_s")
+        .map_or(0.0, |c| c.iter().filter(|v| v.is_finite()).fold(0.0_f64, |m, v| m.max(v.abs())));
+    let speed = first("shaft_speed_rad_s").unwrap_or(0.0);
+    if speed.abs() < 0.01 * speed_scale || speed_scale == 0.0 {
+        if prepared.driving != Driving::Command("current_cmd_a") {
+            return [0.0; 4];
+        }
+        let asked = prepared.command.first().copied().unwrap_or(0.0);
+        let range = prepared.command.iter().fold(0.0_f64, |m, c| m.max(c.abs()));
+        // A shaft that stands although torque is asked for: the command came just now.
+        let current = if asked.abs() < STANDING_SHARE * range {
+            asked
+        } else {
+            first("current_a").map_or(0.0, |measured| measured.clamp(-asked.abs(), asked.abs()))
+        };
+        return [0.0, 0.0, current, 0.0];
+    }
+    let flow = first("flow_m_s").unwrap_or(0.0);
+    let current = first("current_a").or_else(|| prepared.command.first().copied()).unwrap_or(0.0);
+    [speed, flow, current, first("shaft_angle_rad").unwrap_or(0.0)]
+}
