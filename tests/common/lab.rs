@@ -227,12 +227,14 @@ pub fn check_diagnosis(report: &Value) {
             "baseline",
             "mismatch",
             "findings",
+            "explanations",
+            "remainder",
             "alternatives",
             "empirical_term",
             "next_experiment",
         ],
     );
-    assert_eq!(report["schema"], "kort.diagnosis/1");
+    assert_eq!(report["schema"], "kort.diagnosis/2");
     words("kort_version", &report["kort_version"]);
     assert!(!list("recordings", &report["recordings"]).is_empty());
     list("recordings", &report["recordings"]).iter().for_each(|r| {
@@ -307,6 +309,26 @@ pub fn check_diagnosis(report: &Value) {
         }
     }
 
+    let explanations = list("explanations", &report["explanations"]);
+    let mut last = 1.0;
+    for one in explanations {
+        keys("explanation", one, &["effects", "probability"]);
+        list("explanation.effects", &one["effects"]).iter().for_each(|w| {
+            words("explanation.effects", w);
+        });
+        share("explanation.probability", &one["probability"]);
+        let probability = number("explanation.probability", &one["probability"]);
+        assert!(probability <= last, "likeliest first: {explanations:?}");
+        last = probability;
+    }
+    let left = &report["remainder"];
+    if !left.is_null() {
+        keys("remainder", left, &["share_of_excess_error", "path", "channel", "regime", "nrmse"]);
+        share("remainder.share_of_excess_error", &left["share_of_excess_error"]);
+        check_path(&left["path"]);
+        words("remainder.channel", &left["channel"]);
+        words("remainder.regime", &left["regime"]);
+    }
     for one in list("alternatives", &report["alternatives"]) {
         keys("alternative", one, &["effect", "probability", "why_not"]);
         words("alternative.effect", &one["effect"]);
@@ -345,6 +367,9 @@ fn check_path(path: &Value) {
 fn check_verdict(report: &Value, findings: &[Value], mismatch: &[Value]) {
     match report["verdict"].as_str().unwrap_or("") {
         "no_mismatch" | "insufficient_data" => assert!(findings.is_empty() && mismatch.is_empty()),
+        "partly_explained" => {
+            assert!(!findings.is_empty() && !mismatch.is_empty());
+        }
         "explained" => {
             assert!(!findings.is_empty() && !mismatch.is_empty());
             assert!(findings.iter().all(|f| f["confounded_with"].as_array().unwrap().is_empty()));

@@ -13,6 +13,18 @@ pub struct Constants {
     pub search: SearchConstants,
     /// Of the odds.
     pub posterior: PosteriorConstants,
+    /// Of what may be left.
+    pub remainder: RemainderConstants,
+}
+
+/// What noise may be, root mean square over full scale.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RemainderConstants {
+    /// Of force, torque, current and speed, above the noise from sample to sample.
+    pub practical: f64,
+    /// Of an axial flow.
+    pub practical_flow: f64,
 }
 
 /// What the search asks for.
@@ -69,6 +81,8 @@ mod tests {
             c.posterior.temper,
             c.posterior.surprise,
             c.posterior.beside_unknown,
+            c.remainder.practical,
+            c.remainder.practical_flow,
         ] {
             assert!(value > 0.0);
         }

@@ -45,6 +45,8 @@ pub struct Circumstances {
     pub left: f64,
     /// Factor on names beside a nameless term.
     pub beside_unknown: f64,
+    /// Whether the likeliest set leaves more than noise of such sensors can be.
+    pub more_than_noise: bool,
 }
 
 /// Decides from the posterior over sets, likeliest first.
@@ -55,31 +57,39 @@ pub fn decide(explanations: &[Explanation], circumstances: Circumstances) -> Dec
     let members: Vec<&'static str> = best.iter().copied().filter(|id| !is_term(id)).collect();
     let mut named: Vec<Named> = Vec::new();
     for member in &members {
-        let rivals = rivals(explanations, best, member);
-        let others = |own: &'static str| -> Vec<&'static str> {
-            std::iter::once(*member).chain(rivals.iter().copied()).filter(|r| *r != own).collect()
-        };
-        for effect in std::iter::once(*member).chain(rivals.iter().copied()) {
-            if !named.iter().any(|n| n.effect == effect) {
-                let probability = presence(explanations, effect, circumstances.beside_unknown);
-                named.push(Named { effect, probability, rivals: others(effect) });
-            }
+        let taken = |id: &&'static str| named.iter().any(|n| n.effect == *id);
+        let rivals: Vec<&'static str> =
+            rivals(explanations, best, member).into_iter().filter(|id| !taken(id)).collect();
+        let place: Vec<&'static str> = std::iter::once(*member).chain(rivals).collect();
+        for effect in &place {
+            named.push(Named {
+                effect,
+                probability: presence(explanations, effect, circumstances.beside_unknown),
+                rivals: place.iter().copied().filter(|id| id != effect).collect(),
+            });
         }
     }
     let believed = |n: &Named| n.probability >= BELIEVED && n.rivals.is_empty();
     let verdict = if circumstances.broke_down || circumstances.thin && !named.iter().any(believed) {
         Verdict::InsufficientData
     } else if named.is_empty() {
-        if term.is_some() { Verdict::Unexplained } else { Verdict::NoMismatch }
+        if term.is_some() || circumstances.more_than_noise {
+            Verdict::Unexplained
+        } else {
+            Verdict::NoMismatch
+        }
     } else if named.iter().any(|n| !n.rivals.is_empty()) {
         Verdict::Ambiguous
     } else if !named.iter().all(believed) {
         if named.iter().any(believed) { Verdict::PartlyExplained } else { Verdict::Unexplained }
-    } else if term.is_some() && circumstances.left > PRACTICAL {
+    } else if term.is_some() && circumstances.left > PRACTICAL || circumstances.more_than_noise {
         Verdict::PartlyExplained
     } else {
         Verdict::Explained
     };
+    if verdict == Verdict::InsufficientData {
+        return Decision { verdict, named: Vec::new(), term: None };
+    }
     Decision { verdict, named, term }
 }
 
@@ -116,6 +126,7 @@ mod tests {
         let usual = Circumstances { beside_unknown: 0.75, ..Circumstances::default() };
         let left = Circumstances { left: 0.4, ..usual };
         let thin = Circumstances { thin: true, ..usual };
+        let much = Circumstances { more_than_noise: true, ..usual };
         let broke_down = Circumstances { broke_down: true, ..usual };
         type Case<'a> = (&'a [(&'a [&'static str], f64)], Circumstances, Verdict);
         let table: &[Case] = &[
@@ -130,6 +141,8 @@ mod tests {
                 left,
                 Verdict::Unexplained,
             ),
+            (&[(&[], 0.0), (&["windage_drag"], 12.0)], much, Verdict::Unexplained),
+            (&[(&["windage_drag"], 0.0), (&[], 80.0)], much, Verdict::PartlyExplained),
             (&[(&[], 0.0)], thin, Verdict::InsufficientData),
             (&[], broke_down, Verdict::InsufficientData),
         ];

@@ -18,7 +18,21 @@ pub struct Probe {
     pub member: Member,
     /// Its sizes, by their places among the effect's values, with what each does to the response as lines.
     sizes: Vec<(usize, DVector<f64>)>,
+    /// What it does where it has no sizes.
+    always: Option<DVector<f64>>,
 }
+
+impl Probe {
+    /// Whether the effect does nothing to the set it was probed on: a limit that does not bind there, water that
+    /// the model does not hold.
+    pub fn inert(&self) -> bool {
+        let still = |lines: &DVector<f64>| lines.amax() < INERT;
+        self.sizes.iter().all(|s| still(&s.1)) && self.always.as_ref().is_none_or(still)
+    }
+}
+
+/// Largest line of an action, in full scales, that counts as none.
+const INERT: f64 = 1e-9;
 
 /// What probes promise of an effect on top of a set.
 #[derive(Clone)]
@@ -27,12 +41,14 @@ pub struct Promise {
     pub cost: f64,
     /// The effect from where it would start.
     pub member: Member,
+    /// The effect where it was probed, with the same sizes free: what switches on or binds does not scale.
+    pub probed: Member,
 }
 
 /// Multiples of the catalogue's start at which one size is probed.
 const LARGER: [f64; 2] = [5.0, 25.0];
 
-/// Probes an effect on top of the fitted baseline.
+/// Probes an effect on top of a fitted set.
 pub fn probe(problem: &Problem, baseline: &Fit, effect: &'static Descriptor) -> Vec<Probe> {
     let whole = Member::new(effect, &problem.scale);
     let specs = (effect.parameters)(&problem.scale);
@@ -50,7 +66,7 @@ pub fn probe(problem: &Problem, baseline: &Fit, effect: &'static Descriptor) -> 
             (*j, c.1 * if size == 0.0 { 1.0 } else { size })
         });
         let sizes: Vec<(usize, DVector<f64>)> = sizes.collect();
-        return vec![Probe { member: whole, sizes }];
+        return vec![Probe { member: whole, sizes, always: None }];
     }
     let strengths: Vec<usize> = (0..specs.len()).filter(|j| !specs[*j].shape && !specs[*j].held).collect();
     let mut starts = (effect.starts)(&problem.scale);
@@ -77,7 +93,15 @@ pub fn probe(problem: &Problem, baseline: &Fit, effect: &'static Descriptor) -> 
                 action.iter().all(|v| v.is_finite()).then_some((*only, action))
             };
             let sizes: Vec<_> = strengths.iter().filter_map(alone).collect();
-            (!sizes.is_empty()).then(|| Probe { member: whole.clone().at(start), sizes })
+            let member = whole.clone().at(start);
+            if !strengths.is_empty() {
+                return (!sizes.is_empty()).then_some(Probe { member, sizes, always: None });
+            }
+            // Without a size it is there or not.
+            let hypothesis = baseline.hypothesis.with(&baseline.values, member.clone(), &problem.scale);
+            let action = &baseline.lines - problem.residual_lines(&hypothesis, &hypothesis.start);
+            let finite = action.iter().all(|v| v.is_finite());
+            finite.then_some(Probe { member, sizes, always: Some(action) })
         })
         .collect()
 }
@@ -139,8 +163,11 @@ fn of_form(
         columns.push(action);
         values.push(0.0);
     }
-    let model =
-        Quadratic::extended(&problem.spectrum, &problem.criterion, &parent.lines, &columns, &free, known);
+    let lines = match &probe.always {
+        Some(action) => &parent.lines - action,
+        None => parent.lines.clone(),
+    };
+    let model = Quadratic::extended(&problem.spectrum, &problem.criterion, &lines, &columns, &free, known);
     let mut actions = parent.actions.clone();
     actions.push(vec![0.0; problem.spectrum.bands.len()]);
     let mut found = None;
@@ -148,7 +175,7 @@ fn of_form(
     for _ in 0..2 {
         let floor = problem.floor.with_actions(&actions, &problem.criterion);
         let minimum = model.minimise(&floor, &free, &values, 0.0);
-        let mut acts = DVector::zeros(problem.spectrum.lines);
+        let mut acts = probe.always.clone().unwrap_or_else(|| DVector::zeros(problem.spectrum.lines));
         for (i, k) in form.iter().enumerate() {
             let at = free_len(parent) + i;
             acts.axpy(minimum.step[at] * free[at].sigma, &probe.sizes[*k].1, 1.0);
@@ -180,7 +207,11 @@ fn of_form(
             }
         };
     }
-    Some(Promise { cost: found.misfit + found.penalty + price, member })
+    let mut probed = Member { values: probe.member.values.clone(), ..member.clone() };
+    for j in &probed.held {
+        probed.values[*j] = member.values[*j];
+    }
+    Some(Promise { cost: found.misfit + found.penalty + price, member, probed })
 }
 
 fn free_len(parent: &Fit) -> usize {

@@ -36,8 +36,14 @@ pub fn screen(problem: &Problem, parent: &Fit, probes: &[&[Probe]]) -> Vec<Scree
         probes.par_iter().filter_map(|probes| promise(problem, parent, known, probes)).collect();
     promises.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     promises.truncate(CLOSELY);
-    let mut all: Vec<Screened> =
-        promises.into_par_iter().filter_map(|p| at(problem, parent, known, p.member)).collect();
+    let best_of = |p: Promise| {
+        let near =
+            p.member.values.iter().zip(&p.probed.values).all(|(a, b)| a == b || (a / b - 1.0).abs() < 0.5);
+        let from_probe = if near { None } else { at(problem, parent, known, p.probed) };
+        let scaled = at(problem, parent, known, p.member);
+        scaled.into_iter().chain(from_probe).min_by(|a, b| a.cost.total_cmp(&b.cost))
+    };
+    let mut all: Vec<Screened> = promises.into_par_iter().filter_map(best_of).collect();
     all.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     all
 }

@@ -191,6 +191,15 @@ impl<'a, 'p> Search<'a, 'p> {
     /// Screens all effects on top of a set and fits exactly those that may come near a cost; the sets fitted.
     fn expand(&mut self, set: &Set, bar: f64) -> Vec<Set> {
         let Some(parent) = self.fits.get(set) else { return Vec::new() };
+        if !self.screens.contains_key(set) && !set.is_empty() {
+            // What did nothing to the baseline may act on a larger set.
+            let (problem, effects) = (self.problem, &self.effects);
+            self.probes.par_iter_mut().zip(effects).for_each(|(probes, effect)| {
+                if probes.iter().all(Probe::inert) && !set.contains(&effect.id) {
+                    *probes = probe(problem, parent, effect);
+                }
+            });
+        }
         if !self.screens.contains_key(set) {
             let rest: Vec<&[Probe]> = self
                 .effects

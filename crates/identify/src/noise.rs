@@ -55,6 +55,11 @@ impl Floor {
         Self(floor)
     }
 
+    /// With the doubt of what drives the model (mean square by band).
+    pub fn with_doubt(&self, doubt: &[f64]) -> Self {
+        Self(self.0.iter().zip(doubt).map(|(f, d)| f + d).collect())
+    }
+
     /// With the form error of effects that do this to the response (mean squares by band, one list an effect).
     pub fn with_actions(&self, actions: &[Vec<f64>], criterion: &Criterion) -> Self {
         let mut floor = self.0.clone();

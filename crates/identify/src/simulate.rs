@@ -13,7 +13,7 @@ use kort_thruster::rig::Rig;
 use nalgebra::DVector;
 use rayon::prelude::*;
 
-use crate::data::{Prepared, Response, rates};
+use crate::data::{Driving, Prepared, Response, rates};
 use crate::hypothesis::{Hypothesis, Member};
 use crate::noise::{Criterion, Floor};
 use crate::shared_lanes::{groups, last_acting};
@@ -57,17 +57,27 @@ impl<'a> Problem<'a> {
         let spectrum = Spectrum::new(&recordings, &masked);
         let floor = Floor::of_signal(&spectrum.bands, &criterion);
         let scale = crate::data::scale(&recordings, rig);
-        Self {
-            model,
-            rig,
-            stated: Parameters::stated(rig),
-            recordings,
-            masked,
-            scale,
-            criterion,
-            spectrum,
-            floor,
+        let stated = Parameters::stated(rig);
+        let mut problem = Self { model, rig, stated, recordings, masked, scale, criterion, spectrum, floor };
+        if let Some(doubt) = problem.doubt_of_drivers() {
+            problem.floor = problem.floor.with_doubt(&doubt);
         }
+        problem
+    }
+
+    /// What the response owes to how a measured signal that drives runs between its samples, which nobody
+    /// recorded: mean square by band of the difference that straight and curved courses make.
+    fn doubt_of_drivers(&self) -> Option<Vec<f64>> {
+        if self.recordings.iter().all(|r| matches!(r.driving, Driving::Command(_))) {
+            return None;
+        }
+        let inputs = std::sync::Arc::new(crate::hypothesis::Inputs::late(&self.recordings));
+        let plain = Hypothesis { effects: Vec::new(), free: Vec::new(), start: Vec::new(), inputs };
+        let straight = self.residual_lines(&plain, &[]);
+        let mut other = self.clone();
+        other.recordings.iter_mut().for_each(Prepared::curve_drivers);
+        let powers = self.spectrum.powers(&(straight - other.residual_lines(&plain, &[])));
+        powers.iter().all(|p| p.is_finite()).then_some(powers)
     }
 
     /// The problem without some rows: its training part.

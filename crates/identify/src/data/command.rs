@@ -1,9 +1,40 @@
 //! The command on the control grid, and where it jumps.
 
-use super::Prepared;
+use super::{Driving, Prepared};
+use kort_thruster::plant::Driven;
+
 use super::fill::catmull_rom;
 
 impl Prepared {
+    /// Lets a measured signal that drives run on a curve between its samples instead of straight.
+    pub fn curve_drivers(&mut self) {
+        let time = self.time_s.clone();
+        let values = match self.driving {
+            Driving::Command(_) => return,
+            Driving::Current => self.command.clone(),
+            Driving::Speed => self.speed_between.clone(),
+        };
+        let n = values.len();
+        let mut row = 0;
+        let tick_s = self.tick_s;
+        for tick in &mut self.stimulus.ticks {
+            while row + 2 < n && time[row + 1] <= tick.time_s + 0.02 * tick_s {
+                row += 1;
+            }
+            let at = |t: f64| {
+                let u = ((t - time[row]) / (time[row + 1] - time[row])).clamp(0.0, 1.0);
+                let (before, after) = (values[row.saturating_sub(1)], values[(row + 2).min(n - 1)]);
+                catmull_rom(before, values[row], values[row + 1], after, u)
+            };
+            let (a, b) = (at(tick.time_s), at(tick.time_s + tick_s));
+            tick.driven = match tick.driven {
+                Driven::Current(..) => Driven::Current(a, b),
+                Driven::Speed(..) => Driven::Speed(a, b),
+                Driven::Command => Driven::Command,
+            };
+        }
+    }
+
     /// The command at every control tick, where its edges came so many ticks before their rows.
     pub fn commands(&self, ticks_before: &[usize]) -> Vec<f64> {
         let ticks = self.stimulus.ticks.len();

@@ -140,6 +140,8 @@ pub struct Prepared {
     pub tick_s: f64,
     /// State at the first row: shaft speed, axial flow, current, angle.
     pub start: [f64; 4],
+    /// Shaft speed at each row, where it drives.
+    pub speed_between: Vec<f64>,
     /// Bandwidth with which the simulated shaft is kept with the recorded one, rad/s; 0 where it runs freely.
     pub observer_rad_s: f64,
 }
@@ -226,6 +228,7 @@ impl Prepared {
             ticks_per_row: (row_s / tick_s).round() as usize,
             tick_s,
             start: [0.0; 4],
+            speed_between: Vec::new(),
             observer_rad_s: if returns(rig, driving) { 0.0 } else { OBSERVER_RAD_S },
         };
         if let Driving::Command("duty_cmd") = driving {
@@ -298,6 +301,7 @@ impl Prepared {
             });
         }
         self.stimulus.ticks = ticks;
+        self.speed_between = speed.unwrap_or_default();
         let stepped = matches!(self.driving, Driving::Command(_))
             || self.driving == Driving::Current && rig.amplifier.kind == AmplifierKind::Current;
         if stepped {

@@ -1,0 +1,386 @@
+//! The report of a diagnosis: fits on training rows, scores on the others, and everything put in its place.
+
+use kort_identify::data::Series;
+use kort_identify::fit::Fit;
+use kort_identify::heldout::held_out_rows;
+use kort_identify::hypothesis::Member;
+use kort_identify::scores::{self, HeldOut, parameters};
+use kort_identify::simulate::{Problem, Stack};
+use kort_thruster::rig::Rig;
+
+use crate::constants::Constants;
+use crate::decide::{Circumstances, Decision, Named, decide};
+use crate::diagnose::{Diagnosis, Options};
+use crate::experiment;
+use crate::flexible::is_term;
+use crate::left;
+use crate::locate::{self, locate};
+use crate::posterior::{Explanation, presence};
+use crate::report::{Alternative, Baseline, Finding, Mismatch, Remainder, Report, SetReport, Verdict};
+use crate::search::{Search, Set};
+use crate::traces::traces;
+use crate::words;
+
+/// What the report is written from.
+pub struct Writer<'a, 'p> {
+    problem: &'a Problem<'p>,
+    search: &'a Search<'a, 'p>,
+    explanations: Vec<Explanation>,
+    beside_unknown: f64,
+    best: Set,
+    baseline: &'a Fit,
+    last: &'a Fit,
+    series: &'a [Series],
+    rig: &'a Rig,
+    options: &'a Options,
+    held: Vec<Vec<bool>>,
+    training: Problem<'p>,
+    floor: std::collections::BTreeMap<&'static str, f64>,
+}
+
+/// Iterations of a fit on the training rows.
+const TRAINING: usize = 5;
+/// Most a name is given where held-out data do not confirm it or its values stand at their bounds.
+const UNCONFIRMED: f64 = 0.9;
+/// Explanations are listed until this probability is reached.
+const LISTED: f64 = 0.95;
+/// Names set aside that are listed.
+const ALTERNATIVES: usize = 6;
+
+impl<'a, 'p> Writer<'a, 'p> {
+    /// From a search that is done and its posterior.
+    pub fn new(
+        search: &'a Search<'a, 'p>,
+        explanations: Vec<Explanation>,
+        series: &'a [Series],
+        rig: &'a Rig,
+        options: &'a Options,
+    ) -> Self {
+        let problem = search.problem;
+        let best = explanations.first().map_or_else(Set::new, |e| e.set.clone());
+        let (baseline, last) = (&search.fits[&Set::new()], &search.fits[&best]);
+        let held = held_out_rows(problem, &[&last.hypothesis]);
+        let floor = scores::noise_floor(problem, &problem.residual(&last.hypothesis, &last.values));
+        Self {
+            training: problem.without(&held),
+            problem,
+            search,
+            explanations,
+            beside_unknown: Constants::built_in().posterior.beside_unknown,
+            best,
+            baseline,
+            last,
+            series,
+            rig,
+            options,
+            held,
+            floor,
+        }
+    }
+
+    fn residual(&self, fit: &Fit) -> Stack {
+        self.problem.residual(&fit.hypothesis, &fit.values)
+    }
+
+    /// A fit taken further on the training rows, as residual on all.
+    fn trained(&self, fit: &Fit) -> Stack {
+        let trained = self.training.again(fit, TRAINING);
+        self.residual(&trained)
+    }
+
+    fn score(&self, before: &Stack, after: &Stack) -> HeldOut {
+        scores::held_out(self.problem, &self.held, before, after, &self.floor, self.options.seed)
+    }
+
+    /// The fit of a set without one member: the one that was searched, or the set's own with the member taken
+    /// out and the rest fitted again.
+    fn without(&self, set: &Set, member: &str) -> Fit {
+        let rest: Set = set.iter().copied().filter(|id| *id != member).collect();
+        if let Some(fit) = self.search.fits.get(&rest) {
+            return fit.clone();
+        }
+        let from = &self.search.fits[set];
+        let members: Vec<Member> = self
+            .problem
+            .members(&from.hypothesis, &from.values)
+            .into_iter()
+            .filter(|m| m.effect.id != member)
+            .collect();
+        let (hypothesis, columns) = self.problem.recompose(from, &members);
+        self.problem.fit(&hypothesis, &columns, &[], 2 * TRAINING)
+    }
+
+    fn excess(&self, residual: &Stack) -> f64 {
+        left::excess(self.problem, residual, &self.floor)
+    }
+
+    /// The best set's names without the nameless term.
+    fn names_only(&self) -> Set {
+        self.best.iter().copied().filter(|id| !is_term(id)).collect()
+    }
+
+    /// The report, and curves for its plots.
+    pub fn write(self, mut notes: Vec<String>, thin: Option<String>) -> Diagnosis {
+        let (problem, options) = (self.problem, self.options);
+        let baseline_full = self.residual(self.baseline);
+        let last_full = self.residual(self.last);
+        let names = self.names_only();
+        let named_fit = self.search.fits.get(&names).unwrap_or(self.last);
+        let named_full = self.residual(named_fit);
+        let whole = (self.excess(&baseline_full) - self.excess(&last_full)).max(1e-300);
+        let left = (self.excess(&named_full) - self.excess(&last_full)).max(0.0) / whole;
+        let rest = left::more_than_noise(problem, &last_full, &self.floor);
+        let circumstances = Circumstances {
+            thin: thin.is_some(),
+            broke_down: false,
+            left,
+            beside_unknown: self.beside_unknown,
+            more_than_noise: rest.is_some(),
+        };
+        let decision = decide(&self.explanations, circumstances);
+
+        let baseline_trained = self.trained(self.baseline);
+        let last_trained =
+            if self.best.is_empty() { baseline_trained.clone() } else { self.trained(self.last) };
+        let rows = problem.rows(&self.last.hypothesis, &self.last.values);
+        let speed: Vec<Vec<f64>> =
+            rows.iter().map(|rows| rows.iter().map(|s| s.true_speed_rad_s).collect()).collect();
+
+        let (mut findings, mut mismatch) = (Vec::new(), Vec::new());
+        let told = |id: &&str| decision.term == Some(*id) || decision.named.iter().any(|n| n.effect == *id);
+        let members = self.best.iter().copied().filter(told);
+        let empty_cost = self.search.cost(&Set::new());
+        for member in members {
+            let smaller = self.without(&self.best, member);
+            let smaller_full = self.residual(&smaller);
+            let smaller_trained = self.trained(&smaller);
+            let located = locate(problem, &smaller_full, &last_full, &speed);
+            let gain = (smaller.noise.misfit - self.last.noise.misfit).max(0.0);
+            let share = ((self.excess(&smaller_full) - self.excess(&last_full)) / whole).clamp(0.0, 1.0);
+            let path = self.path(member);
+            mismatch.push((share, mismatch_of(path, &located, gain, share)));
+            let here: Vec<&Named> = decision
+                .named
+                .iter()
+                .filter(|n| {
+                    n.effect == member || n.rivals.contains(&member) && !self.best.contains(&n.effect)
+                })
+                .collect();
+            for named in here {
+                let finding = if named.effect == member {
+                    let heldout = self.score(&smaller_trained, &last_trained);
+                    self.finding(named, self.last, heldout, Some(&located))
+                } else {
+                    let mut swapped: Set = self.best.iter().copied().filter(|id| *id != member).collect();
+                    swapped.push(named.effect);
+                    swapped.sort_unstable();
+                    let Some(fit) = self.search.fits.get(&swapped) else { continue };
+                    let heldout = self.score(&smaller_trained, &self.trained(fit));
+                    self.finding(named, fit, heldout, None)
+                };
+                findings.push((share, finding));
+            }
+        }
+        if let (Some((channel, size)), Verdict::Unexplained) = (rest, decision.verdict)
+            && mismatch.is_empty()
+        {
+            mismatch.push((1.0, self.bare(channel, size, &baseline_full, &speed)));
+        }
+        // In the order of what each removes; of rivals the likeliest first.
+        findings.sort_by(|a, b| b.0.total_cmp(&a.0).then(b.1.probability.total_cmp(&a.1.probability)));
+        mismatch.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let findings: Vec<Finding> = findings.into_iter().map(|f| f.1).collect();
+        let mismatch: Vec<Mismatch> = mismatch.into_iter().map(|m| m.1).collect();
+        let std_last = problem.standard_errors(self.last);
+        let empirical_term = decision.term.map(|term| {
+            let smaller = self.without(&self.best, term);
+            words::empirical(
+                problem,
+                self.last,
+                &std_last,
+                term,
+                self.score(&self.trained(&smaller), &last_trained),
+            )
+        });
+        let remainder = match (decision.term, rest) {
+            _ if decision.named.is_empty() => None,
+            (Some(term), _) => {
+                let located = locate(problem, &named_full, &last_full, &speed);
+                Some(Remainder {
+                    share_of_excess_error: left.min(1.0),
+                    path: self.path(term).into(),
+                    channel: located.channel.into(),
+                    regime: located.regime,
+                    nrmse: words::nrmse(problem, &named_full),
+                })
+            }
+            (None, Some((channel, size))) => {
+                let bare = self.bare(channel, size, &last_full, &speed);
+                let share = self.excess(&last_full) / self.excess(&baseline_full).max(1e-300);
+                Some(Remainder {
+                    share_of_excess_error: share.clamp(0.0, 1.0),
+                    path: bare.path,
+                    channel: bare.channel,
+                    regime: bare.regime,
+                    nrmse: words::nrmse(problem, &last_full),
+                })
+            }
+            (None, None) => None,
+        };
+        if findings.len() > 1 {
+            let everything = self.score(&baseline_trained, &last_trained).excess_error_removed;
+            notes.push(format!(
+                "everything found together removes {:.0} % of the error above the noise on held-out data",
+                100.0 * everything
+            ));
+        }
+        if let (Some(why), Verdict::InsufficientData) = (&thin, decision.verdict) {
+            notes.insert(0, why.clone());
+        }
+        notes.extend(words::strained(self.baseline));
+        notes.extend(words::unused(self.series, problem));
+        let std_baseline = problem.standard_errors(self.baseline);
+        let baseline = Baseline {
+            model: options.model.name().into(),
+            parameters: parameters(self.baseline, &std_baseline, None),
+            channels: scores::channels(problem, &self.held, &baseline_trained, &baseline_full, &self.floor),
+        };
+        let next_experiment = experiment::next(self.search, &decision, &self.best, self.rig);
+        let summary = words::summary(&words::Told {
+            verdict: decision.verdict,
+            findings: &findings,
+            mismatch: &mismatch,
+            term: empirical_term.as_ref(),
+            remainder: remainder.as_ref(),
+            next: next_experiment.as_ref(),
+            baseline: &baseline,
+            thin: thin.as_deref(),
+        });
+        let report = Report {
+            schema: "kort.diagnosis/2".into(),
+            kort_version: env!("CARGO_PKG_VERSION").into(),
+            recordings: self.series.iter().map(|s| s.name.clone()).collect(),
+            rig: self.rig.name.clone(),
+            seed: options.seed,
+            seconds: problem.recordings.iter().map(kort_identify::data::Prepared::duration_s).sum(),
+            verdict: decision.verdict,
+            summary,
+            baseline,
+            mismatch,
+            findings,
+            explanations: self.listed(),
+            remainder,
+            alternatives: self.alternatives(&decision, empty_cost),
+            empirical_term,
+            next_experiment,
+            notes,
+        };
+        Diagnosis { report, traces: traces(problem, &baseline_full, &last_full, &speed) }
+    }
+
+    /// A mismatch that neither name nor term describes, located by its error alone.
+    fn bare(&self, channel: &str, size: f64, residual: &Stack, speed: &[Vec<f64>]) -> Mismatch {
+        let nothing: Stack =
+            residual.iter().map(|r| r.iter().map(|c| vec![0.0; c.len()]).collect()).collect();
+        let located = locate(self.problem, residual, &nothing, speed);
+        Mismatch {
+            path: match channel {
+                "current_a" => "drive",
+                "shaft_speed_rad_s" | "shaft_angle_rad" => "shaft",
+                "flow_m_s" => "flow",
+                "thrust_n" => "sensor",
+                _ => "blade",
+            }
+            .into(),
+            channel: channel.into(),
+            regime: format!("{} ({:.1} % of full scale above the noise)", located.regime, 100.0 * size),
+            time_s: located.spans,
+            significance_sigma: size / Constants::built_in().remainder.practical,
+            share_of_excess_error: 1.0,
+        }
+    }
+
+    fn path(&self, id: &str) -> &'static str {
+        self.search.descriptor(id).map_or("shaft", |d| d.path.name())
+    }
+
+    fn finding(
+        &self,
+        named: &Named,
+        fit: &Fit,
+        heldout: HeldOut,
+        located: Option<&locate::Place>,
+    ) -> Finding {
+        let problem = self.problem;
+        let slot = fit.hypothesis.effects.iter().position(|m| m.effect.id == named.effect);
+        let values = parameters(fit, &problem.standard_errors(fit), slot);
+        let at_bound = values.iter().any(|p| p.at_bound == Some(true) && p.value != 0.0);
+        let unconfirmed = heldout.interval_95[0] <= 0.0 || at_bound;
+        let probability = if unconfirmed { named.probability.min(UNCONFIRMED) } else { named.probability };
+        let effect = slot.map(|i| fit.hypothesis.effects[i].effect);
+        Finding {
+            effect: named.effect.into(),
+            path: self.path(named.effect).into(),
+            probability,
+            statement: effect.map_or_else(String::new, words::statement),
+            equation: effect.map_or("", |e| e.equation).into(),
+            parameters: values,
+            evidence: words::evidence(effect, &heldout, located, at_bound),
+            heldout,
+            confounded_with: named.rivals.iter().map(|r| (*r).to_string()).collect(),
+        }
+    }
+
+    fn listed(&self) -> Vec<SetReport> {
+        let mut reached = 0.0;
+        let mut out = Vec::new();
+        for e in &self.explanations {
+            out.push(SetReport {
+                effects: e.set.iter().map(|id| (*id).to_string()).collect(),
+                probability: e.probability,
+            });
+            reached += e.probability;
+            if reached >= LISTED || e.probability < 1e-3 {
+                break;
+            }
+        }
+        out
+    }
+
+    /// Names that were fitted and are less likely, likeliest first.
+    fn alternatives(&self, decision: &Decision, empty_cost: f64) -> Vec<Alternative> {
+        let best_cost = self.search.cost(&self.best);
+        let mut others: Vec<(f64, f64, &'static str)> = self
+            .search
+            .effects
+            .iter()
+            .filter(|e| !decision.named.iter().any(|n| n.effect == e.id))
+            .filter_map(|e| {
+                let holding = self.search.fits.keys().filter(|set| set.contains(&e.id));
+                let cost = holding.map(|set| self.search.cost(set)).min_by(f64::total_cmp)?;
+                Some((presence(&self.explanations, e.id, self.beside_unknown), cost, e.id))
+            })
+            .collect();
+        others.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.total_cmp(&b.1)));
+        others
+            .into_iter()
+            .take(ALTERNATIVES)
+            .map(|(probability, cost, effect)| Alternative {
+                effect: effect.into(),
+                probability,
+                why_not: words::why_not(cost - best_cost, empty_cost - best_cost, self.best.is_empty()),
+            })
+            .collect()
+    }
+}
+
+fn mismatch_of(path: &str, located: &locate::Place, gain: f64, share: f64) -> Mismatch {
+    Mismatch {
+        path: path.into(),
+        channel: located.channel.into(),
+        regime: located.regime.clone(),
+        time_s: located.spans.clone(),
+        significance_sigma: gain.sqrt(),
+        share_of_excess_error: share,
+    }
+}
