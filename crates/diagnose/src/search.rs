@@ -87,7 +87,7 @@ impl<'a, 'p> Search<'a, 'p> {
     /// Searches from the baseline; the best set.
     pub fn run(&mut self, baseline: &Hypothesis, progress: &(dyn Fn(&str) + Sync)) -> Set {
         progress("fitting the baseline");
-        let first = self.problem.settle(baseline, &Vec::new(), &[], 2 * ITERATIONS);
+        let first = self.problem.settle_from_stated(baseline, 2 * ITERATIONS);
         let second = self.problem.settle(&first.resume(), &first.columns, &[], ITERATIONS);
         self.fits.insert(Vec::new(), second);
         let best: Set = Vec::new();

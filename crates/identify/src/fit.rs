@@ -17,7 +17,7 @@ use crate::simulate::Problem;
 const ENOUGH: f64 = 0.3;
 
 /// Rounds of placing the command's steps and fitting.
-const PLACINGS: usize = 4;
+const PLACINGS: usize = 8;
 
 /// Derivatives of the response by free number, as lines, where they are known.
 pub type Columns = Vec<Option<Arc<DVector<f64>>>>;
@@ -145,6 +145,18 @@ impl Problem<'_> {
             noise,
             price: f64::NAN,
         }
+    }
+
+    /// A fit to a finish from what is stated: the steps of the command are placed before anything moves, since
+    /// numbers that were fitted to misplaced steps keep them there.
+    pub fn settle_from_stated(&self, hypothesis: &Hypothesis, iterations: usize) -> Fit {
+        let mut placed = hypothesis.clone();
+        for _ in 0..PLACINGS {
+            let stated = self.fit(&placed, &Vec::new(), &[], 0);
+            let Some(inputs) = self.place_edges(&stated) else { break };
+            placed.inputs = Arc::new(inputs);
+        }
+        self.settle(&placed, &Vec::new(), &[], iterations)
     }
 
     /// A fit to a finish: from its start, with the steps of the command placed for it, the form error of its

@@ -158,7 +158,7 @@ pub fn identify(
         problem = Problem::new(problem.model, rig, problem.recordings, masked, problem.criterion);
     }
     progress("fitting from the stated values");
-    let mut best = problem.settle(&baseline, &Vec::new(), &[], ITERATIONS);
+    let mut best = problem.settle_from_stated(&baseline, ITERATIONS);
     if best.broke_down() {
         return Err(DataError::BrokeDown {
             recording: series.first().map_or_else(String::new, |s| s.name.clone()),
