@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 
 use kort_identify::data::Series;
 use kort_identify::fit::Fit;
-use kort_identify::hypothesis::Target;
 use kort_identify::scores::{self, HeldOut, ParameterReport, parameters};
 use kort_identify::simulate::{Problem, Stack};
 use kort_thruster::effects::Descriptor;
@@ -97,9 +96,7 @@ pub fn strained(baseline: &Fit) -> Option<String> {
         .free
         .iter()
         .zip(&baseline.values)
-        .filter(|(free, value)| {
-            matches!(free.target, Target::Base(_)) && free.score(**value).abs() > STRAINED
-        })
+        .filter(|(free, value)| free.stated && free.score(**value).abs() > STRAINED)
         .map(|(free, value)| {
             format!(
                 "{} {:+.0} % (stated to {:.0} %)",

@@ -37,6 +37,8 @@ pub struct Free {
     pub name: &'static str,
     /// Unit for reports.
     pub unit: &'static str,
+    /// Whether the rig states it.
+    pub stated: bool,
     /// Prior mean.
     pub mean: f64,
     /// Prior standard deviation.
@@ -231,6 +233,7 @@ impl Hypothesis {
                 target: Target::Base(parameter),
                 name: parameter.name(),
                 unit: parameter.unit(),
+                stated: true,
                 mean: quantity.value,
                 sigma: quantity.sigma(),
                 low: if parameter.positive() { low.max(0.02 * quantity.value) } else { low },
@@ -256,6 +259,7 @@ impl Hypothesis {
                 target: Target::Effect(slot, j),
                 name: spec.name,
                 unit: spec.unit,
+                stated: false,
                 mean,
                 sigma: if spec.acts.is_some() { sigma * member.liveliness } else { sigma },
                 low: spec.low,

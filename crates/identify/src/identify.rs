@@ -233,7 +233,7 @@ fn open_friction(hypothesis: &mut Hypothesis, rig: &Rig, wanted: bool, typical: 
     if let Some(free) = hypothesis.free.iter_mut().find(|f| f.target == target) {
         free.low = free.low.min(-free.high);
         if wanted {
-            *free = Free { sigma: reach, low: -reach, high: reach, ..*free };
+            *free = Free { stated: false, sigma: reach, low: -reach, high: reach, ..*free };
         }
     } else if wanted && hypothesis.free.iter().any(|f| f.target == Target::Base(Parameter::InertiaKgM2)) {
         let p = Parameter::ViscousFrictionNmS;
@@ -242,6 +242,7 @@ fn open_friction(hypothesis: &mut Hypothesis, rig: &Rig, wanted: bool, typical: 
             target,
             name: p.name(),
             unit: p.unit(),
+            stated: false,
             mean: stated,
             sigma: reach,
             low: -reach,
@@ -366,7 +367,7 @@ fn symptoms(fit: &Fit, std: &[f64]) -> Vec<String> {
                 "{} = {value:.5} {} stands at the edge of what is allowed ({:.5} to {:.5}): a symptom of physics left out or of a wrong stated value, not a measurement; run `kort diagnose`",
                 free.name, free.unit, free.low, free.high
             ));
-        } else if matches!(free.target, Target::Base(_)) && free.score(value).abs() > 3.0 {
+        } else if free.stated && free.score(value).abs() > 3.0 {
             out.push(format!(
                 "{} = {value:.5} {} is {:.1} sigma from the stated {:.5}: check the statement, or run `kort diagnose`",
                 free.name,

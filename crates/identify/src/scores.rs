@@ -78,7 +78,7 @@ pub fn parameters(fit: &Fit, std_errors: &[f64], effect: Option<usize>) -> Vec<P
             value: fit.values[k],
             unit: f.unit.into(),
             std_error: std_errors[k],
-            stated: effect.is_none().then_some(f.mean),
+            stated: f.stated.then_some(f.mean),
             at_bound: Some(at_bound[k]),
         })
         .collect()

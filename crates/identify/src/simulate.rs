@@ -101,12 +101,12 @@ impl<'a> Problem<'a> {
     /// Measured less simulated, by sample.
     pub fn residual(&self, hypothesis: &Hypothesis, values: &[f64]) -> Stack {
         let mut stack = self.respond(hypothesis, values);
-        self.from_measured(&mut stack);
+        self.take_from_measured(&mut stack);
         stack
     }
 
     /// Measured less these.
-    fn from_measured(&self, stack: &mut Stack) {
+    fn take_from_measured(&self, stack: &mut Stack) {
         for (recording, channels) in self.recordings.iter().zip(stack) {
             for (channel, samples) in recording.channels.iter().zip(channels) {
                 samples.iter_mut().zip(&channel.values).for_each(|(s, m)| *s = m - *s);
@@ -216,7 +216,7 @@ impl<'a> Problem<'a> {
             let [a, b, c, d] = v.slopes();
             [v.value, a, b, c, d]
         });
-        self.from_measured(&mut stack);
+        self.take_from_measured(&mut stack);
         let columns = [a, b, c, d].iter().take(wanted.len()).map(|s| self.spectrum.transform(s)).collect();
         (self.spectrum.transform(&stack), columns)
     }
