@@ -18,6 +18,10 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     confused_with: &["ventilation", "water_density", "cavitation", "ambient_flow_unsteady"],
     separated_by: "thrust over speed squared against torque over speed squared (same fraction) at one held speed for minutes",
     reference: "density of the mixture; straight pieces are kort's form",
+    commonness: 0.2,
+    shifts_time: false,
+    nonparametric: true,
+    forms: &[],
     parameters,
     starts: one_start,
     needs: wet,
@@ -28,8 +32,8 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 };
 
 fn parameters(scale: &Scale) -> Vec<Spec> {
-    let mut specs = knots::specs(scale, &knots::SHARE, "1", 0.05, -0.5, 0.7);
-    specs.insert(0, Spec::shape("column_share", "1", 0.5, 0.0, 1.0));
+    let mut specs = knots::specs(scale, &knots::SHARE, "1", 0.05, (-0.5, 0.7), 0.1);
+    specs.insert(0, Spec::shape("column_share", "1", 0.5, 0.0, 1.0).sigma(0.4));
     specs
 }
 

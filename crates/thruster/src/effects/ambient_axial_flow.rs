@@ -21,6 +21,10 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     ],
     separated_by: "a staircase in both directions; a towed run; a force bias leaves shaft speed alone",
     reference: "equation (6a), from (4); Blanke, Lindegaard, Fossen 2000 (nonzero advance speed)",
+    commonness: 1.0,
+    shifts_time: false,
+    nonparametric: false,
+    forms: &[],
     parameters,
     starts: one_start,
     needs,
@@ -29,7 +33,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 
 fn parameters(scale: &Scale) -> Vec<Spec> {
     let full = scale.flow_m_s;
-    vec![Spec::strength("ambient_m_s", "m/s", 0.03 * full, -1.5 * full, 1.5 * full)]
+    vec![Spec::strength("ambient_m_s", "m/s", 0.03 * full, -1.5 * full, 1.5 * full).sigma(0.3 * full)]
 }
 
 pub(super) fn needs(rig: &Rig, available: &Available) -> Result<(), &'static str> {

@@ -15,6 +15,10 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     confused_with: &["ambient_axial_flow", "tank_recirculation", "supply_sag", "thermal_drift_kt"],
     separated_by: "the flow meter with the motor off; coherence of thrust, speed and flow at low frequency",
     reference: "equation (6a), from (4); straight pieces are kort's form",
+    commonness: 0.3,
+    shifts_time: false,
+    nonparametric: true,
+    forms: &[],
     parameters,
     starts: one_start,
     needs: super::ambient_axial_flow::needs,
@@ -23,7 +27,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 
 fn parameters(scale: &Scale) -> Vec<Spec> {
     let full = scale.flow_m_s;
-    knots::specs(scale, &knots::SPEED, "m/s", 0.03 * full, -full, full)
+    knots::specs(scale, &knots::SPEED, "m/s", 0.03 * full, (-full, full), 0.1 * full)
 }
 
 struct AmbientFlowUnsteady<T> {

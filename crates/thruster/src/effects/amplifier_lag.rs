@@ -15,6 +15,10 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     confused_with: &["transport_delay", "encoder_filter_lag", "entrained_water_inertia", "clock_skew"],
     separated_by: "a chirp: phase slope against roll-off; the recorded current",
     reference: "Whitcomb & Yoerger, Comparative Experiments in the Dynamics and Model-Based Control of Marine Thrusters (their current amplifier: 2 ms)",
+    commonness: 3.0,
+    shifts_time: false,
+    nonparametric: false,
+    forms: &[],
     parameters,
     starts: |scale| [0.005_f64, 0.015, 0.05].iter().map(|lag| vec![lag.max(scale.tick_s)]).collect(),
     needs: commanded,
@@ -23,7 +27,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 
 /// Negative where the drive is faster than stated; a tenth of the stated lag stays.
 fn parameters(scale: &Scale) -> Vec<Spec> {
-    vec![Spec::strength("extra_lag_s", "s", 2.0 * scale.tick_s, -0.9 * scale.tick_s, 0.5)]
+    vec![Spec::strength("extra_lag_s", "s", 2.0 * scale.tick_s, -0.9 * scale.tick_s, 0.5).sigma(0.02)]
 }
 
 struct AmplifierLag<T> {

@@ -19,6 +19,10 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     confused_with: &["stand_resonance", "inertia_added_mass_error", "amplifier_lag"],
     separated_by: "steps of several sizes: the flow settles over shaft angle, a lag or a resonance over seconds",
     reference: "Healey et al. 1995 (IEEE JOE 20:354); Whitcomb & Yoerger 1999, Models 2 and 3",
+    commonness: 3.0,
+    shifts_time: false,
+    nonparametric: false,
+    forms: &[],
     parameters,
     starts: |_| vec![vec![1.0, 1.0, 1.0, 2.5, 1.0]],
     needs: static_baseline,
@@ -30,11 +34,11 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 /// Factors on what the rig states.
 fn parameters(_: &Scale) -> Vec<Spec> {
     vec![
-        Spec::shape("lift_factor", "1", 1.0, 0.2, 5.0),
-        Spec::shape("drag_factor", "1", 1.0, 0.2, 5.0),
-        Spec::shape("flux_factor", "1", 1.0, 0.2, 5.0),
-        Spec::shape("added_mass_factor", "1", 1.0, 0.3, 5.0),
-        Spec::shape("pitch_factor", "1", 1.0, 0.8, 1.25),
+        Spec::shape("lift_factor", "1", 1.0, 0.2, 5.0).sigma(0.4),
+        Spec::shape("drag_factor", "1", 1.0, 0.2, 5.0).sigma(0.4),
+        Spec::shape("flux_factor", "1", 1.0, 0.2, 5.0).sigma(0.4),
+        Spec::shape("added_mass_factor", "1", 1.0, 0.3, 5.0).sigma(0.6),
+        Spec::shape("pitch_factor", "1", 1.0, 0.8, 1.25).sigma(0.08),
     ]
 }
 

@@ -19,6 +19,10 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     confused_with: &["nonsinusoidal_lift_drag", "ventilation", "unsteady_lift_lag"],
     separated_by: "reversals at several rates, which sweep the angle of attack",
     reference: "Leishman 2006, Principles of Helicopter Aerodynamics (dynamic stall); kort's form",
+    commonness: 0.3,
+    shifts_time: false,
+    nonparametric: false,
+    forms: &[],
     parameters,
     starts: |_| vec![vec![0.1, 0.17, 1.0], vec![0.1, 0.28, 1.0], vec![0.1, 0.35, 1.0], vec![0.1, 0.28, 4.0]],
     needs: wet,
@@ -34,9 +38,9 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 
 fn parameters(_: &Scale) -> Vec<Spec> {
     vec![
-        Spec::strength("lift_loss", "1", 0.1, 0.0, 0.9),
-        Spec::shape("stall_angle_rad", "rad", 0.22, 0.08, 0.8),
-        Spec::shape("lag_radii", "1", 1.0, 0.1, 10.0),
+        Spec::strength("lift_loss", "1", 0.1, 0.0, 0.9).sigma(0.3),
+        Spec::shape("stall_angle_rad", "rad", 0.22, 0.08, 0.8).prior(0.28, 0.08),
+        Spec::shape("lag_radii", "1", 1.0, 0.1, 10.0).sigma(2.0),
     ]
 }
 

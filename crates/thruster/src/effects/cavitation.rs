@@ -30,6 +30,10 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     ],
     separated_by: "the same run at several depths; a voltage limit caps speed but leaves thrust over speed squared alone",
     reference: "Carlton, Marine Propellers and Propulsion (cavitation number); the loss below onset is kort's form",
+    commonness: 0.5,
+    shifts_time: false,
+    nonparametric: false,
+    forms: &[],
     parameters,
     starts: |scale| [1.3, 3.0, 5.0].iter().map(|factor| vec![0.1, onset(scale, *factor)]).collect(),
     needs: wet,
@@ -46,8 +50,8 @@ fn onset(scale: &Scale, factor: f64) -> f64 {
 
 fn parameters(scale: &Scale) -> Vec<Spec> {
     vec![
-        Spec::strength("loss", "1", 0.1, 0.0, 3.0),
-        Spec::shape("onset_sigma", "1", onset(scale, 2.0), 0.2, 50.0),
+        Spec::strength("loss", "1", 0.1, 0.0, 3.0).sigma(0.4),
+        Spec::shape("onset_sigma", "1", onset(scale, 2.0), 0.2, 50.0).sigma(onset(scale, 2.0)),
     ]
 }
 

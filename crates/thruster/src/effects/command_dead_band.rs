@@ -13,9 +13,13 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
                beyond the band, k = 1: passed on as it is",
     signature: "no current and no motion for small commands, the same way up and down (no hysteresis); large commands \
                 are off by d or not at all",
-    confused_with: &["coulomb_friction", "torque_channel_bias", "gear_backlash"],
+    confused_with: &["coulomb_friction", "torque_channel_bias", "gear_backlash", "command_curve"],
     separated_by: "a slow ramp through zero with current recorded: with dry friction current flows and nothing moves",
     reference: "Bessa, Dutra, Kreuzer (thruster dead zone); ArduSub's simulated ESC: 1475 to 1525 us",
+    commonness: 1.5,
+    shifts_time: false,
+    nonparametric: false,
+    forms: &[&[0], &[0, 2], &[0, 1], &[0, 1, 2]],
     parameters,
     starts: |scale| {
         let full = scale.command;
@@ -35,9 +39,9 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 fn parameters(scale: &Scale) -> Vec<Spec> {
     let full = scale.command;
     vec![
-        Spec::strength("half_width", "of the command", 0.02 * full, 0.0, 0.5 * full),
-        Spec::shape("centre", "of the command", 0.0, -0.2 * full, 0.2 * full),
-        Spec::shape("kept_outside", "1", 0.0, 0.0, 1.0),
+        Spec::strength("half_width", "of the command", 0.02 * full, 0.0, 0.5 * full).sigma(0.07 * full),
+        Spec::shape("centre", "of the command", 0.0, -0.2 * full, 0.2 * full).sigma(0.03 * full),
+        Spec::shape("kept_outside", "1", 0.0, 0.0, 1.0).prior(0.0, 0.6),
     ]
 }
 

@@ -16,6 +16,10 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     confused_with: &["ambient_axial_flow", "thrust_deduction_interaction", "duct_loss", "blade_stall"],
     separated_by: "a yaw sweep in towed runs; the transverse flow recorded",
     reference: "T (1 - c (vt/vp)^2), here bounded where vp is small; kort's form",
+    commonness: 0.2,
+    shifts_time: false,
+    nonparametric: false,
+    forms: &[&[0, 1], &[0, 1, 2]],
     parameters,
     starts: |scale| {
         let full = scale.flow_m_s;
@@ -43,9 +47,9 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 fn parameters(scale: &Scale) -> Vec<Spec> {
     let full = scale.flow_m_s;
     vec![
-        Spec::strength("thrust_loss", "1", 0.1, 0.0, 1.0),
-        Spec::shape("cross_flow_m_s", "m/s", 0.25 * full, 0.02 * full, 2.0 * full),
-        Spec::shape("cross_flow_per_signal_m_s", "m/s", 0.25 * full, -2.0 * full, 2.0 * full),
+        Spec::strength("thrust_loss", "1", 0.1, 0.0, 1.0).sigma(0.4),
+        Spec::shape("cross_flow_m_s", "m/s", 0.25 * full, 0.02 * full, 2.0 * full).sigma(0.4 * full),
+        Spec::shape("cross_flow_per_signal_m_s", "m/s", 0.25 * full, -2.0 * full, 2.0 * full).prior(0.0, 0.4 * full),
     ]
 }
 

@@ -16,6 +16,10 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     confused_with: &["voltage_limit_backemf", "torque_constant_saturation", "cavitation"],
     separated_by: "steps of rising size; the supply voltage varied (a current limit stays)",
     reference: "Whitcomb & Yoerger, Comparative Experiments in the Dynamics and Model-Based Control of Marine Thrusters (their current amplifier: 9 A)",
+    commonness: 0.7,
+    shifts_time: false,
+    nonparametric: false,
+    forms: &[],
     parameters,
     starts: |_| [0.05, 0.25, 0.4, 0.6].iter().map(|cut| vec![*cut]).collect(),
     needs,
@@ -25,7 +29,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 /// The limit is sharp, as a drive's is; a recording's response is still smooth in it, since each
 /// sample crosses it at another time.
 fn parameters(_: &Scale) -> Vec<Spec> {
-    vec![Spec::strength("limit_cut", "1", 0.15, 0.0, 0.9)]
+    vec![Spec::strength("limit_cut", "1", 0.15, 0.0, 0.9).sigma(0.3)]
 }
 
 fn needs(rig: &Rig, available: &Available) -> Result<(), &'static str> {

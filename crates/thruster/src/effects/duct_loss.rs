@@ -22,6 +22,10 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     ],
     separated_by: "a profile of the flow across the duct; thrust and flow recorded together",
     reference: "control volume of the duct, equations (2)-(6); Carlton, Marine Propellers and Propulsion",
+    commonness: 0.7,
+    shifts_time: false,
+    nonparametric: false,
+    forms: &[&[0], &[1], &[0, 1]],
     parameters,
     starts: one_start,
     needs: wet,
@@ -30,8 +34,8 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 
 fn parameters(_: &Scale) -> Vec<Spec> {
     vec![
-        Spec::strength("wall_loss", "1", 0.1, -1.0, 4.0),
-        Spec::strength("duct_thrust", "1", 0.04, -1.5, 1.5),
+        Spec::strength("wall_loss", "1", 0.1, -1.0, 4.0).sigma(0.4),
+        Spec::strength("duct_thrust", "1", 0.04, -1.5, 1.5).sigma(0.15),
     ]
 }
 

@@ -18,6 +18,10 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     confused_with: &["torque_ripple_cogging"],
     separated_by: "a slow creep over full turns, averaged over angle, speed against thrust",
     reference: "Doebelin, Measurement Systems (angle encoders)",
+    commonness: 0.7,
+    shifts_time: false,
+    nonparametric: false,
+    forms: &[&[0, 1], &[2, 3], &[0, 1, 2, 3]],
     parameters,
     starts: one_start,
     needs,
@@ -33,7 +37,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 };
 
 fn parameters(_: &Scale) -> Vec<Spec> {
-    let part = |name| Spec::strength(name, "1", 0.01, -0.5, 0.5);
+    let part = |name| Spec::strength(name, "1", 0.01, -0.5, 0.5).sigma(0.02);
     vec![part("once_sin"), part("once_cos"), part("twice_sin"), part("twice_cos")]
 }
 

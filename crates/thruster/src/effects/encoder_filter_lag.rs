@@ -21,6 +21,10 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     ],
     separated_by: "the raw shaft angle, differenced",
     reference: "Whitcomb & Yoerger, Comparative Experiments in the Dynamics and Model-Based Control of Marine Thrusters (their speed filter: 10 ms)",
+    commonness: 2.0,
+    shifts_time: false,
+    nonparametric: false,
+    forms: &[&[0], &[1], &[0, 1]],
     parameters,
     starts: |_| vec![vec![0.03, 0.03], vec![0.1, 0.1]],
     needs: speed_measured,
@@ -40,8 +44,8 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 
 fn parameters(_: &Scale) -> Vec<Spec> {
     vec![
-        Spec::strength("filter_excess_s", "s", 0.01, 0.0, 1.0),
-        Spec::strength("second_lag_s", "s", 0.01, 0.0, 1.0),
+        Spec::strength("filter_excess_s", "s", 0.01, 0.0, 1.0).sigma(0.02),
+        Spec::strength("second_lag_s", "s", 0.01, 0.0, 1.0).sigma(0.02),
     ]
 }
 

@@ -17,6 +17,10 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     confused_with: &["rotor_inertia_error", "inertia_added_mass_error", "amplifier_lag", "rotational_flow"],
     separated_by: "a coast-down in air against one in water; small fast variations of torque about zero speed",
     reference: "Newman 1977, Marine Hydrodynamics (added moment of inertia); equation (10)",
+    commonness: 1.0,
+    shifts_time: false,
+    nonparametric: false,
+    forms: &[],
     parameters,
     starts: one_start,
     needs,
@@ -25,7 +29,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 
 fn parameters(scale: &Scale) -> Vec<Spec> {
     let stated = scale.inertia_kg_m2;
-    vec![Spec::strength("entrained_inertia_kg_m2", "kg m^2", 0.15 * stated, 0.0, 5.0 * stated)]
+    vec![Spec::strength("entrained_inertia_kg_m2", "kg m^2", 0.15 * stated, 0.0, 5.0 * stated).sigma(0.5 * stated)]
 }
 
 fn needs(rig: &Rig, available: &Available) -> Result<(), &'static str> {

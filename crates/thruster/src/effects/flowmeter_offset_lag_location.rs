@@ -20,6 +20,10 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     confused_with: &["inertia_added_mass_error", "duct_loss", "clock_skew"],
     separated_by: "steps to several speeds, flow correlated with thrust at each; a traverse of the meter",
     reference: "Whitcomb & Yoerger, Comparative Experiments in the Dynamics and Model-Based Control of Marine Thrusters (their meter: 0.30 m downstream); dbeta 1.86 = 2/g^2 gives g = 1.04; mixing and drift are kort's form",
+    commonness: 1.5,
+    shifts_time: false,
+    nonparametric: false,
+    forms: &[&[2], &[3], &[2, 3], &[0, 4], &[1, 4], &[0, 1, 4], &[0, 1, 2, 3, 4]],
     parameters,
     starts: |scale| {
         let full = scale.flow_m_s;
@@ -43,11 +47,11 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 fn parameters(scale: &Scale) -> Vec<Spec> {
     let full = scale.flow_m_s;
     vec![
-        Spec::strength("distance_m", "m", 0.02 * full, 0.0, full),
-        Spec::strength("mixing_length_m", "m", 0.02 * full, 0.0, full),
-        Spec::strength("flow_gain_error", "1", 0.02, -0.7, 1.5),
-        Spec::strength("flow_offset_m_s", "m/s", 0.005 * full, -0.3 * full, 0.3 * full),
-        Spec::shape("drift_speed_m_s", "m/s", 0.08 * full, 0.02 * full, 0.4 * full),
+        Spec::strength("distance_m", "m", 0.02 * full, 0.0, full).sigma(0.25 * full),
+        Spec::strength("mixing_length_m", "m", 0.02 * full, 0.0, full).sigma(0.2 * full),
+        Spec::strength("flow_gain_error", "1", 0.02, -0.7, 1.5).sigma(0.3),
+        Spec::strength("flow_offset_m_s", "m/s", 0.005 * full, -0.3 * full, 0.3 * full).sigma(0.05 * full),
+        Spec::shape("drift_speed_m_s", "m/s", 0.08 * full, 0.02 * full, 0.4 * full).sigma(0.08 * full),
     ]
 }
 

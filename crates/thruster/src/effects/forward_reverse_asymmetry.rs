@@ -15,6 +15,10 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     confused_with: &["ambient_axial_flow", "thrust_bias_gain_hysteresis", "torque_channel_bias"],
     separated_by: "a staircase in both directions; the thruster turned end for end on the stand",
     reference: "maker's curves of a T200-size unit: reverse over forward thrust 0.75 to 0.785",
+    commonness: 1.5,
+    shifts_time: false,
+    nonparametric: false,
+    forms: &[&[0], &[1], &[2], &[0, 1], &[0, 1, 2]],
     parameters,
     starts: one_start,
     needs: wet,
@@ -23,9 +27,9 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 
 fn parameters(_: &Scale) -> Vec<Spec> {
     vec![
-        Spec::strength("reverse_lift_error", "1", -0.04, -0.8, 1.0),
-        Spec::strength("reverse_drag_error", "1", 0.05, -0.8, 2.0),
-        Spec::strength("reverse_flux_error", "1", 0.05, -0.8, 2.0),
+        Spec::strength("reverse_lift_error", "1", -0.04, -0.8, 1.0).sigma(0.15),
+        Spec::strength("reverse_drag_error", "1", 0.05, -0.8, 2.0).sigma(0.15),
+        Spec::strength("reverse_flux_error", "1", 0.05, -0.8, 2.0).sigma(0.15),
     ]
 }
 

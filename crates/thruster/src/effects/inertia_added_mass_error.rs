@@ -20,6 +20,10 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     ],
     separated_by: "steps of shaft speed under a speed loop (the shaft's inertia drops out), with flow or thrust recorded",
     reference: "equation (2); Whitcomb & Yoerger, Comparative Experiments in the Dynamics and Model-Based Control of Marine Thrusters",
+    commonness: 1.0,
+    shifts_time: false,
+    nonparametric: false,
+    forms: &[],
     parameters,
     starts: |_| vec![vec![-0.3], vec![1.0]],
     needs: wet,
@@ -27,7 +31,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 };
 
 fn parameters(_: &Scale) -> Vec<Spec> {
-    vec![Spec::strength("added_mass_error", "1", 0.2, -0.8, 6.0)]
+    vec![Spec::strength("added_mass_error", "1", 0.2, -0.8, 6.0).sigma(0.5)]
 }
 
 struct AddedMassError<T> {

@@ -31,8 +31,8 @@ pub(super) fn specs(
     names: &[&'static str; MOST],
     unit: &'static str,
     start: f64,
-    low: f64,
-    high: f64,
+    (low, high): (f64, f64),
+    sigma: f64,
 ) -> Vec<Spec> {
     let spacing_s = (scale.duration_s / (MOST - 2) as f64).max(CLOSEST_S);
     let count = ((scale.duration_s / spacing_s).ceil() as usize + 1).clamp(2, MOST);
@@ -42,7 +42,7 @@ pub(super) fn specs(
             length_s: 2.0 * spacing_s,
             period_s: count as f64 * spacing_s,
         }),
-        ..Spec::strength(name, unit, start, low, high)
+        ..Spec::strength(name, unit, start, low, high).sigma(sigma)
     });
     std::iter::once(Spec::held("knot_spacing_s", "s", spacing_s, spacing_s, spacing_s)).chain(knots).collect()
 }

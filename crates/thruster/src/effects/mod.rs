@@ -6,12 +6,12 @@
 //! the residual looks like, what it is confused with, and what separates it; `kort explain`
 //! prints just that.
 
-use crate::blade::Inflow;
+use crate::blade::{Foil, Inflow};
 use crate::dual::Dual;
 use crate::models::ModelName;
 use crate::parameters::Parameters;
-use crate::plant::{Balance, Drive, Foil, Local, Sensed, Tick};
-use crate::rig::{AmplifierKind, Rig};
+use crate::plant::{Balance, Drive, Local, Sensed, Tick};
+use crate::rig::Rig;
 
 /// Where an effect enters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
@@ -42,83 +42,6 @@ impl Path {
     }
 }
 
-/// Sizes of a rig in use, from which an effect takes the scale of its parameters.
-#[derive(Clone, Copy, Debug)]
-pub struct Scale {
-    /// Largest shaft speed seen, rad/s.
-    pub shaft_speed_rad_s: f64,
-    /// Largest motor torque, N m.
-    pub torque_n_m: f64,
-    /// Largest thrust, N.
-    pub thrust_n: f64,
-    /// Largest axial flow, m/s.
-    pub flow_m_s: f64,
-    /// Largest current, A.
-    pub current_a: f64,
-    /// Largest command, in the unit of the command.
-    pub command: f64,
-    /// Nominal supply, V (zero if not stated).
-    pub supply_v: f64,
-    /// Stated winding resistance, ohm (zero if not stated).
-    pub winding_resistance_ohm: f64,
-    /// Stated inertia, kg m^2.
-    pub inertia_kg_m2: f64,
-    /// Control period, s.
-    pub tick_s: f64,
-    /// Length of the recording, s.
-    pub duration_s: f64,
-}
-
-/// One parameter of an effect.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Spec {
-    /// Name, unit last.
-    pub name: &'static str,
-    /// Unit for reports.
-    pub unit: &'static str,
-    /// Where a fit starts: a value at which the effect is small but visible.
-    pub start: f64,
-    /// Smallest allowed value.
-    pub low: f64,
-    /// Largest allowed value.
-    pub high: f64,
-    /// A shape parameter does nothing alone; the effect vanishes when all its strength
-    /// parameters are zero.
-    pub shape: bool,
-    /// Not to be fitted: a whole number or a grid. The starts try its values, a fit holds them.
-    pub held: bool,
-    /// For a strength that acts only for a while: when.
-    pub acts: Option<Stretch>,
-}
-
-/// A stretch of time that comes again after a period.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Stretch {
-    /// Its beginning, s.
-    pub from_s: f64,
-    /// Its length, s.
-    pub length_s: f64,
-    /// Time to its next beginning, s.
-    pub period_s: f64,
-}
-
-impl Spec {
-    /// A strength: the effect vanishes at zero.
-    pub const fn strength(name: &'static str, unit: &'static str, start: f64, low: f64, high: f64) -> Self {
-        Self { name, unit, start, low, high, shape: false, held: false, acts: None }
-    }
-
-    /// A shape: where, how fast, how sharp.
-    pub const fn shape(name: &'static str, unit: &'static str, start: f64, low: f64, high: f64) -> Self {
-        Self { name, unit, start, low, high, shape: true, held: false, acts: None }
-    }
-
-    /// A shape that a fit holds at its start.
-    pub const fn held(name: &'static str, unit: &'static str, start: f64, low: f64, high: f64) -> Self {
-        Self { name, unit, start, low, high, shape: true, held: true, acts: None }
-    }
-}
-
 /// What an effect does at the hooks of the plant. All default to nothing.
 ///
 /// `own` holds the effect's continuous states (as many as [`Effect::states`] says), integrated
@@ -132,6 +55,10 @@ pub trait Effect<T = f64>: Send {
     fn slow(&self) -> bool {
         self.states() == 0
     }
+    /// Smallest share of the shaft's inertia that its states let move by itself.
+    fn lightest_share(&self) -> f64 {
+        1.0
+    }
     /// Once, before the run: other equations or other values of their parameters.
     fn amend(&self, _model: &mut ModelName, _parameters: &mut Parameters<T>) {}
     /// Which hooks are used; the others are never called.
@@ -144,6 +71,8 @@ pub trait Effect<T = f64>: Send {
     fn foil(&self, _at: &Local<T>, _own: &[T], _foil: &mut Foil<T>) {}
     /// Torques on the shaft and forces on the water.
     fn balance(&self, _at: &Local<T>, _own: &[T], _balance: &mut Balance<T>, _rates: &mut [T]) {}
+    /// Once a control tick, after the step and before [`Effect::sense`]: the state that was reached.
+    fn arrive(&mut self, _at: &Local<T>, _own: &[T]) {}
     /// Once a control tick, after the step: what the sensors see.
     fn sense(&mut self, _tick: &Tick, _sensed: &mut Sensed<T>) {}
 }
@@ -178,28 +107,6 @@ impl Hooks {
     pub const SENSE: Self = Self { sense: true, ..Self::NONE };
 }
 
-/// Which signals a recording (or a run) offers to an effect as drivers and to a fit as responses.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Available {
-    /// Columns with data, by their contract names.
-    pub columns: Vec<String>,
-    /// The shaft speed is prescribed (a recorded speed drives the model).
-    pub shaft_prescribed: bool,
-    /// The current is prescribed (a recorded current drives the model).
-    pub current_prescribed: bool,
-    /// The baseline model has the axial flow as a state.
-    pub axial_flow_modelled: bool,
-    /// Share of the supply lost at the largest load, where every recording holds the supply.
-    pub supply_sag_share: Option<f64>,
-}
-
-impl Available {
-    /// Is this column there?
-    pub fn has(&self, name: &str) -> bool {
-        self.columns.iter().any(|c| c == name)
-    }
-}
-
 /// One entry of the catalogue.
 pub struct Descriptor {
     /// Identifier as in the report.
@@ -218,6 +125,15 @@ pub struct Descriptor {
     pub separated_by: &'static str,
     /// Where the equation and the ranges come from.
     pub reference: &'static str,
+    /// Prior odds of its presence against an average effect: above 1 what most drives have, below what few do.
+    pub commonness: f64,
+    /// It moves signals in time: a delay, a skewed clock.
+    pub shifts_time: bool,
+    /// It changes freely with time (knots), and so can stand in for almost anything.
+    pub nonparametric: bool,
+    /// Which of its parameters make sense without the others, by their places; none listed: all together.
+    /// Those left out of a form stay at their prior means. See [`Descriptor::forms`].
+    pub forms: &'static [&'static [usize]],
     /// Its parameters at a rig's scale.
     pub parameters: fn(&Scale) -> Vec<Spec>,
     /// Further starting points for a fit, beyond the one in the parameters; may be empty.
@@ -226,6 +142,20 @@ pub struct Descriptor {
     pub needs: fn(&Rig, &Available) -> Result<(), &'static str>,
     /// Builds the effect with values for its parameters.
     pub build: Build,
+}
+
+impl Descriptor {
+    /// The sets of parameters that a fit may free, by their places, smallest first where the entry lists
+    /// them so; at least one, the whole effect. Parameters that a fit holds are in none.
+    pub fn forms(&self, specs: &[Spec]) -> Vec<Vec<usize>> {
+        let free = |places: &mut dyn Iterator<Item = usize>| -> Vec<usize> {
+            places.filter(|k| specs.get(*k).is_some_and(|s| !s.held)).collect()
+        };
+        if self.forms.is_empty() {
+            return vec![free(&mut (0..specs.len()))];
+        }
+        self.forms.iter().map(|form| free(&mut form.iter().copied())).collect()
+    }
 }
 
 /// Builds an effect on plain numbers, and on numbers with derivatives. [`both`](crate::both) makes it.
@@ -257,80 +187,21 @@ pub struct Context<'a, T = f64> {
     pub tick_s: f64,
 }
 
-/// Name under which [`Available`] lists a recorded signal laid into [`Tick::extra`].
-pub const EXTRA: &str = "extra";
-
 /// No further starting points.
 pub fn one_start(_: &Scale) -> Vec<Vec<f64>> {
     Vec::new()
 }
 
-/// Can always be fitted.
-pub fn always(_: &Rig, _: &Available) -> Result<(), &'static str> {
-    Ok(())
-}
-
-/// Needs a propeller in water.
-pub fn wet(rig: &Rig, _: &Available) -> Result<(), &'static str> {
-    if rig.propeller.is_some() { Ok(()) } else { Err("a dry shaft has no blades and no water") }
-}
-
-/// Needs the shaft's torque balance: the shaft must be driven by current, voltage or torque.
-pub fn free_shaft(rig: &Rig, available: &Available) -> Result<(), &'static str> {
-    if available.shaft_prescribed {
-        Err("the recorded shaft speed drives the model, so the shaft's torque balance is not seen")
-    } else if rig.amplifier.kind == AmplifierKind::Speed && !available.current_prescribed {
-        Err(
-            "a speed drive holds the shaft and its current is not recorded, so the torque balance is not seen",
-        )
-    } else {
-        Ok(())
-    }
-}
-
-/// Needs a command: a recorded current or speed that drives the model has the drive behind it.
-pub fn commanded(_: &Rig, available: &Available) -> Result<(), &'static str> {
-    if available.current_prescribed || available.shaft_prescribed {
-        Err(
-            "a recorded response drives the model, so what lies between command and that response is not seen",
-        )
-    } else {
-        Ok(())
-    }
-}
-
-/// Needs a measured thrust.
-pub fn thrust_measured(_: &Rig, available: &Available) -> Result<(), &'static str> {
-    if available.has("thrust_n") { Ok(()) } else { Err("thrust is not recorded") }
-}
-
-/// Needs a measured axial flow.
-pub fn flow_measured(_: &Rig, available: &Available) -> Result<(), &'static str> {
-    if available.has("flow_m_s") { Ok(()) } else { Err("axial flow is not recorded") }
-}
-
-/// Needs a measured shaft speed as a response.
-pub fn speed_measured(_: &Rig, available: &Available) -> Result<(), &'static str> {
-    if available.shaft_prescribed {
-        Err("the recorded shaft speed drives the model and is no response")
-    } else if !available.has("shaft_speed_rad_s") {
-        Err("shaft speed is not recorded")
-    } else {
-        Ok(())
-    }
-}
-
-/// Needs the recorded shaft angle: an integrated model speed loses the phase within seconds.
-pub fn angle_recorded(_: &Rig, available: &Available) -> Result<(), &'static str> {
-    if available.has("shaft_angle_rad") {
-        Ok(())
-    } else {
-        Err("the shaft angle is not recorded, so what follows the angle cannot be kept in phase")
-    }
-}
-
 mod knots;
 mod memory;
+mod needs;
+mod spec;
+
+pub use needs::{
+    Available, EXTRA, always, angle_recorded, commanded, flow_measured, free_shaft, geared, speed_measured,
+    thrust_measured, wet,
+};
+pub use spec::{Scale, Spec, Stretch};
 
 macro_rules! catalogue {
     ($($name:ident),* $(,)?) => {
@@ -343,10 +214,15 @@ macro_rules! catalogue {
 catalogue! {
     // shaft friction and load
     coulomb_friction,
+    direction_dependent_friction,
+    gear_load_friction,
+    position_dependent_friction,
+    friction_warm_up,
     viscous_friction,
     windage_drag,
     rotor_inertia_error,
     entrained_water_inertia,
+    flexible_coupling,
     // drive and motor
     amplifier_lag,
     transport_delay,
@@ -357,6 +233,7 @@ catalogue! {
     supply_sag,
     torque_ripple_cogging,
     command_dead_band,
+    command_curve,
     gear_backlash,
     // axial flow
     axial_flow_dynamics,
@@ -385,7 +262,9 @@ catalogue! {
     encoder_filter_lag,
     encoder_eccentricity,
     torque_channel_bias,
+    unsigned_speed_sensor,
     clock_skew,
+    log_gaps,
 }
 
 /// The effect with this identifier.

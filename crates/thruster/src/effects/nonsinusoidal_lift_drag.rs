@@ -15,6 +15,10 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     confused_with: &["rotational_flow", "blade_stall", "inertia_added_mass_error", "windage_drag"],
     separated_by: "steps of shaft speed, towed runs: whatever sweeps the angle of attack",
     reference: "Bachmayer, Whitcomb, Grosenbaugh 2000 (IEEE JOE 25:146); the harmonics are kort's form",
+    commonness: 1.0,
+    shifts_time: false,
+    nonparametric: false,
+    forms: &[&[0], &[1], &[2], &[0, 1], &[0, 2], &[1, 2], &[0, 1, 2]],
     parameters,
     starts: one_start,
     needs: wet,
@@ -28,9 +32,9 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 /// Bounded where the blade would begin to pull energy out of still water.
 fn parameters(_: &Scale) -> Vec<Spec> {
     vec![
-        Spec::strength("profile_drag", "1", 0.01, -0.02, 0.5),
-        Spec::strength("drag_harmonic", "1", 0.02, -0.25, 1.0),
-        Spec::strength("lift_harmonic", "1", 0.01, -0.25, 1.0),
+        Spec::strength("profile_drag", "1", 0.01, -0.02, 0.5).sigma(0.04),
+        Spec::strength("drag_harmonic", "1", 0.02, -0.25, 1.0).sigma(0.06),
+        Spec::strength("lift_harmonic", "1", 0.01, -0.25, 1.0).sigma(0.05),
     ]
 }
 

@@ -23,6 +23,10 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     ],
     separated_by: "steps of several sizes both ways with shaft speed and thrust logged: the pair of overshoots; a probe for tangential flow",
     reference: "Bachmayer, Whitcomb, Grosenbaugh 2000 (IEEE JOE 25:146); the equation's form is kort's",
+    commonness: 1.0,
+    shifts_time: false,
+    nonparametric: false,
+    forms: &[],
     parameters,
     starts: |_| vec![vec![0.1, 0.08], vec![0.1, 1.5]],
     needs: wet,
@@ -37,8 +41,8 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 /// The published pair (`dbr`, `gr`) divided by `dbr`, so that the effect vanishes at zero yield.
 fn parameters(_: &Scale) -> Vec<Spec> {
     vec![
-        Spec::strength("swirl_yield", "1", 0.1, 0.0, 3.0),
-        Spec::shape("swirl_lag_ratio", "1", 0.4, 0.005, 8.0),
+        Spec::strength("swirl_yield", "1", 0.1, 0.0, 3.0).sigma(0.6),
+        Spec::shape("swirl_lag_ratio", "1", 0.4, 0.005, 8.0).sigma(0.5),
     ]
 }
 

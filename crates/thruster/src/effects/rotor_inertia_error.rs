@@ -20,6 +20,10 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     ],
     separated_by: "small fast variations of torque about zero speed; a coast-down in air against one in water",
     reference: "Healey et al. 1995 (IEEE JOE 20:354), equation (10)",
+    commonness: 2.0,
+    shifts_time: false,
+    nonparametric: false,
+    forms: &[],
     parameters,
     starts: one_start,
     needs: free_shaft,
@@ -27,7 +31,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 };
 
 fn parameters(_: &Scale) -> Vec<Spec> {
-    vec![Spec::strength("inertia_error", "1", 0.15, -0.8, 5.0)]
+    vec![Spec::strength("inertia_error", "1", 0.15, -0.8, 5.0).sigma(0.3)]
 }
 
 struct RotorInertiaError<T> {

@@ -16,6 +16,10 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     confused_with: &["thrust_sensor_lag", "rotational_flow", "nonsinusoidal_lift_drag"],
     separated_by: "a tap on the stand with the motor off; a chirp",
     reference: "Doebelin, Measurement Systems (second-order instrument)",
+    commonness: 0.7,
+    shifts_time: false,
+    nonparametric: false,
+    forms: &[],
     parameters,
     starts,
     needs: thrust_measured,
@@ -24,9 +28,9 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 
 fn parameters(_: &Scale) -> Vec<Spec> {
     vec![
-        Spec::strength("swinging_share", "1", 0.5, -1.5, 1.5),
-        Spec::shape("natural_frequency_hz", "Hz", 20.0, 2.0, 200.0),
-        Spec::shape("damping_ratio", "1", 0.03, 0.001, 0.9),
+        Spec::strength("swinging_share", "1", 0.5, -1.5, 1.5).sigma(0.7),
+        Spec::shape("natural_frequency_hz", "Hz", 20.0, 2.0, 200.0).sigma(25.0),
+        Spec::shape("damping_ratio", "1", 0.03, 0.001, 0.9).sigma(0.1),
     ]
 }
 

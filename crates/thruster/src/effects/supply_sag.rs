@@ -19,6 +19,10 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     confused_with: &["voltage_limit_backemf", "thermal_drift_kt", "viscous_friction"],
     separated_by: "the recorded bus voltage; the supply voltage varied",
     reference: "Ohm's law with the power balance of the drive; kort's form",
+    commonness: 1.5,
+    shifts_time: false,
+    nonparametric: false,
+    forms: &[&[0], &[0, 2], &[0, 1], &[0, 1, 2]],
     parameters,
     starts,
     needs,
@@ -45,9 +49,9 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
     let full = source_ohm(scale);
     let share = (1.0 - 0.85 * winding_share(scale)).clamp(0.02, 0.6);
     vec![
-        Spec::strength("source_resistance_ohm", "ohm", share * full, 0.0, 2.0 * full),
-        Spec::shape("recovery_s", "s", 0.01, 0.0, 20.0),
-        Spec::shape("supply_factor", "1", 1.0, 0.4, 1.2),
+        Spec::strength("source_resistance_ohm", "ohm", share * full, 0.0, 2.0 * full).sigma(0.15 * full),
+        Spec::shape("recovery_s", "s", 0.01, 0.0, 20.0).sigma(1.0),
+        Spec::shape("supply_factor", "1", 1.0, 0.4, 1.2).sigma(0.1),
     ]
 }
 
@@ -72,6 +76,12 @@ const LEAST_SHARE: f64 = 0.02;
 
 fn needs(rig: &Rig, available: &Available) -> Result<(), &'static str> {
     voltage_limit_backemf::supply_known(rig, available)?;
+    if rig.amplifier.kind == crate::rig::AmplifierKind::Voltage
+        && available.has("duty_cmd")
+        && available.has("supply_v")
+    {
+        return Err("the recorded supply is in the drive's voltage already: duty times supply");
+    }
     if available.supply_sag_share.is_some_and(|share| share < LEAST_SHARE) {
         Err("the recorded supply hardly falls under load")
     } else {

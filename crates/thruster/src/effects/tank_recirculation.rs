@@ -15,6 +15,10 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     confused_with: &["ambient_axial_flow", "ambient_flow_unsteady", "thermal_drift_kt"],
     separated_by: "long holds, with waits for still water between; thermal drift leaves thrust over speed squared alone",
     reference: "equation (6a), from (4); the first-order return is kort's form",
+    commonness: 0.7,
+    shifts_time: false,
+    nonparametric: false,
+    forms: &[],
     parameters,
     starts: |_| vec![vec![0.05, 2.0], vec![0.05, 4.0], vec![0.05, 20.0], vec![0.05, 50.0]],
     needs: super::ambient_axial_flow::needs,
@@ -23,8 +27,8 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 
 fn parameters(_: &Scale) -> Vec<Spec> {
     vec![
-        Spec::strength("returned_share", "1", 0.05, 0.0, 0.8),
-        Spec::shape("return_time_s", "s", 10.0, 0.5, 300.0),
+        Spec::strength("returned_share", "1", 0.05, 0.0, 0.8).sigma(0.1),
+        Spec::shape("return_time_s", "s", 10.0, 0.5, 300.0).sigma(20.0),
     ]
 }
 

@@ -15,6 +15,10 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     confused_with: &["forward_reverse_asymmetry", "ambient_axial_flow", "duct_loss", "water_density"],
     separated_by: "known static loads; the zero before and after the run",
     reference: "Doebelin, Measurement Systems; a play operator for the loop",
+    commonness: 3.0,
+    shifts_time: false,
+    nonparametric: false,
+    forms: &[&[1], &[0], &[0, 1], &[2, 3], &[0, 1, 2, 3]],
     parameters,
     starts: one_start,
     needs: thrust_measured,
@@ -30,10 +34,10 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 fn parameters(scale: &Scale) -> Vec<Spec> {
     let t = scale.thrust_n;
     vec![
-        Spec::strength("gain_error", "1", 0.03, -0.5, 0.5),
-        Spec::strength("bias_n", "N", 0.01 * t, -0.3 * t, 0.3 * t),
-        Spec::strength("hysteresis_n", "N", 0.005 * t, 0.0, 0.2 * t),
-        Spec::shape("hysteresis_width_n", "N", 0.1 * t, 0.01 * t, 0.5 * t),
+        Spec::strength("gain_error", "1", 0.03, -0.5, 0.5).sigma(0.05),
+        Spec::strength("bias_n", "N", 0.01 * t, -0.3 * t, 0.3 * t).sigma(0.03 * t),
+        Spec::strength("hysteresis_n", "N", 0.005 * t, 0.0, 0.2 * t).sigma(0.01 * t),
+        Spec::shape("hysteresis_width_n", "N", 0.1 * t, 0.01 * t, 0.5 * t).sigma(0.15 * t),
     ]
 }
 

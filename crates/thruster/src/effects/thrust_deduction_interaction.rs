@@ -20,6 +20,10 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     ],
     separated_by: "the thrusters run one by one, then together",
     reference: "Carlton, Marine Propellers and Propulsion (thrust deduction, interaction)",
+    commonness: 0.5,
+    shifts_time: false,
+    nonparametric: false,
+    forms: &[&[0], &[1], &[0, 1]],
     parameters,
     starts: one_start,
     needs,
@@ -33,8 +37,8 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 fn parameters(scale: &Scale) -> Vec<Spec> {
     let full = scale.flow_m_s;
     vec![
-        Spec::strength("neighbour_flow_m_s", "m/s", 0.03 * full, -full, full),
-        Spec::strength("deduction", "1", 0.02, -0.3, 0.6),
+        Spec::strength("neighbour_flow_m_s", "m/s", 0.03 * full, -full, full).sigma(0.2 * full),
+        Spec::strength("deduction", "1", 0.02, -0.3, 0.6).sigma(0.1),
     ]
 }
 

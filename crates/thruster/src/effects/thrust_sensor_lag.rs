@@ -15,6 +15,10 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     confused_with: &["unsteady_lift_lag", "clock_skew", "stand_resonance"],
     separated_by: "a tap on the stand with the motor off; a chirp at two mean speeds (lift lag shrinks with speed)",
     reference: "Whitcomb & Yoerger, Comparative Experiments in the Dynamics and Model-Based Control of Marine Thrusters (their force filter: 163 Hz)",
+    commonness: 2.0,
+    shifts_time: false,
+    nonparametric: false,
+    forms: &[],
     parameters,
     starts: |_| vec![vec![0.003], vec![0.03], vec![0.1]],
     needs: thrust_measured,
@@ -26,7 +30,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 };
 
 fn parameters(_: &Scale) -> Vec<Spec> {
-    vec![Spec::strength("thrust_lag_s", "s", 0.01, 0.0, 1.0)]
+    vec![Spec::strength("thrust_lag_s", "s", 0.01, 0.0, 1.0).sigma(0.03)]
 }
 
 struct ThrustSensorLag<T> {

@@ -20,6 +20,10 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     ],
     separated_by: "a staircase in both directions; the zeros before and after the run",
     reference: "Doebelin, Measurement Systems",
+    commonness: 3.0,
+    shifts_time: false,
+    nonparametric: false,
+    forms: &[&[0], &[1], &[2], &[0, 1], &[0, 2], &[0, 1, 2]],
     parameters,
     starts: one_start,
     needs: always,
@@ -33,9 +37,9 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 fn parameters(scale: &Scale) -> Vec<Spec> {
     let (torque, current) = (scale.torque_n_m, scale.current_a);
     vec![
-        Spec::strength("shaft_torque_bias_n_m", "N m", 0.02 * torque, -0.5 * torque, 0.5 * torque),
-        Spec::strength("current_offset_a", "A", 0.02 * current, -0.5 * current, 0.5 * current),
-        Spec::strength("transducer_offset_n_m", "N m", 0.02 * torque, -0.5 * torque, 0.5 * torque),
+        Spec::strength("shaft_torque_bias_n_m", "N m", 0.02 * torque, -0.5 * torque, 0.5 * torque).sigma(0.05 * torque),
+        Spec::strength("current_offset_a", "A", 0.02 * current, -0.5 * current, 0.5 * current).sigma(0.05 * current),
+        Spec::strength("transducer_offset_n_m", "N m", 0.02 * torque, -0.5 * torque, 0.5 * torque).sigma(0.05 * torque),
     ]
 }
 

@@ -15,6 +15,10 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     confused_with: &["coulomb_friction", "windage_drag", "thermal_drift_kt", "current_saturation"],
     separated_by: "torque with the rotor locked; a staircase in both directions (Coulomb friction has the opposite trend)",
     reference: "Krishnan 2001, Electric Motor Drives",
+    commonness: 0.7,
+    shifts_time: false,
+    nonparametric: false,
+    forms: &[],
     parameters,
     starts: one_start,
     needs: free_shaft,
@@ -23,7 +27,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 
 fn parameters(scale: &Scale) -> Vec<Spec> {
     let full = 1.0 / scale.current_a.powi(2);
-    vec![Spec::strength("saturation_per_a2", "1/A^2", 0.04 * full, 0.0, 2.0 * full)]
+    vec![Spec::strength("saturation_per_a2", "1/A^2", 0.04 * full, 0.0, 2.0 * full).sigma(0.15 * full)]
 }
 
 struct TorqueConstantSaturation<T> {

@@ -5,41 +5,89 @@ use crate::plant::{Balance, Local};
 use crate::real::Real;
 use crate::rig::Rig;
 
+/// Orders of shaft angle at once.
+pub const ORDERS: usize = 6;
+/// Values of one order: itself, cogging by sine and cosine, ripple by sine and cosine.
+const EACH: usize = 5;
+
+/// One order's cogging; its ripple too; then those of several orders.
+const FORMS: &[&[usize]] = &[
+    &[1, 2],
+    &[1, 2, 3, 4],
+    &[1, 2, 6, 7],
+    &[1, 2, 6, 7, 11, 12],
+    &[1, 2, 6, 7, 11, 12, 16, 17],
+    &[1, 2, 6, 7, 11, 12, 16, 17, 21, 22],
+    &[1, 2, 6, 7, 11, 12, 16, 17, 21, 22, 26, 27],
+];
+
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
     id: "torque_ripple_cogging",
     path: Path::Drive,
     what: "magnets and slots make torque vary with rotor angle: cogging (always there) and ripple (in proportion to current)",
-    equation: "tau += (As + Bs im) sin(k q) + (Ac + Bc im) cos(k q); k whole, A [N m], B [N m/A], q shaft angle [rad]",
-    signature: "a line at order k of shaft angle in speed and torque, its frequency follows the shaft; largest at creep speed",
-    confused_with: &["encoder_eccentricity", "coulomb_friction"],
+    equation: "tau += sum over up to six whole orders k of (As + Bs im) sin(k q) + (Ac + Bc im) cos(k q); A [N m], B [N m/A], q \
+               shaft angle [rad]",
+    signature: "lines at orders of shaft angle in speed and torque, their frequency follows the shaft; largest at creep speed",
+    confused_with: &["encoder_eccentricity", "coulomb_friction", "position_dependent_friction"],
     separated_by: "a slow creep over full turns, averaged over angle; cogging stays with the current off; a resolver's \
                    error shows in speed but not in thrust",
     reference: "Jahns & Soong 1996 (IEEE Trans. Ind. Electron. 43:321)",
+    commonness: 1.5,
+    shifts_time: false,
+    nonparametric: false,
+    forms: FORMS,
     parameters,
     starts,
     needs,
     build: both!(build),
 };
 
+/// Names of one order's values.
+macro_rules! names {
+    ($($n:literal)*) => {
+        [$([
+            concat!("order_", $n),
+            concat!("cogging_sin_", $n, "_n_m"),
+            concat!("cogging_cos_", $n, "_n_m"),
+            concat!("ripple_sin_", $n, "_nm_a"),
+            concat!("ripple_cos_", $n, "_nm_a"),
+        ]),*]
+    };
+}
+const NAMES: [[&str; EACH]; ORDERS] = names!(1 2 3 4 5 6);
+/// Orders where none are told: what misalignment, poles, slots and their common multiples give.
+const USUAL: [f64; ORDERS] = [6.0, 12.0, 24.0, 36.0, 2.0, 4.0];
+
 fn parameters(scale: &Scale) -> Vec<Spec> {
     let (torque, per_a) = (scale.torque_n_m, scale.torque_n_m / scale.current_a);
-    vec![
-        Spec::held("order", "1", 1.0, 1.0, 144.0),
-        Spec::strength("cogging_sin_n_m", "N m", 0.02 * torque, -0.5 * torque, 0.5 * torque),
-        Spec::strength("cogging_cos_n_m", "N m", 0.02 * torque, -0.5 * torque, 0.5 * torque),
-        Spec::strength("ripple_sin_nm_a", "N m/A", 0.02 * per_a, -0.5 * per_a, 0.5 * per_a),
-        Spec::strength("ripple_cos_nm_a", "N m/A", 0.02 * per_a, -0.5 * per_a, 0.5 * per_a),
-    ]
+    let cogging =
+        |name| Spec::strength(name, "N m", 0.02 * torque, -0.5 * torque, 0.5 * torque).sigma(0.04 * torque);
+    let ripple =
+        |name| Spec::strength(name, "N m/A", 0.02 * per_a, -0.5 * per_a, 0.5 * per_a).sigma(0.04 * per_a);
+    let order = |[order, sin, cos, ripple_sin, ripple_cos]: [&'static str; EACH], usual| {
+        [
+            Spec::held(order, "1", usual, 1.0, 720.0),
+            cogging(sin),
+            cogging(cos),
+            ripple(ripple_sin),
+            ripple(ripple_cos),
+        ]
+    };
+    NAMES.into_iter().zip(USUAL).flat_map(|(names, usual)| order(names, usual)).collect()
 }
 
-/// One start an order: what misalignment gives, the poles, the slots, six times the pole pairs, and the
-/// least common multiple of slots and poles of common windings.
+/// One start a first order: what misalignment gives, the poles, the slots, six times the pole pairs, and the
+/// least common multiple of slots and poles of common windings. Nothing acts at the other orders.
 fn starts(scale: &Scale) -> Vec<Vec<f64>> {
     let (torque, per_a) = (0.02 * scale.torque_n_m, 0.02 * scale.torque_n_m / scale.current_a);
     [2, 3, 4, 6, 7, 8, 10, 12, 14, 18, 21, 24, 30, 36, 42, 48, 60, 72, 84]
         .iter()
-        .map(|order| vec![f64::from(*order), torque, torque, per_a, per_a])
+        .map(|order| {
+            let mut values = vec![f64::from(*order), torque, torque, per_a, per_a];
+            USUAL[1..].iter().for_each(|usual| values.extend([*usual, 0.0, 0.0, 0.0, 0.0]));
+            values
+        })
         .collect()
 }
 
@@ -48,18 +96,29 @@ fn needs(rig: &Rig, available: &Available) -> Result<(), &'static str> {
     angle_recorded(rig, available)
 }
 
+/// Orders at which nothing acts, and nothing is asked how it would, are left out.
 fn build<T: Real>(values: &[T], _: &Context<T>) -> Box<dyn Effect<T>> {
-    Box::new(TorqueRipple {
-        order: values[0].re().round(),
-        cogging_n_m: [values[1], values[2]],
-        ripple_nm_a: [values[3], values[4]],
-    })
+    let nothing = |v: &T| *v == T::ZERO && v.same_slopes(T::ZERO);
+    let orders = values
+        .chunks_exact(EACH)
+        .filter(|v| !v[1..].iter().all(nothing))
+        .map(|v| Order {
+            order: v[0].re().round(),
+            cogging_n_m: [v[1], v[2]],
+            ripple_nm_a: [v[3], v[4]],
+        })
+        .collect();
+    Box::new(TorqueRipple { orders })
 }
 
-struct TorqueRipple<T> {
+struct Order<T> {
     order: f64,
     cogging_n_m: [T; 2],
     ripple_nm_a: [T; 2],
+}
+
+struct TorqueRipple<T> {
+    orders: Vec<Order<T>>,
 }
 
 impl<T: Real> Effect<T> for TorqueRipple<T> {
@@ -68,8 +127,10 @@ impl<T: Real> Effect<T> for TorqueRipple<T> {
     }
 
     fn balance(&self, at: &Local<T>, _: &[T], balance: &mut Balance<T>, _: &mut [T]) {
-        let (sin, cos) = (at.shaft_angle_rad * self.order).sin_cos();
-        let amplitude = |i: usize| self.cogging_n_m[i] + self.ripple_nm_a[i] * at.current_a;
-        balance.shaft_torque_n_m += amplitude(0) * sin + amplitude(1) * cos;
+        for order in &self.orders {
+            let (sin, cos) = (at.shaft_angle_rad * order.order).sin_cos();
+            let amplitude = |i: usize| order.cogging_n_m[i] + order.ripple_nm_a[i] * at.current_a;
+            balance.shaft_torque_n_m += amplitude(0) * sin + amplitude(1) * cos;
+        }
     }
 }

@@ -15,6 +15,10 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     confused_with: &["amplifier_lag", "clock_skew", "encoder_filter_lag"],
     separated_by: "steps cross-correlated channel by channel; a chirp (phase slope against roll-off)",
     reference: "Ljung 1999, System Identification",
+    commonness: 3.0,
+    shifts_time: true,
+    nonparametric: false,
+    forms: &[],
     parameters,
     starts: |_| [0.02, 0.05, 0.1].map(|delay| vec![delay]).to_vec(),
     needs: commanded,
@@ -22,7 +26,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 };
 
 fn parameters(scale: &Scale) -> Vec<Spec> {
-    vec![Spec::strength("delay_s", "s", 2.0 * scale.tick_s, 0.0, 0.2)]
+    vec![Spec::strength("delay_s", "s", 2.0 * scale.tick_s, 0.0, 0.2).sigma(0.03)]
 }
 
 fn build<T: Real>(values: &[T], context: &Context<T>) -> Box<dyn Effect<T>> {
@@ -39,6 +43,8 @@ impl<T: Real> Effect<T> for TransportDelay<T> {
         Hooks::DRIVE
     }
 
+    /// The command is held from tick to tick, so the mix of two neighbouring ticks is its mean over this one: the
+    /// response goes over smoothly from one whole number of ticks to the next.
     fn drive(&mut self, _: &Tick, drive: &mut Drive<T>) {
         self.past.push(drive.command);
         drive.command = self.past.ago(self.delay_s);

@@ -19,6 +19,10 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     confused_with: &["thrust_sensor_lag", "inertia_added_mass_error", "rotational_flow", "blade_stall"],
     separated_by: "a chirp at two mean speeds (a sensor's lag stays the same in seconds)",
     reference: "Wagner 1925; R. T. Jones 1940 (NACA TR 681)",
+    commonness: 0.5,
+    shifts_time: false,
+    nonparametric: false,
+    forms: &[&[0], &[0, 1]],
     parameters,
     starts: |_| vec![vec![0.5, 0.2], vec![0.5, 1.5]],
     needs: wet,
@@ -26,7 +30,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 };
 
 fn parameters(_: &Scale) -> Vec<Spec> {
-    vec![Spec::strength("wagner_share", "1", 0.5, 0.0, 1.9), Spec::shape("chord_radii", "1", 0.5, 0.05, 5.0)]
+    vec![Spec::strength("wagner_share", "1", 0.5, 0.0, 1.9).sigma(0.7), Spec::shape("chord_radii", "1", 0.5, 0.05, 5.0).sigma(0.4)]
 }
 
 fn build<T: Real>(values: &[T], context: &Context<T>) -> Box<dyn Effect<T>> {

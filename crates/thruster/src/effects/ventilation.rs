@@ -19,6 +19,10 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     confused_with: &["cavitation", "air_ingestion", "blade_stall"],
     separated_by: "depth changed at the same speed; the recovery on the way down",
     reference: "Minsaas, Faltinsen, Persson 1983; Smogeli 2006 (thesis, NTNU); kort's form",
+    commonness: 0.3,
+    shifts_time: false,
+    nonparametric: false,
+    forms: &[],
     parameters,
     starts: |scale| {
         let start = |share, recovery| vec![0.05, share * scale.shaft_speed_rad_s, 0.1, recovery, 0.2, 0.9];
@@ -41,12 +45,12 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 fn parameters(scale: &Scale) -> Vec<Spec> {
     let full = scale.shaft_speed_rad_s;
     vec![
-        Spec::strength("thrust_loss", "1", 0.05, 0.0, 0.95),
-        Spec::shape("onset_speed_rad_s", "rad/s", 0.8 * full, 0.2 * full, 1.3 * full),
-        Spec::shape("lag_s", "s", 0.1, 0.02, 20.0),
-        Spec::shape("recovery_lag_s", "s", 0.3, 0.02, 60.0),
-        Spec::shape("hysteresis", "1", 0.2, 0.0, 0.7),
-        Spec::shape("drag_loss_over_lift_loss", "1", 0.9, 0.2, 1.3),
+        Spec::strength("thrust_loss", "1", 0.05, 0.0, 0.95).sigma(0.4),
+        Spec::shape("onset_speed_rad_s", "rad/s", 0.8 * full, 0.2 * full, 1.3 * full).sigma(0.25 * full),
+        Spec::shape("lag_s", "s", 0.1, 0.02, 20.0).sigma(0.5),
+        Spec::shape("recovery_lag_s", "s", 0.3, 0.02, 60.0).sigma(2.0),
+        Spec::shape("hysteresis", "1", 0.2, 0.0, 0.7).sigma(0.2),
+        Spec::shape("drag_loss_over_lift_loss", "1", 0.9, 0.2, 1.3).sigma(0.25),
     ]
 }
 

@@ -15,6 +15,10 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     confused_with: &["coulomb_friction", "windage_drag", "voltage_limit_backemf", "supply_sag"],
     separated_by: "a staircase over a 10:1 range of speeds; a dry spin",
     reference: "Healey et al. 1995 (IEEE JOE 20:354), equation (10)",
+    commonness: 3.0,
+    shifts_time: false,
+    nonparametric: false,
+    forms: &[],
     parameters,
     starts: one_start,
     needs: free_shaft,
@@ -24,7 +28,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 /// A negative value says that less friction acts than the rig states.
 fn parameters(scale: &Scale) -> Vec<Spec> {
     let full = scale.torque_n_m / scale.shaft_speed_rad_s;
-    vec![Spec::strength("viscous_friction_nm_s", "N m s", 0.02 * full, -0.2 * full, full)]
+    vec![Spec::strength("viscous_friction_nm_s", "N m s", 0.02 * full, -0.2 * full, full).sigma(0.1 * full)]
 }
 
 struct ViscousFriction<T> {

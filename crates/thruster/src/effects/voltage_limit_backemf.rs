@@ -16,6 +16,10 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     confused_with: &["current_saturation", "supply_sag", "cavitation", "viscous_friction"],
     separated_by: "the supply voltage varied; steps of rising size",
     reference: "Healey et al. 1995 (IEEE JOE 20:354), equations (10)-(12)",
+    commonness: 1.0,
+    shifts_time: false,
+    nonparametric: false,
+    forms: &[&[0], &[0, 1]],
     parameters,
     starts,
     needs,
@@ -40,9 +44,10 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
             (1.0 - 0.85 * winding_share(scale)).clamp(-0.25, 0.9),
             -0.3,
             0.95,
-        ),
+        )
+        .sigma(0.3),
         // Warm copper: a winding is seldom further from what is stated.
-        Spec::shape("resistance_factor", "1", 1.0, 0.75, 1.4),
+        Spec::shape("resistance_factor", "1", 1.0, 0.75, 1.4).sigma(0.15),
     ]
 }
 

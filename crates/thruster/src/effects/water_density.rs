@@ -15,6 +15,10 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     confused_with: &["air_ingestion", "thrust_bias_gain_hysteresis", "windage_drag", "duct_loss"],
     separated_by: "temperature and salinity of the water; shaft speed together with thrust and torque",
     reference: "Fofonoff & Millard 1983 (UNESCO Tech. Pap. Mar. Sci. 44)",
+    commonness: 0.7,
+    shifts_time: false,
+    nonparametric: false,
+    forms: &[],
     parameters,
     starts: one_start,
     needs: wet,
@@ -22,7 +26,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 };
 
 fn parameters(_: &Scale) -> Vec<Spec> {
-    vec![Spec::strength("density_error", "1", 0.03, -0.6, 0.3)]
+    vec![Spec::strength("density_error", "1", 0.03, -0.6, 0.3).sigma(0.05)]
 }
 
 struct WaterDensity<T> {

@@ -19,6 +19,10 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     ],
     separated_by: "a spin with the blades off (windage stays); an error of the torque constant shows at standstill too",
     reference: "Daily & Nece 1960 (J. Basic Eng. 82:217)",
+    commonness: 0.7,
+    shifts_time: false,
+    nonparametric: false,
+    forms: &[],
     parameters,
     starts: one_start,
     needs: free_shaft,
@@ -27,7 +31,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 
 fn parameters(scale: &Scale) -> Vec<Spec> {
     let full = scale.torque_n_m / scale.shaft_speed_rad_s.powi(2);
-    vec![Spec::strength("windage_nm_s2", "N m s^2", 0.03 * full, 0.0, full)]
+    vec![Spec::strength("windage_nm_s2", "N m s^2", 0.03 * full, 0.0, full).sigma(0.1 * full)]
 }
 
 struct WindageDrag<T> {

@@ -69,7 +69,9 @@ impl<T: Real> Plant<T> {
             let mut sensed = self.unhooked_sensed();
             let now = Tick { time_s: self.time_s, ..*tick };
             for i in &self.sense_hooks {
-                self.effects[*i].effect.sense(&now, &mut sensed);
+                let hooked = &mut self.effects[*i];
+                hooked.effect.arrive(&self.at, &self.x[hooked.own.clone()]);
+                hooked.effect.sense(&now, &mut sensed);
             }
             self.sensed = sensed;
         }

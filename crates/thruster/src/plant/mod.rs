@@ -156,11 +156,12 @@ impl<T: Real> Plant<T> {
             let h = e.effect.hooks();
             (h.drive || h.sense) && (h.inflow || h.foil || h.balance)
         };
+        let lightest_share = effects.iter().map(|e| e.effect.lightest_share()).fold(1.0, f64::min);
         Self {
             model,
             rates_may_hold: !effects.iter().any(changes_between_ticks),
             slow: effects.iter().all(|e| e.effect.slow()) && model != ModelName::RotationalFlow,
-            stiff: Stiff::of(model, rig, tick_s),
+            stiff: Stiff::of(model, rig, tick_s, lightest_share),
             parameters,
             sensors: rig.sensors,
             amplifier: rig.amplifier.kind,

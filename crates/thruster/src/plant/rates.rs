@@ -14,7 +14,7 @@ const STILL_M2_S2: f64 = 1e-50;
 #[derive(Clone, Copy)]
 pub(super) struct Constants<T> {
     pub(super) row: BladeRow<T>,
-    swirl: Swirl<T>,
+    pub(super) swirl: Swirl<T>,
     half_area_m2: T,
     density_kg_m3: T,
     added_mass_kg: T,
@@ -67,6 +67,7 @@ impl<T: Real> Plant<T> {
             added_mass_kg: c.added_mass_kg,
             flux_kg_m: c.flux_kg_m,
             ambient_m_s: T::from(at.ambient_m_s),
+            load_torque_n_m: T::ZERO,
             friction_ahead_n_m: T::ZERO,
             friction_astern_n_m: T::ZERO,
             blade_torque_n_m: T::ZERO,
@@ -99,7 +100,8 @@ impl<T: Real> Plant<T> {
             let hooked = &self.effects[*i];
             hooked.effect.balance(at, &x[hooked.own.clone()], balance, &mut rates[hooked.own.clone()]);
         }
-        rates[SPEED] = (balance.motor_torque_n_m + balance.shaft_torque_n_m - balance.blade_torque_n_m)
+        rates[SPEED] = (balance.motor_torque_n_m + balance.shaft_torque_n_m + balance.load_torque_n_m
+            - balance.blade_torque_n_m)
             / balance.inertia_kg_m2;
         rates[ANGLE] = speed;
         match self.model {

@@ -152,6 +152,8 @@ pub struct Balance<T = f64> {
     pub motor_torque_n_m: T,
     /// Other torque on the shaft, N m; positive accelerates ahead.
     pub shaft_torque_n_m: T,
+    /// Torque of what else hangs on the shaft (the rig's load), N m; positive accelerates ahead.
+    pub load_torque_n_m: T,
     /// Size of the dry friction against turning ahead, N m, zero or above: it slows and holds the shaft,
     /// and never drives it. See [`Balance::rub`].
     pub friction_ahead_n_m: T,
@@ -248,7 +250,7 @@ at_rest! {
     }
     Foil { speed_m_s normal_m_s chordwise_m_s sin_2a one_minus_cos_2a lift drag density_kg_m3 }
     Balance {
-        motor_torque_n_m shaft_torque_n_m friction_ahead_n_m friction_astern_n_m blade_torque_n_m inertia_kg_m2 thrust_n momentum_n added_mass_kg
+        motor_torque_n_m shaft_torque_n_m load_torque_n_m friction_ahead_n_m friction_astern_n_m blade_torque_n_m inertia_kg_m2 thrust_n momentum_n added_mass_kg
         flux_kg_m ambient_m_s stand_n,
         foil
     }

@@ -9,7 +9,8 @@
 //! settled once from the stated rig, so that a response stays smooth in the parameters.
 
 use super::drive::Course;
-use super::{ANGLE, Balance, FLOW, Plant, Rub, SPEED, Tick, each};
+use super::{ANGLE, Balance, FLOW, OWN, Plant, Rub, SPEED, SWIRL, Tick, each};
+use crate::blade::{BladeRow, Swirl};
 use crate::models::{DriveInput, Model, Model2, ModelName};
 use crate::parameters::{Parameter as P, Parameters};
 use crate::real::Real;
@@ -19,9 +20,13 @@ use crate::rig::{AmplifierKind, Rig};
 /// fit may move inertia and masses to a third of what is stated.
 const EXPLICIT: f64 = 0.9;
 
+/// The same of a part of the inertia that moves by itself: stable, with some room.
+const STABLE: f64 = 2.0;
 /// Part of the slower decay that one implicit step may take: the loads go with the square of the speed, and a
 /// straight line through them leads far off where the speed changes by more than itself.
 const RESOLVED: f64 = 0.4;
+/// Part of the faster decay that one implicit step may pass over, for the same reason at a jump from rest.
+const PASSED: f64 = 25.0;
 /// Most implicit steps a tick.
 const MOST_STEPS: f64 = 64.0;
 
@@ -35,13 +40,16 @@ const GAS_KG_M3: f64 = 100.0;
 pub(super) struct Stiff {
     /// Largest shaft speed, rad/s.
     top_rad_s: f64,
+    /// Blade torque over its square, N m s^2; zero without blades.
+    load_nm_s2: f64,
     /// Steps a tick: as many as its slower decay asks for.
     steps: usize,
 }
 
 impl Stiff {
-    /// For a rig that is too stiff for explicit steps at its stated values and largest speed.
-    pub(super) fn of(model: ModelName, rig: &Rig, tick_s: f64) -> Option<Self> {
+    /// For a rig that is too stiff for explicit steps at its stated values and largest speed, where no less than
+    /// a share of its inertia moves by itself.
+    pub(super) fn of(model: ModelName, rig: &Rig, tick_s: f64, lightest_share: f64) -> Option<Self> {
         let p = Parameters::stated(rig);
         let mut shaft_1_s = p.get(P::ViscousFrictionNmS) / p.get(P::InertiaKgM2);
         let ohm = p.get(P::WindingResistanceOhm);
@@ -52,27 +60,58 @@ impl Stiff {
         let (fast_1_s, slow_1_s) = match model {
             _ if rig.propeller.is_none() => (0.0, 0.0),
             ModelName::Model0 | ModelName::Model1 => (0.0, 0.0),
+            ModelName::RotationalFlow => {
+                let (fast_1_s, slow_1_s) = wet_1_s(&p, top_rad_s);
+                (fast_1_s.max(swirl_1_s(&p, top_rad_s)), slow_1_s)
+            }
             _ => wet_1_s(&p, top_rad_s),
         };
-        let steps = (slow_1_s * tick_s / RESOLVED).ceil().clamp(1.0, MOST_STEPS);
-        ((shaft_1_s + fast_1_s) * tick_s > EXPLICIT).then_some(Self { top_rad_s, steps: steps as usize })
+        let steps = (slow_1_s * tick_s / RESOLVED).max(fast_1_s * tick_s / PASSED);
+        let steps = steps.ceil().clamp(1.0, MOST_STEPS);
+        let rate = (shaft_1_s + fast_1_s) * tick_s;
+        (rate > EXPLICIT || rate > STABLE * lightest_share).then_some(Self {
+            top_rad_s,
+            load_nm_s2: if rig.propeller.is_some() { p.bollard_coefficients().1 } else { 0.0 },
+            steps: steps as usize,
+        })
     }
 }
 
-/// Faster and slower decay of shaft speed and flow in bollard pull at a shaft speed, 1/s.
+/// Faster and slower decay of shaft speed and flow at a shaft speed, 1/s: in bollard pull, and the faster one
+/// also in still water, where the blades pull hardest.
 fn wet_1_s(p: &Parameters, speed_rad_s: f64) -> (f64, f64) {
     let model = Model2::new(p);
-    let flow = model.rough_steady_state(&DriveInput::torque(1.0));
-    let x = [speed_rad_s, speed_rad_s * flow[1] / flow[0]];
     let rates = |x: [f64; 2]| model.rates(&x, &DriveInput::torque(0.0));
-    let here = rates(x);
-    let by = x.map(|x| 1e-6 * x.abs().max(1e-6));
-    let there = [rates([x[0] + by[0], x[1]]), rates([x[0], x[1] + by[1]])];
-    let slopes: [[f64; 2]; 2] =
-        std::array::from_fn(|i| std::array::from_fn(|j| (there[j][i] - here[i]) / by[j]));
-    let fast = fastest_1_s(slopes);
-    let [[a, b], [c, d]] = slopes;
-    (fast, ((a * d - b * c) / fast).abs())
+    let slopes = |x: [f64; 2]| -> [[f64; 2]; 2] {
+        let here = rates(x);
+        let by = x.map(|x| 1e-6 * x.abs().max(1e-6));
+        let there = [rates([x[0] + by[0], x[1]]), rates([x[0], x[1] + by[1]])];
+        std::array::from_fn(|i| std::array::from_fn(|j| (there[j][i] - here[i]) / by[j]))
+    };
+    let bollard = model.rough_steady_state(&DriveInput::torque(1.0));
+    let steady = slopes([speed_rad_s, speed_rad_s * bollard[1] / bollard[0]]);
+    let [[a, b], [c, d]] = steady;
+    let settled = fastest_1_s(steady);
+    let still = [speed_rad_s, 0.0];
+    // Where the water is drawn in by F and carried off by k v^2, it settles at 2 sqrt(F k).
+    let drawn =
+        2.0 * (rates(still)[1].abs() * model.momentum.flux_kg_m / model.momentum.added_mass_kg).sqrt();
+    let onset = fastest_1_s(slopes(still)).max(drawn);
+    (settled.max(onset), ((a * d - b * c) / settled).abs())
+}
+
+/// Decay of the swirl in bollard pull, washed out and resisted by the blades, 1/s.
+fn swirl_1_s(p: &Parameters, speed_rad_s: f64) -> f64 {
+    let (row, swirl) = (BladeRow::new(p), Swirl::new(p));
+    let (thrust, _) = p.bollard_coefficients();
+    let flux = p.get(P::FluxCoefficient) * p.get(P::DensityKgM3) * p.area_m2();
+    let flow = speed_rad_s * (thrust / flux).max(0.0).sqrt();
+    let rate = |us: f64| {
+        let load = row.load(row.lever_m * speed_rad_s - us, flow);
+        swirl.acceleration(load.torque_n_m, flow, us, 0.0)
+    };
+    let by = 1e-6 * row.lever_m * speed_rad_s;
+    ((rate(by) - rate(0.0)) / by).abs()
 }
 
 /// The largest eigenvalue of a matrix by size.
@@ -113,7 +152,7 @@ impl<T: Real> Plant<T> {
         for step in 0..stiff.steps {
             let from = step as f64 * part;
             let until = if step + 1 == stiff.steps { 1.0 } else { from + part };
-            x = self.stiff_part(tick, &drive, &x, (from, until), stiff.top_rad_s, &mut balance);
+            x = self.stiff_part(tick, &drive, &x, (from, until), stiff, &mut balance);
         }
         let current = self.current_at(tick, &drive, 1.0, x[SPEED]);
         let end = self.local_at(&x, current, 1.0, tick);
@@ -129,7 +168,7 @@ impl<T: Real> Plant<T> {
         drive: &Course<T>,
         from: &[T; N],
         (start, end): (f64, f64),
-        top_rad_s: f64,
+        Stiff { top_rad_s, load_nm_s2, .. }: Stiff,
         balance: &mut Balance<T>,
     ) -> [T; N] {
         let step_s = (end - start) * self.tick_s;
@@ -150,7 +189,12 @@ impl<T: Real> Plant<T> {
             let speed = imposed(until);
             x[SPEED] = speed.unwrap_or(x[SPEED]);
             let rates = self.rates_at(tick, drive, &x, until, balance);
-            slopes.advance(&x, &rates, step_s, rub.mean(Rub::of(balance)), speed.is_some())
+            let mut squares = [T::ZERO; OWN];
+            squares[SPEED] = T::from(load_nm_s2) / balance.inertia_kg_m2;
+            squares[FLOW] = balance.flux_kg_m / balance.added_mass_kg;
+            squares[SWIRL] = self.constants.swirl.flux_kg_m / self.constants.swirl.mass_kg;
+            let rub = rub.mean(Rub::of(balance));
+            slopes.advance(&x, &rates, squares, step_s, rub, speed.is_some())
         };
         let whole = advance(from, end, step_s);
         let half = advance(from, 0.5 * (start + end), 0.5 * step_s);
@@ -211,12 +255,25 @@ impl<T: Real> Plant<T> {
 
 impl<T: Real, const N: usize> Slopes<T, N> {
     /// One linearly implicit step, with dry friction at its end: `(1 - h J) (x1 - x) = h x'`.
-    fn advance(&self, x: &[T; N], rates: &[T; N], step_s: f64, rub: Rub<T>, imposed: bool) -> [T; N] {
+    fn advance(
+        &self,
+        x: &[T; N],
+        rates: &[T; N],
+        squares: [T; OWN],
+        step_s: f64,
+        rub: Rub<T>,
+        imposed: bool,
+    ) -> [T; N] {
         // Only what decays is taken implicitly; what grows is left to be followed.
-        let (ww, vv) = (self.by_speed[SPEED].min(T::ZERO), self.by_flow[FLOW].min(T::ZERO));
+        // Where the loads go with the square (`x' = f - k x|x|`), a step from rest must not pass the state in
+        // which they balance, at sqrt(f/k), however little they resist at first.
+        let resists =
+            |slope: T, place: usize| slope.min(T::ZERO).min(-(rates[place].abs() * squares[place]).sqrt());
+        let (ww, vv) = (resists(self.by_speed[SPEED], SPEED), resists(self.by_flow[FLOW], FLOW));
+        // Nor may each drive the other beyond what both lose.
         let (vw, mut wv) = (self.by_speed[FLOW], self.by_flow[SPEED]);
-        if ww * vv <= wv * vw {
-            wv = T::ZERO;
+        if wv * vw > ww * vv {
+            wv = ww * vv / vw;
         }
         let (a, d) = (T::ONE - ww * step_s, T::ONE - vv * step_s);
         let det = a * d - wv * vw * (step_s * step_s);
@@ -233,7 +290,8 @@ impl<T: Real, const N: usize> Slopes<T, N> {
         next[FLOW] = x[FLOW] + flow_by;
         for i in ANGLE..N {
             let pushed = rates[i] + self.by_speed[i] * speed_by + self.by_flow[i] * flow_by;
-            next[i] = x[i] + pushed / (T::ONE - self.by_itself[i] * step_s) * step_s;
+            let itself = if i == SWIRL { resists(self.by_itself[i], i) } else { self.by_itself[i] };
+            next[i] = x[i] + pushed / (T::ONE - itself * step_s) * step_s;
         }
         next
     }

@@ -1,6 +1,8 @@
 //! The composed plant from outside: dry friction, stiff rigs, the observer, a released drive.
 
+mod delay;
 mod drive;
+mod effects;
 mod friction;
 mod observer;
 mod stiff;

@@ -1,0 +1,121 @@
+//! A belt, a long shaft or a magnetic coupling between motor and load.
+
+use super::{Context, Descriptor, Effect, Hooks, Path, Scale, Spec, free_shaft};
+use crate::blade::{Inflow, REFERENCE_RADIUS};
+use crate::parameters::Parameter as P;
+use crate::plant::{Balance, Local, Sensed, Tick};
+use crate::real::Real;
+
+/// Catalogue entry.
+pub const DESCRIPTOR: Descriptor = Descriptor {
+    id: "flexible_coupling",
+    path: Path::Shaft,
+    what: "a belt, a long shaft or a magnetic coupling twists between motor and load: two inertias on a spring",
+    equation: "with d = q1 - q2 of motor and load: d'' + 2 z wn d' + wn^2 d = (tm - tf)/I1 - tl/I2, wn^2 = 1/(k Ir), I1 = (1 - s) I, \
+               I2 = s I, Ir = s (1 - s) I; speed is measured at the motor, blades and load turn with q2; k [rad/(N m)], s, \
+               z [1]",
+    signature: "speed rings at a fixed frequency after steps of torque, resonance and antiresonance in its spectrum; the load's \
+                side rings the other way",
+    confused_with: &["stand_resonance", "gear_backlash", "amplifier_lag", "encoder_filter_lag"],
+    separated_by: "a chirp at two amplitudes (play depends on amplitude, a spring does not); a tap on the load",
+    reference: "Ellis & Lorenz 2000 (IEEE IAS, resonant load control); a measured belt drive: 3.2 Hz, damping 0.15",
+    commonness: 0.7,
+    shifts_time: false,
+    nonparametric: false,
+    forms: &[],
+    parameters,
+    starts: |scale| {
+        [1.5, 3.0, 6.0, 12.0, 25.0].iter().map(|hz| vec![compliance(scale, *hz), 0.5, 0.1]).collect()
+    },
+    needs: free_shaft,
+    build: both!(|values, context| {
+        Box::new(Coupling::new(values[0], values[1], values[2], context.parameters.get(P::InertiaKgM2), context))
+    }),
+};
+
+/// Compliance of a coupling between two halves of the stated inertia that swing at `hz`.
+fn compliance(scale: &Scale, hz: f64) -> f64 {
+    1.0 / (0.25 * scale.inertia_kg_m2 * (std::f64::consts::TAU * hz).powi(2))
+}
+
+fn parameters(scale: &Scale) -> Vec<Spec> {
+    vec![
+        Spec::strength("compliance_rad_nm", "rad/(N m)", compliance(scale, 12.0), 0.0, compliance(scale, 0.3))
+            .sigma(compliance(scale, 5.0)),
+        Spec::shape("load_inertia_share", "1", 0.5, 0.03, 0.97).sigma(0.25),
+        Spec::shape("damping_ratio", "1", 0.1, 0.01, 1.0).sigma(0.15),
+    ]
+}
+
+/// Twist between motor and load, in the two states twist and its rate; the shaft's state is the speed of both
+/// together. It vanishes with the compliance, whatever the rest.
+pub(crate) struct Coupling<T> {
+    /// Square of the natural frequency, no higher than a tick can follow, 1/s^2.
+    stiffness_1_s2: T,
+    damping_1_s: T,
+    /// Twist under a unit of accelerating difference, s^2.
+    give_s2: T,
+    share: T,
+    lever_m: T,
+    inertia_kg_m2: T,
+    relative_rad_s: T,
+}
+
+/// Largest angle of the swing that one tick may take, rad: what the integrator follows.
+const SWING_A_TICK_RAD: f64 = 0.4;
+
+impl<T: Real> Coupling<T> {
+    /// From compliance, rad/(N m), the load's share of the inertia, the damping ratio and the inertia of both.
+    pub(crate) fn new(compliance: T, share: T, damping: T, inertia_kg_m2: T, context: &Context<T>) -> Self {
+        let give_s2 = compliance * share * (T::ONE - share) * inertia_kg_m2;
+        let most = (SWING_A_TICK_RAD / context.tick_s).powi(2);
+        // 1/give where that can be followed, else the most; and a stiff coupling gives next to nothing.
+        let stiffness_1_s2 = if give_s2 * most > 1.0 { give_s2.recip() } else { T::from(most) };
+        Self {
+            stiffness_1_s2,
+            damping_1_s: damping * 2.0 * stiffness_1_s2.sqrt(),
+            give_s2,
+            share,
+            lever_m: context.parameters.get(P::RadiusM) * REFERENCE_RADIUS,
+            inertia_kg_m2,
+            relative_rad_s: T::ZERO,
+        }
+    }
+}
+
+impl<T: Real> Effect<T> for Coupling<T> {
+    fn states(&self) -> usize {
+        2
+    }
+
+    fn hooks(&self) -> Hooks {
+        Hooks { inflow: true, balance: true, sense: true, ..Hooks::NONE }
+    }
+
+    /// A coupling stiffer than a tick can follow lets the load move little by itself.
+    fn lightest_share(&self) -> f64 {
+        (self.share / (self.give_s2 * self.stiffness_1_s2)).re().min(1.0)
+    }
+
+    /// The blades turn with the load.
+    fn inflow(&self, _: &Local<T>, own: &[T], inflow: &mut Inflow<T>) {
+        inflow.tangential_m_s -= self.lever_m * (T::ONE - self.share) * own[1];
+    }
+
+    fn balance(&self, _: &Local<T>, own: &[T], balance: &mut Balance<T>, rates: &mut [T]) {
+        let motor = balance.motor_torque_n_m + balance.shaft_torque_n_m;
+        let load = balance.load_torque_n_m - balance.blade_torque_n_m;
+        let apart = (motor / (T::ONE - self.share) - load / self.share) / self.inertia_kg_m2;
+        rates[0] = own[1];
+        rates[1] = self.stiffness_1_s2 * (self.give_s2 * apart - own[0]) - self.damping_1_s * own[1];
+    }
+
+    fn arrive(&mut self, _: &Local<T>, own: &[T]) {
+        self.relative_rad_s = own[1];
+    }
+
+    /// The encoder sits on the motor.
+    fn sense(&mut self, _: &Tick, sensed: &mut Sensed<T>) {
+        sensed.shaft_speed_rad_s += self.share * self.relative_rad_s;
+    }
+}

@@ -1,0 +1,103 @@
+//! What a recording and a rig offer to an effect: whether it can be fitted at all, and if not why.
+
+use crate::rig::{AmplifierKind, Rig};
+
+/// Which signals a recording (or a run) offers to an effect as drivers and to a fit as responses.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Available {
+    /// Columns with data, by their contract names.
+    pub columns: Vec<String>,
+    /// The shaft speed is prescribed (a recorded speed drives the model).
+    pub shaft_prescribed: bool,
+    /// The current is prescribed (a recorded current drives the model).
+    pub current_prescribed: bool,
+    /// The baseline model has the axial flow as a state.
+    pub axial_flow_modelled: bool,
+    /// Share of the supply lost at the largest load, where every recording holds the supply.
+    pub supply_sag_share: Option<f64>,
+}
+
+impl Available {
+    /// Is this column there?
+    pub fn has(&self, name: &str) -> bool {
+        self.columns.iter().any(|c| c == name)
+    }
+}
+
+/// Name under which [`Available`] lists a recorded signal laid into [`Tick::extra`].
+pub const EXTRA: &str = "extra";
+
+/// Can always be fitted.
+pub fn always(_: &Rig, _: &Available) -> Result<(), &'static str> {
+    Ok(())
+}
+
+/// Needs a propeller in water.
+pub fn wet(rig: &Rig, _: &Available) -> Result<(), &'static str> {
+    if rig.propeller.is_some() { Ok(()) } else { Err("a dry shaft has no blades and no water") }
+}
+
+/// Needs the shaft's torque balance: the shaft must be driven by current, voltage or torque.
+pub fn free_shaft(rig: &Rig, available: &Available) -> Result<(), &'static str> {
+    if available.shaft_prescribed {
+        Err("the recorded shaft speed drives the model, so the shaft's torque balance is not seen")
+    } else if rig.amplifier.kind == AmplifierKind::Speed && !available.current_prescribed {
+        Err(
+            "a speed drive holds the shaft and its current is not recorded, so the torque balance is not seen",
+        )
+    } else {
+        Ok(())
+    }
+}
+
+/// Needs a command: a recorded current or speed that drives the model has the drive behind it.
+pub fn commanded(_: &Rig, available: &Available) -> Result<(), &'static str> {
+    if available.current_prescribed || available.shaft_prescribed {
+        Err(
+            "a recorded response drives the model, so what lies between command and that response is not seen",
+        )
+    } else {
+        Ok(())
+    }
+}
+
+/// Needs a measured thrust.
+pub fn thrust_measured(_: &Rig, available: &Available) -> Result<(), &'static str> {
+    if available.has("thrust_n") { Ok(()) } else { Err("thrust is not recorded") }
+}
+
+/// Needs a measured axial flow.
+pub fn flow_measured(_: &Rig, available: &Available) -> Result<(), &'static str> {
+    if available.has("flow_m_s") { Ok(()) } else { Err("axial flow is not recorded") }
+}
+
+/// Needs a measured shaft speed as a response.
+pub fn speed_measured(_: &Rig, available: &Available) -> Result<(), &'static str> {
+    if available.shaft_prescribed {
+        Err("the recorded shaft speed drives the model and is no response")
+    } else if !available.has("shaft_speed_rad_s") {
+        Err("shaft speed is not recorded")
+    } else {
+        Ok(())
+    }
+}
+
+/// Needs the recorded shaft angle: an integrated model speed loses the phase within seconds.
+pub fn angle_recorded(_: &Rig, available: &Available) -> Result<(), &'static str> {
+    if available.has("shaft_angle_rad") {
+        Ok(())
+    } else {
+        Err("the shaft angle is not recorded, so what follows the angle cannot be kept in phase")
+    }
+}
+
+/// Needs a gear, a belt or a screw between motor and load: the rig's class names one.
+pub fn geared(rig: &Rig, available: &Available) -> Result<(), &'static str> {
+    free_shaft(rig, available)?;
+    let class = rig.class.to_lowercase();
+    if ["gear", "belt", "screw", "worm", "servo", "actuator", "reduction"].iter().any(|w| class.contains(w)) {
+        Ok(())
+    } else {
+        Err("the rig is direct drive: its class names no gear, belt or screw")
+    }
+}

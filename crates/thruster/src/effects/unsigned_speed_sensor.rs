@@ -1,0 +1,41 @@
+//! The speed sensor does not know the direction.
+
+use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, one_start, speed_measured};
+use crate::plant::{Sensed, Tick};
+use crate::real::Real;
+
+/// Catalogue entry.
+pub const DESCRIPTOR: Descriptor = Descriptor {
+    id: "unsigned_speed_sensor",
+    path: Path::Sensor,
+    what: "a tachometer with a single channel, or a hall sensor, shows the size of the shaft speed and not its sign",
+    equation: "y = |Om|; there (1) or not (0), nothing to fit",
+    signature: "measured speed is never negative, and has a cusp at zero where the model crosses it; thrust and current do \
+                change sign",
+    confused_with: &["forward_reverse_asymmetry", "torque_channel_bias"],
+    separated_by: "the crossings of zero: the sign is the model's",
+    reference: "Doebelin, Measurement Systems (tachometers)",
+    commonness: 0.5,
+    shifts_time: false,
+    nonparametric: false,
+    forms: &[],
+    parameters: |_: &Scale| vec![Spec::switch("unsigned")],
+    starts: one_start,
+    needs: speed_measured,
+    build: both!(|values, _| Box::new(UnsignedSpeed { share: values[0] })),
+};
+
+struct UnsignedSpeed<T> {
+    share: T,
+}
+
+impl<T: Real> Effect<T> for UnsignedSpeed<T> {
+    fn hooks(&self) -> Hooks {
+        Hooks::SENSE
+    }
+
+    fn sense(&mut self, _: &Tick, sensed: &mut Sensed<T>) {
+        let signed = sensed.shaft_speed_rad_s;
+        sensed.shaft_speed_rad_s = signed + self.share * (signed.abs() - signed);
+    }
+}
