@@ -5,7 +5,7 @@
 //! options serves a 1 kW test stand and a 76 mm thruster alike.
 
 use kort_thruster::blade::{self, Blade, BladeLoad, BladeRow, Inflow};
-use kort_thruster::rig::{AmplifierKind, Rig};
+use kort_thruster::rig::{AmplifierKind, KnownEffect, Rig};
 use thiserror::Error;
 
 /// Why a controller cannot be designed for a rig.
@@ -191,9 +191,39 @@ impl ControlModel {
             thrust_max_n: 0.0,
             step_max_s: 1e-3,
         };
+        rig.effects.iter().for_each(|known| model.take_in(known));
         model.refresh();
         model.set_envelope();
         Ok(model)
+    }
+
+    /// Takes in physics that the rig is known to have, as far as laws and observers are designed from it.
+    fn take_in(&mut self, known: &KnownEffect) {
+        match known.effect {
+            "coulomb_friction" => self.coulomb_friction_n_m += known.value("coulomb_torque_n_m"),
+            "direction_dependent_friction" => {
+                let both = |a, b| 0.5 * (known.value(a) + known.value(b));
+                self.coulomb_friction_n_m += both("dry_ahead_n_m", "dry_astern_n_m");
+                self.viscous_friction_nm_s += both("viscous_ahead_nm_s", "viscous_astern_nm_s");
+            }
+            "viscous_friction" => self.viscous_friction_nm_s += known.value("viscous_friction_nm_s"),
+            "entrained_water_inertia" => self.inertia_kg_m2 += known.value("entrained_inertia_kg_m2"),
+            "rotor_inertia_error" => self.inertia_kg_m2 *= 1.0 + known.value("inertia_error"),
+            "inertia_added_mass_error" => self.added_mass_kg *= 1.0 + known.value("added_mass_error"),
+            "amplifier_lag" => self.amplifier_lag_s += known.value("extra_lag_s").max(0.0),
+            "water_density" => {
+                let factor = 1.0 + known.value("density_error");
+                self.blade.density_kg_m3 *= factor;
+                self.added_mass_kg *= factor;
+                self.duct_water_kg *= factor;
+            }
+            "rotational_flow" if known.value("swirl_yield") > 0.0 => {
+                let drag = 1.0 / known.value("swirl_yield");
+                self.swirl = Some(Swirl { drag, inertia: drag * known.value("swirl_lag_ratio") });
+            }
+            // The rest acts where no law looks: in the drive's limits, the sensors, off the design point.
+            _ => {}
+        }
     }
 
     /// Makes all that follows from the blade's coefficients agree with them; call after changing them.
@@ -534,6 +564,19 @@ flow_rate_hz = 20
                 assert!((m.load(speed, flow, 0.0).thrust_n - thrust).abs() < 1e-3, "{thrust} {flow} {speed}");
             }
         }
+    }
+
+    #[test]
+    fn what_a_rig_is_known_to_have_is_in_the_model() {
+        let known = |effects: &str| {
+            ControlModel::from_rig(&Rig::from_toml(&format!("{STAND}{effects}")).unwrap(), 0.002).unwrap()
+        };
+        let friction = "[[effects]]\neffect = \"coulomb_friction\"\ncoulomb_torque_n_m = 0.3\n";
+        let model = known(friction);
+        assert_eq!(model.friction_n_m(60.0), 0.3 * 60.0 / (60.0 + 0.005 * model.speed_max_rad_s));
+        let swirl = "[[effects]]\neffect = \"rotational_flow\"\nswirl_yield = 0.5\nswirl_lag_ratio = 0.25\n";
+        assert_eq!(known(swirl).swirl, Some(Swirl { drag: 2.0, inertia: 0.5 }));
+        assert!(known(swirl).map.thrust_n_s2 < stand().map.thrust_n_s2);
     }
 
     #[test]

@@ -4,10 +4,10 @@
 use std::collections::BTreeMap;
 
 use kort_identify::fit::Fit;
+use kort_scenario::{EffectUse, NoReplays, Run, Scenario};
 use kort_thruster::effects::{Descriptor, Scale};
 use kort_thruster::parameters::Parameter;
 use kort_thruster::rig::Rig;
-use kort_thruster::scenario::{EffectUse, NoReplays, Run, Scenario};
 
 use crate::decide::Decision;
 use crate::flexible::is_term;

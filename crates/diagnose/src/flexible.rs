@@ -175,6 +175,10 @@ macro_rules! term {
             confused_with: &[],
             separated_by: "",
             reference: "",
+            commonness: 0.2,
+            shifts_time: false,
+            nonparametric: true,
+            forms: &[],
             parameters: $parameters,
             starts: one_start,
             needs: $needs,
@@ -302,6 +306,10 @@ const SHAFT_STEP: Descriptor = Descriptor {
     confused_with: &[],
     separated_by: "",
     reference: "",
+    commonness: 0.2,
+    shifts_time: false,
+    nonparametric: true,
+    forms: &[],
     parameters: |s| {
         vec![
             Spec::strength("torque_n_m", "N m", 0.02 * s.torque_n_m, -s.torque_n_m, s.torque_n_m),

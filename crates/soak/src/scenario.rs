@@ -358,7 +358,7 @@ impl Scenario {
     /// # Errors
     /// Words that name the key, the value and what is allowed, with a hint.
     pub fn from_toml(text: &str) -> Result<Self, String> {
-        let scenario: Self = kort_thruster::scenario::from_toml(text)
+        let scenario: Self = kort_scenario::from_toml(text)
             .map_err(|said| format!("{said}\nhint: docs/control.md lists every key"))?;
         scenario.check()?;
         Ok(scenario)

@@ -17,4 +17,3 @@ pub mod parameters;
 pub mod plant;
 pub mod real;
 pub mod rig;
-pub mod scenario;

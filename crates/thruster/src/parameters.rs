@@ -45,13 +45,25 @@ pub enum Parameter {
     SwirlFluxCoefficient,
     /// Swirl added-mass coefficient `gr` of the rotational-flow model.
     SwirlMassCoefficient,
+    /// Mass that hangs on the shaft, kg: the pendulum's weight, what a slide moves.
+    LoadMassKg,
+    /// Shaft to the pendulum's centre of mass, m.
+    LoadLengthM,
+    /// Inertia of the load's side of two masses, kg m^2.
+    LoadInertiaKgM2,
+    /// Torque over twist between two masses, N m/rad.
+    LoadStiffnessNmRad,
+    /// Torque over rate of twist between two masses, N m s.
+    LoadDampingNmS,
+    /// Torque of a fan over the square of shaft speed, N m s^2.
+    FanCoefficientNmS2,
 }
 
 use Parameter as P;
 
 impl Parameter {
     /// Every parameter, in the order of storage.
-    pub const ALL: [P; 18] = [
+    pub const ALL: [P; 24] = [
         P::RadiusM,
         P::DuctLengthM,
         P::PitchRad,
@@ -70,6 +82,12 @@ impl Parameter {
         P::Efficiency,
         P::SwirlFluxCoefficient,
         P::SwirlMassCoefficient,
+        P::LoadMassKg,
+        P::LoadLengthM,
+        P::LoadInertiaKgM2,
+        P::LoadStiffnessNmRad,
+        P::LoadDampingNmS,
+        P::FanCoefficientNmS2,
     ];
 
     /// Name as in the rig description where it stands there, unit last.
@@ -93,13 +111,24 @@ impl Parameter {
             P::Efficiency => "efficiency",
             P::SwirlFluxCoefficient => "swirl_flux_coefficient",
             P::SwirlMassCoefficient => "swirl_mass_coefficient",
+            P::LoadMassKg => "load_mass_kg",
+            P::LoadLengthM => "load_length_m",
+            P::LoadInertiaKgM2 => "load_inertia_kg_m2",
+            P::LoadStiffnessNmRad => "load_stiffness_nm_rad",
+            P::LoadDampingNmS => "load_damping_nm_s",
+            P::FanCoefficientNmS2 => "fan_coefficient_nm_s2",
         }
     }
 
     /// Unit for reports.
     pub const fn unit(self) -> &'static str {
         match self {
-            P::RadiusM | P::DuctLengthM => "m",
+            P::RadiusM | P::DuctLengthM | P::LoadLengthM => "m",
+            P::LoadMassKg => "kg",
+            P::LoadInertiaKgM2 => "kg m^2",
+            P::LoadStiffnessNmRad => "N m/rad",
+            P::LoadDampingNmS => "N m s",
+            P::FanCoefficientNmS2 => "N m s^2",
             P::PitchRad => "rad",
             P::DensityKgM3 => "kg/m^3",
             P::InertiaKgM2 => "kg m^2",
@@ -115,7 +144,7 @@ impl Parameter {
 
     /// May a fit drive this parameter to the edge of what is physical (a symptom, not a value)?
     pub const fn positive(self) -> bool {
-        !matches!(self, P::ViscousFrictionNmS)
+        !matches!(self, P::ViscousFrictionNmS | P::LoadDampingNmS)
     }
 }
 
@@ -165,6 +194,12 @@ impl Parameters {
             P::WindingResistanceOhm => rig.motor.winding_resistance_ohm,
             P::ViscousFrictionNmS => rig.motor.viscous_friction_nm_s,
             P::TimeConstantS => Some(rig.amplifier.time_constant_s),
+            P::LoadMassKg
+            | P::LoadLengthM
+            | P::LoadInertiaKgM2
+            | P::LoadStiffnessNmRad
+            | P::LoadDampingNmS
+            | P::FanCoefficientNmS2 => rig.load.quantity(parameter),
             _ => None,
         }
     }

@@ -8,7 +8,7 @@ use bench::{Bench, Which, by_every_value};
 use kort_thruster::effects;
 use kort_thruster::models::ModelName;
 use kort_thruster::parameters::{Parameter as P, Parameters};
-use kort_thruster::rig::AmplifierKind;
+use kort_thruster::rig::{AmplifierKind, Load, Quantity};
 
 #[test]
 fn by_every_parameter_of_every_model() {
@@ -17,10 +17,34 @@ fn by_every_parameter_of_every_model() {
         let mut stated = Parameters::stated(&bench.rig);
         stated.set(P::ViscousFrictionNmS, 0.01);
         for model in ModelName::ALL {
-            for p in P::ALL {
+            // What hangs on the shaft has a test of its own.
+            for p in P::ALL.into_iter().filter(|p| stated.get(*p) != 0.0) {
                 let value = stated.get(p);
                 let what = format!("{kind:?} {model} {}", p.name());
                 bench.check(&what, model, (&stated, &Vec::new()), Which::Parameter(p), (value, value), false);
+            }
+        }
+    }
+}
+
+#[test]
+fn by_every_parameter_of_every_load() {
+    let of = Quantity::exact;
+    for load in [
+        Load::Pendulum { mass_kg: of(2.0), length_m: of(0.1) },
+        Load::TwoMass { inertia_kg_m2: of(0.005), stiffness_nm_rad: of(20.0), damping_nm_s: of(0.05) },
+        Load::Fan { fan_coefficient_nm_s2: of(1e-3) },
+        Load::Slide { mass_kg: of(50.0), lead_m_rev: of(0.05), incline_rad: of(0.3) },
+    ] {
+        let mut bench = Bench::new(AmplifierKind::Current);
+        bench.rig.load = load;
+        let stated = Parameters::stated(&bench.rig);
+        for p in P::ALL.into_iter().filter(|p| p.name().starts_with("load_") || p.name().starts_with("fan_"))
+        {
+            let value = stated.get(p);
+            if value != 0.0 {
+                let (at, which) = ((&stated, &Vec::new()), Which::Parameter(p));
+                bench.check(p.name(), ModelName::Model2, at, which, (value, value), false);
             }
         }
     }

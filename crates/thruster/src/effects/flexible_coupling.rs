@@ -61,6 +61,16 @@ pub(crate) struct Coupling<T> {
     relative_rad_s: T,
 }
 
+/// The coupling of a rig's two masses ([`crate::rig::Load::TwoMass`]).
+pub(crate) fn of_load<T: Real>(context: &Context<T>) -> Box<dyn Effect<T>> {
+    let p = context.parameters;
+    let (motor, load) = (p.get(P::InertiaKgM2), p.get(P::LoadInertiaKgM2));
+    let (stiffness, both) = (p.get(P::LoadStiffnessNmRad), motor + load);
+    // c = 2 z wn Ir with wn = sqrt(k/Ir).
+    let damping = p.get(P::LoadDampingNmS) / ((stiffness * motor * load / both).sqrt() * 2.0);
+    Box::new(Coupling::new(stiffness.recip(), load / both, damping, both, context))
+}
+
 /// Largest angle of the swing that one tick may take, rad: what the integrator follows.
 const SWING_A_TICK_RAD: f64 = 0.4;
 

@@ -27,6 +27,23 @@ pub struct Scale {
     pub duration_s: f64,
 }
 
+impl Scale {
+    /// A rig of no size: names and units of parameters do not depend on it.
+    pub const ANY: Self = Self {
+        shaft_speed_rad_s: 1.0,
+        torque_n_m: 1.0,
+        thrust_n: 1.0,
+        flow_m_s: 1.0,
+        current_a: 1.0,
+        command: 1.0,
+        supply_v: 1.0,
+        winding_resistance_ohm: 1.0,
+        inertia_kg_m2: 1.0,
+        tick_s: 0.002,
+        duration_s: 1.0,
+    };
+}
+
 /// One parameter of an effect.
 ///
 /// Its prior is normal, cut off at the bounds, and wide: one rule for all. A strength's mean is zero and its

@@ -5,6 +5,7 @@
 mod drive;
 mod explicit;
 mod friction;
+mod load;
 mod measuring;
 mod observer;
 mod rates;
@@ -23,14 +24,14 @@ use measuring::Filters;
 use rates::Constants;
 use stiff::Stiff;
 
-use crate::effects::{Context, Descriptor, Effect};
+use crate::effects::{Context, Descriptor, Effect, flexible_coupling};
 use crate::models::ModelName;
 use crate::parameters::{Parameter as P, Parameters};
 use crate::real::Real;
-use crate::rig::{AmplifierKind, Rig, Sensors};
+use crate::rig::{AmplifierKind, Load, Rig, Sensors};
 
 /// Most continuous states of a plant: speed, flow, angle, swirl and those of the effects.
-const STATES: usize = 12;
+const STATES: usize = 28;
 const SPEED: usize = 0;
 const FLOW: usize = 1;
 const ANGLE: usize = 2;
@@ -38,6 +39,8 @@ const SWIRL: usize = 3;
 const OWN: usize = 4;
 /// Most states of the usual plant with an effect that has states.
 const FEW: usize = OWN + 2;
+/// Most states of a plant with several of them.
+const SOME: usize = OWN + 8;
 
 /// An effect at work, with the place of its states.
 struct Hooked<T> {
@@ -123,10 +126,11 @@ impl<T: Real> Decays<T> {
 }
 
 impl<T: Real> Plant<T> {
-    /// Sets a plant up at rest. `effects` are pairs of a catalogue entry and its parameter values.
+    /// Sets a plant up at rest, with its load and the effects that the rig is known to have. `effects` are pairs
+    /// of a catalogue entry and its parameter values; one that the rig has too takes its place.
     ///
     /// # Panics
-    /// If the effects together have more than eight continuous states, or an effect is given the
+    /// If the effects together have more than 24 continuous states, or an effect is given the
     /// wrong number of values: errors of the program, not of its input.
     pub fn new(
         model: ModelName,
@@ -136,11 +140,21 @@ impl<T: Real> Plant<T> {
         tick_s: f64,
     ) -> Self {
         let context = Context { parameters, rig, tick_s };
+        let built = |descriptor: &Descriptor, values: &[T]| T::build(descriptor, values, &context);
+        let given = |id: &str| effects.iter().any(|(descriptor, _)| descriptor.id == id);
+        let mut all: Vec<Box<dyn Effect<T>>> = Vec::new();
+        for known in rig.effects.iter().filter(|known| !given(known.effect)) {
+            let values: Vec<T> = known.values().map(T::from).collect();
+            all.extend(known.descriptor().map(|descriptor| built(descriptor, &values)));
+        }
+        all.extend(effects.iter().map(|(descriptor, values)| built(descriptor, values)));
+        if let Load::TwoMass { .. } = rig.load {
+            all.push(flexible_coupling::of_load(&context));
+        }
         let mut next = OWN;
-        let effects: Vec<Hooked<T>> = effects
-            .iter()
-            .map(|(descriptor, values)| {
-                let effect = T::build(descriptor, values, &context);
+        let effects: Vec<Hooked<T>> = all
+            .into_iter()
+            .map(|effect| {
                 let own = next..next + effect.states();
                 next = own.end;
                 assert!(next <= STATES, "too many effect states");
@@ -175,7 +189,7 @@ impl<T: Real> Plant<T> {
             sense_hooks: hooked(|h| h.sense),
             effects,
             used_states: next,
-            constants: Constants::new(&parameters, rig.propeller.is_none()),
+            constants: Constants::new(&parameters, rig),
             decays: Decays::new(parameters.get(P::TimeConstantS), &rig.sensors, tick_s),
             x: [T::ZERO; STATES],
             current_a: T::ZERO,
@@ -279,6 +293,7 @@ impl<T: Real> Plant<T> {
             (_, _, true, ..=OWN) => self.step_as::<true, true, OWN>(tick),
             (_, _, false, ..=FEW) => self.step_as::<true, false, FEW>(tick),
             (_, _, true, ..=FEW) => self.step_as::<true, true, FEW>(tick),
+            (.., ..=SOME) => self.step_as::<true, true, SOME>(tick),
             _ => self.step_as::<true, true, STATES>(tick),
         }
         self.pull(tick);

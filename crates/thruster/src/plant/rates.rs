@@ -1,10 +1,12 @@
 //! Rates of all states, and the loads they follow from.
 
+use super::load::Hanging;
 use super::{ANGLE, Balance, FLOW, Local, Plant, SPEED, SWIRL};
 use crate::blade::{BladeRow, Foil, Inflow, Swirl};
 use crate::models::ModelName;
 use crate::parameters::{Parameter as P, Parameters};
 use crate::real::Real;
+use crate::rig::Rig;
 
 /// Square of the speed through the water below which the blades do nothing and no effect is asked about
 /// them, m^2/s^2.
@@ -24,11 +26,13 @@ pub(super) struct Constants<T> {
     pub(super) resistance_ohm: T,
     viscous_nm_s: T,
     pub(super) yoerger_slip_m: T,
+    load: Hanging<T>,
     dry: bool,
 }
 
 impl<T: Real> Constants<T> {
-    pub(super) fn new(p: &Parameters<T>, dry: bool) -> Self {
+    pub(super) fn new(p: &Parameters<T>, rig: &Rig) -> Self {
+        let load = Hanging::new(&rig.load, p);
         let area = p.area_m2();
         let density = p.get(P::DensityKgM3);
         Self {
@@ -38,12 +42,13 @@ impl<T: Real> Constants<T> {
             density_kg_m3: density,
             added_mass_kg: p.duct_mass_kg() * p.get(P::AddedMassCoefficient),
             flux_kg_m: p.get(P::FluxCoefficient) * density * area,
-            inertia_kg_m2: p.get(P::InertiaKgM2),
+            inertia_kg_m2: p.get(P::InertiaKgM2) + load.inertia_kg_m2,
             torque_constant_nm_a: p.get(P::TorqueConstantNmA),
             resistance_ohm: p.get(P::WindingResistanceOhm),
             viscous_nm_s: p.get(P::ViscousFrictionNmS),
             yoerger_slip_m: p.get(P::Efficiency) * p.get(P::RadiusM) * p.get(P::PitchRad).tan(),
-            dry,
+            load,
+            dry: rig.propeller.is_none(),
         }
     }
 }
@@ -67,7 +72,7 @@ impl<T: Real> Plant<T> {
             added_mass_kg: c.added_mass_kg,
             flux_kg_m: c.flux_kg_m,
             ambient_m_s: T::from(at.ambient_m_s),
-            load_torque_n_m: T::ZERO,
+            load_torque_n_m: if c.load.pulls { c.load.torque_n_m(x[ANGLE], speed) } else { T::ZERO },
             friction_ahead_n_m: T::ZERO,
             friction_astern_n_m: T::ZERO,
             blade_torque_n_m: T::ZERO,
@@ -91,7 +96,8 @@ impl<T: Real> Plant<T> {
                 let force = c.density_kg_m3 * 2.0 * c.half_area_m2 * vp * vp.abs();
                 balance.thrust_n = force;
                 balance.blade_torque_n_m = force * 0.5 * c.yoerger_slip_m;
-                balance.inertia_kg_m2 = c.yoerger_slip_m * c.yoerger_slip_m * c.added_mass_kg;
+                balance.inertia_kg_m2 =
+                    c.yoerger_slip_m * c.yoerger_slip_m * c.added_mass_kg + c.load.inertia_kg_m2;
             }
             _ => self.blade_loads::<BLADE, N>(at, x, balance),
         }

@@ -4,6 +4,7 @@ mod delay;
 mod drive;
 mod effects;
 mod friction;
+mod load;
 mod observer;
 mod stiff;
 

@@ -133,20 +133,6 @@ struct Parameter {
 
 impl Entry {
     fn of(effect: &Descriptor) -> Self {
-        // Names and units do not depend on the rig.
-        let any = Scale {
-            shaft_speed_rad_s: 1.0,
-            torque_n_m: 1.0,
-            thrust_n: 1.0,
-            flow_m_s: 1.0,
-            current_a: 1.0,
-            command: 1.0,
-            supply_v: 1.0,
-            winding_resistance_ohm: 1.0,
-            inertia_kg_m2: 1.0,
-            tick_s: 0.002,
-            duration_s: 1.0,
-        };
         let role = |shape| if shape { "shape" } else { "strength" };
         Self {
             effect: effect.id,
@@ -157,7 +143,7 @@ impl Entry {
             confused_with: effect.confused_with,
             separated_by: effect.separated_by,
             reference: effect.reference,
-            parameters: (effect.parameters)(&any)
+            parameters: (effect.parameters)(&Scale::ANY)
                 .into_iter()
                 .map(|s| Parameter { name: s.name, unit: s.unit, role: role(s.shape) })
                 .collect(),

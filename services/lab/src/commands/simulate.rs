@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use clap::Args as ClapArgs;
 use kort_recording::{Format, Writer};
+use kort_scenario::{Replayed, Replays, Run, Scenario};
 use kort_thruster::rig::Rig;
-use kort_thruster::scenario::{self, Replayed, Replays, Run, Scenario};
 use serde::Serialize;
 
 use crate::failure::{Failure, Outcome, print, print_json};
@@ -130,7 +130,8 @@ fn read_scenario(wanted: &Path) -> Result<Scenario, Failure> {
     }
     serde_json::from_value(json.clone()).map_err(|e| {
         let tree = toml::Value::try_from(json).ok();
-        let said = tree.as_ref().and_then(scenario::complaint::<Scenario>).unwrap_or_else(|| e.to_string());
+        let said =
+            tree.as_ref().and_then(kort_scenario::complaint::<Scenario>).unwrap_or_else(|| e.to_string());
         fail(&format!("{said}\nhint: docs/recordings.md lists the keys of a scenario"))
     })
 }

@@ -5,12 +5,12 @@ use std::collections::BTreeMap;
 use kort_proto::config::{Config, ConfigError, Thruster};
 use kort_proto::messages::DriveKind;
 use kort_proto::signals::Signals;
+use kort_scenario::Measuring;
 use kort_thruster::effects::{self, Descriptor, Scale};
 use kort_thruster::models::ModelName;
 use kort_thruster::parameters::{Parameter, Parameters};
 use kort_thruster::plant::{Plant, Tick};
 use kort_thruster::rig::{AmplifierKind, Rig, Sensors};
-use kort_thruster::scenario::{self, Measuring};
 use serde::Deserialize;
 
 use super::{Amplifier, AmplifierFault};
@@ -76,7 +76,7 @@ impl Simulated {
         }
         let tick_s = thruster.servo_period_ns() as f64 * 1e-9;
         let parameters = Parameters::stated(rig);
-        let scale = scenario::scale(rig, &parameters, full_drive(rig, &parameters), tick_s, 60.0);
+        let scale = kort_scenario::scale(rig, &parameters, full_drive(rig, &parameters), tick_s, 60.0);
         let mut chosen = Vec::new();
         for effect in &keys.effects {
             chosen.push(resolve(effect, &scale).map_err(|words| fail("effects", words))?);

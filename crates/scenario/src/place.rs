@@ -87,7 +87,7 @@ fn at<'a>(tree: &'a mut Value, path: &[Step]) -> Option<&'a mut Value> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scenario::Scenario;
+    use crate::Scenario;
 
     #[test]
     fn the_key_meant_is_named_down_to_its_entry() {

@@ -4,9 +4,9 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::effects::Scale;
-use crate::plant::Sensed;
-use crate::rig::Sensors;
+use kort_thruster::effects::Scale;
+use kort_thruster::plant::Sensed;
+use kort_thruster::rig::Sensors;
 
 /// Usual standard deviations as shares of the largest value in use: a Hall current sensor, a
 /// strain-gauge load cell and torque transducer, an acoustic flow meter in a jet, a battery monitor.

@@ -1,9 +1,9 @@
 use super::super::NoReplays;
 use super::*;
-use crate::scenario::{EffectUse, Segment};
+use crate::{EffectUse, Segment};
 
 fn rig() -> Rig {
-    Rig::from_toml(include_str!("../../../../../config/thrusters/whitcomb-yoerger-1999.toml")).unwrap()
+    Rig::from_toml(include_str!("../../../../config/thrusters/whitcomb-yoerger-1999.toml")).unwrap()
 }
 
 fn scenario(segments: Vec<Segment>) -> Scenario {
@@ -59,7 +59,7 @@ fn the_same_seed_gives_the_same_rows_and_noise_can_be_off() {
 
 #[test]
 fn a_thrust_command_gives_that_thrust_on_every_drive() {
-    let text = include_str!("../../../../../config/thrusters/whitcomb-yoerger-1999.toml");
+    let text = include_str!("../../../../config/thrusters/whitcomb-yoerger-1999.toml");
     for kind in ["current", "voltage", "speed"] {
         let text = text
             .replace("kind = \"current\"", &format!("kind = \"{kind}\""))

@@ -5,11 +5,11 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::{Command, Excitation, Measuring, Replays, Scenario, ScenarioError, Turbulence};
-use crate::effects::{self, Descriptor, Scale, Spec};
-use crate::models::ModelName;
-use crate::parameters::{Parameter, Parameters};
-use crate::plant::{Plant, Sensed, Tick};
-use crate::rig::{AmplifierKind, Rig};
+use kort_thruster::effects::{self, Descriptor, Scale, Spec};
+use kort_thruster::models::ModelName;
+use kort_thruster::parameters::{Parameter, Parameters};
+use kort_thruster::plant::{Plant, Sensed, Tick};
+use kort_thruster::rig::{AmplifierKind, Rig};
 
 /// Control and log rates of a rig that states none, Hz.
 const CONTROL_RATE_HZ: f64 = 500.0;

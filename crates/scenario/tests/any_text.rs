@@ -1,8 +1,8 @@
 //! Whatever stands in a rig or a scenario, reading it gives a value or an error with a hint, never
 //! a panic.
 
+use kort_scenario::Scenario;
 use kort_thruster::rig::Rig;
-use kort_thruster::scenario::Scenario;
 use proptest::prelude::*;
 
 const RIG: &str = include_str!("../../../config/thrusters/whitcomb-yoerger-1999.toml");

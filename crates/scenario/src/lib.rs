@@ -18,8 +18,8 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::models::ModelName;
-use crate::parameters::Parameter;
+use kort_thruster::models::ModelName;
+use kort_thruster::parameters::Parameter;
 
 /// What the segments of a scenario's command mean.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

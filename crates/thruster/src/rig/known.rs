@@ -1,0 +1,154 @@
+//! Physics that a rig is known to have (`[[effects]]`): effects of the catalogue with their sizes.
+
+use serde::Serialize;
+
+use super::keys::{nearest, value_error};
+use super::read::quantity;
+use super::{Quantity, RigError};
+use crate::effects::{self, Descriptor, Scale, Spec};
+
+/// Most effects a rig may state, so that their states find room in a plant beside those that a fit tries.
+const MOST: usize = 8;
+
+/// One effect that is known to be there.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct KnownEffect {
+    /// Its identifier in the catalogue.
+    pub effect: &'static str,
+    /// All its values, in the order of its parameters.
+    pub parameters: Vec<(&'static str, Quantity)>,
+}
+
+impl KnownEffect {
+    /// Its entry in the catalogue.
+    pub fn descriptor(&self) -> Option<&'static Descriptor> {
+        effects::find(self.effect)
+    }
+
+    /// Its stated values, in the order of its parameters.
+    pub fn values(&self) -> impl Iterator<Item = f64> + '_ {
+        self.parameters.iter().map(|(_, quantity)| quantity.value)
+    }
+
+    /// A value by its name; zero if it has none of that name.
+    pub fn value(&self, name: &str) -> f64 {
+        self.parameters.iter().find(|(n, _)| *n == name).map_or(0.0, |(_, quantity)| quantity.value)
+    }
+}
+
+/// The list `[[effects]]`; empty without one.
+///
+/// A strength that is not stated is zero. A shape that is not stated stays at its usual value where what is
+/// stated makes sense without it (a form of the effect), and is missing otherwise.
+pub(super) fn read(table: &toml::Table) -> Result<Vec<KnownEffect>, RigError> {
+    let Some(list) = table.get("effects") else { return Ok(Vec::new()) };
+    let form = "a list: [[effects]] before each";
+    let hint = "write [[effects]], below it effect = \"coulomb_friction\" and its parameters";
+    let list = list.as_array().ok_or_else(|| value_error("effects", "a table or a value", form, hint))?;
+    if list.len() > MOST {
+        return Err(value_error("effects", list.len(), "at most 8 effects", "keep those that matter most"));
+    }
+    let mut known = Vec::<KnownEffect>::new();
+    for (k, entry) in list.iter().enumerate() {
+        let entry =
+            entry.as_table().ok_or_else(|| value_error(&format!("effects[{k}]"), entry, form, hint))?;
+        let one = read_one(&format!("effects[{k}]"), entry)?;
+        if known.iter().any(|other| other.effect == one.effect) {
+            let key = format!("effects[{k}].effect");
+            return Err(value_error(&key, one.effect, "each effect once", "put the values in one entry"));
+        }
+        known.push(one);
+    }
+    Ok(known)
+}
+
+fn read_one(at: &str, entry: &toml::Table) -> Result<KnownEffect, RigError> {
+    let key = format!("{at}.effect");
+    let id = match entry.get("effect") {
+        Some(toml::Value::String(id)) => id,
+        Some(other) => return Err(value_error(&key, other, "a text in quotes", "the effect's identifier")),
+        None => {
+            return Err(RigError::Missing { key, hint: "name it: effect = \"coulomb_friction\"".into() });
+        }
+    };
+    let Some(descriptor) = effects::find(id) else {
+        let ids = effects::ALL.iter().map(|d| d.id);
+        let hint = nearest(id, ids);
+        return Err(value_error(&key, id, "an identifier of the catalogue (`kort explain`)", &hint));
+    };
+    if descriptor.nonparametric {
+        let why = "changes freely with time and has no lasting sizes";
+        return Err(value_error(
+            &key,
+            id,
+            "an effect with lasting sizes",
+            &format!("{id} {why}; leave it out"),
+        ));
+    }
+    let specs = (descriptor.parameters)(&Scale::ANY);
+    if let Some(odd) = entry.keys().find(|k| *k != "effect" && specs.iter().all(|s| s.name != k.as_str())) {
+        let hint = nearest(odd, specs.iter().map(|s| s.name));
+        return Err(RigError::UnknownKey { key: format!("{at}.{odd}"), hint });
+    }
+    let stated: Vec<usize> = (0..specs.len()).filter(|k| entry.contains_key(specs[*k].name)).collect();
+    let mut parameters = Vec::new();
+    for (k, spec) in specs.iter().enumerate() {
+        let value = match entry.get(spec.name) {
+            Some(found) => {
+                let key = format!("{at}.{}", spec.name);
+                in_range(&key, quantity(&key, found)?, spec)?
+            }
+            None if !spec.shape => Quantity::exact(if spec.held { spec.mean } else { 0.0 }),
+            None if needed(descriptor, &specs, &stated, k) => {
+                let (key, name, unit) = (format!("{at}.{}", spec.name), spec.name, spec.unit);
+                return Err(RigError::Missing {
+                    key,
+                    hint: format!("add {name} = … [{unit}] to the effect"),
+                });
+            }
+            None => Quantity::exact(spec.mean),
+        };
+        parameters.push((spec.name, value));
+    }
+    if stated.iter().all(|k| specs[*k].shape) && specs.iter().any(|s| !s.shape && !s.held) {
+        let names: Vec<_> = specs.iter().filter(|s| !s.shape).map(|s| s.name).collect();
+        let hint = format!("the effect is nothing without one of {}", names.join(", "));
+        return Err(RigError::Missing { key: format!("{at}.{}", names[0]), hint });
+    }
+    Ok(KnownEffect { effect: descriptor.id, parameters })
+}
+
+/// A value whose sign the effect allows; how large it may be depends on the rig.
+fn in_range(key: &str, quantity: Quantity, spec: &Spec) -> Result<Quantity, RigError> {
+    let value = quantity.value;
+    let (allowed, fits) = if spec.low > 0.0 {
+        ("above 0", value > 0.0)
+    } else if spec.low == 0.0 {
+        ("0 or above", value >= 0.0)
+    } else {
+        ("a finite number", true)
+    };
+    if fits && value.is_finite() {
+        Ok(quantity)
+    } else {
+        Err(value_error(
+            key,
+            value,
+            &format!("{allowed} [{}]", spec.unit),
+            "`kort explain` tells its equation",
+        ))
+    }
+}
+
+/// Whether the shape at this place must be stated, with those that are.
+fn needed(effect: &Descriptor, specs: &[Spec], stated: &[usize], place: usize) -> bool {
+    if specs[place].held {
+        // It belongs to the strengths that follow it up to the next of its kind, or to all.
+        let group = specs[place + 1..].iter().take_while(|s| !s.held).count();
+        return group == 0 || stated.iter().any(|k| *k > place && *k <= place + group);
+    }
+    let fits = |form: &Vec<usize>| stated.iter().all(|k| specs[*k].held || form.contains(k));
+    let forms = effect.forms(specs);
+    let fitting: Vec<_> = forms.iter().filter(|form| fits(form)).collect();
+    fitting.iter().all(|form| form.contains(&place))
+}
