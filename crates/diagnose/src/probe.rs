@@ -69,42 +69,54 @@ pub fn probe(problem: &Problem, baseline: &Fit, effect: &'static Descriptor) -> 
         return vec![Probe { member: whole, sizes, always: None }];
     }
     let strengths: Vec<usize> = (0..specs.len()).filter(|j| !specs[*j].shape && !specs[*j].held).collect();
+    let action = |values: Vec<f64>| {
+        let hypothesis = baseline.hypothesis.with(&baseline.values, whole.clone().at(values), &problem.scale);
+        let action = &baseline.lines - problem.residual_lines(&hypothesis, &hypothesis.start);
+        action.iter().all(|v| v.is_finite()).then_some(action)
+    };
+    let alone = |start: &[f64], only: usize| {
+        let mut values = start.to_vec();
+        strengths.iter().filter(|j| **j != only).for_each(|j| values[*j] = 0.0);
+        if values[only] == 0.0 { None } else { action(values) }
+    };
     let mut starts = (effect.starts)(&problem.scale);
     starts.insert(0, whole.values.clone());
-    for times in LARGER {
-        let mut larger = starts[0].clone();
-        for j in &strengths {
-            larger[*j] = (times * larger[*j]).clamp(0.6 * specs[*j].low, 0.6 * specs[*j].high);
-        }
-        starts.push(larger);
-    }
-    starts
+    let mut probes: Vec<Probe> = starts
         .into_par_iter()
         .filter_map(|start| {
-            let alone = |only: &usize| {
-                let mut values = start.clone();
-                strengths.iter().filter(|j| *j != only).for_each(|j| values[*j] = 0.0);
-                if values[*only] == 0.0 {
-                    return None;
-                }
-                let member = whole.clone().at(values);
-                let hypothesis = baseline.hypothesis.with(&baseline.values, member, &problem.scale);
-                let action = &baseline.lines - problem.residual_lines(&hypothesis, &hypothesis.start);
-                action.iter().all(|v| v.is_finite()).then_some((*only, action))
-            };
-            let sizes: Vec<_> = strengths.iter().filter_map(alone).collect();
-            let member = whole.clone().at(start);
-            if !strengths.is_empty() {
-                return (!sizes.is_empty()).then_some(Probe { member, sizes, always: None });
+            let member = whole.clone().at(start.clone());
+            if strengths.is_empty() {
+                // Without a size it is there or not.
+                return Some(Probe { member, sizes: Vec::new(), always: Some(action(start)?) });
             }
-            // Without a size it is there or not.
-            let hypothesis = baseline.hypothesis.with(&baseline.values, member.clone(), &problem.scale);
-            let action = &baseline.lines - problem.residual_lines(&hypothesis, &hypothesis.start);
-            let finite = action.iter().all(|v| v.is_finite());
-            finite.then_some(Probe { member, sizes, always: Some(action) })
+            let sizes: Vec<_> = strengths.iter().filter_map(|j| Some((*j, alone(&start, *j)?))).collect();
+            (!sizes.is_empty()).then_some(Probe { member, sizes, always: None })
         })
-        .collect()
+        .collect();
+    let Some(first) = probes.first().filter(|p| p.always.is_none()) else { return probes };
+    // What is not in proportion to its size is probed at larger ones.
+    let larger = |(j, small): &(usize, DVector<f64>)| {
+        let mut more = Vec::new();
+        for times in LARGER {
+            let mut start = whole.values.clone();
+            start[*j] = (times * start[*j]).clamp(0.6 * specs[*j].low, 0.6 * specs[*j].high);
+            let ratio = start[*j] / whole.values[*j];
+            let Some(action) = alone(&start, *j) else { break };
+            let in_proportion = (&action - small * ratio).norm() < BENDS * action.norm();
+            if in_proportion {
+                break;
+            }
+            more.push(Probe { member: whole.clone().at(start), sizes: vec![(*j, action)], always: None });
+        }
+        more
+    };
+    let more: Vec<Probe> = first.sizes.par_iter().flat_map_iter(larger).collect();
+    probes.extend(more);
+    probes
 }
+
+/// Departure from proportion to its size, as a share, that makes an action worth probing at larger ones.
+const BENDS: f64 = 0.05;
 
 /// The best that an effect's probes promise on top of a set, with all of its sizes or one alone. `known` are
 /// the products of the set's own derivatives.
@@ -120,10 +132,7 @@ pub fn promise(problem: &Problem, parent: &Fit, known: &[DMatrix<f64>], probes: 
             };
             alone.into_iter().chain(std::iter::once(every)).map(move |form| (probe, form))
         })
-        .flat_map(|(probe, form)| {
-            let lively = if form.len() > MOST_ALONE { &LIVELINESS[..] } else { &LIVELINESS[..1] };
-            lively.iter().filter_map(move |l| of_form(problem, parent, known, probe, &form, *l))
-        })
+        .filter_map(|(probe, form)| of_form(problem, parent, known, probe, &form))
         .min_by(|a, b| a.cost.total_cmp(&b.cost))
 }
 
@@ -139,13 +148,12 @@ fn of_form(
     known: &[DMatrix<f64>],
     probe: &Probe,
     form: &[usize],
-    liveliness: f64,
 ) -> Option<Promise> {
     let specs = (probe.member.effect.parameters)(&problem.scale);
     let mut free = parent.hypothesis.free.clone();
     let mut columns: Vec<&DVector<f64>> = parent.columns.iter().flatten().map(AsRef::as_ref).collect();
     let mut values = parent.values.clone();
-    let mut member = Member { liveliness, ..probe.member.clone() };
+    let mut member = probe.member.clone();
     let alone = parent.hypothesis.with(&parent.values, member.clone(), &problem.scale);
     for k in form {
         let (place, action) = &probe.sizes[*k];
@@ -168,24 +176,39 @@ fn of_form(
         None => parent.lines.clone(),
     };
     let model = Quadratic::extended(&problem.spectrum, &problem.criterion, &lines, &columns, &free, known);
-    let mut actions = parent.actions.clone();
-    actions.push(vec![0.0; problem.spectrum.bands.len()]);
-    let mut found = None;
-    // Twice: the form error of what the effect does is known once its size is.
-    for _ in 0..2 {
-        let floor = problem.floor.with_actions(&actions, &problem.criterion);
-        let minimum = model.minimise(&floor, &free, &values, 0.0);
-        let mut acts = probe.always.clone().unwrap_or_else(|| DVector::zeros(problem.spectrum.lines));
-        for (i, k) in form.iter().enumerate() {
-            let at = free_len(parent) + i;
-            acts.axpy(minimum.step[at] * free[at].sigma, &probe.sizes[*k].1, 1.0);
+    let lively = if form.len() > MOST_ALONE { &LIVELINESS[..] } else { &LIVELINESS[..1] };
+    let tried = lively.iter().filter_map(|liveliness| {
+        let mut free = free.clone();
+        free[free_len(parent)..].iter_mut().for_each(|f| f.sigma *= liveliness);
+        let narrowed;
+        let model = if *liveliness == 1.0 {
+            &model
+        } else {
+            narrowed = model.scaled(free_len(parent), *liveliness);
+            &narrowed
+        };
+        let mut actions = parent.actions.clone();
+        actions.push(vec![0.0; problem.spectrum.bands.len()]);
+        let mut found = None;
+        // Twice: the form error of what the effect does is known once its size is.
+        for _ in 0..2 {
+            let floor = problem.floor.with_actions(&actions, &problem.criterion);
+            let minimum = model.minimise(&floor, &free, &values, 0.0);
+            let mut acts = probe.always.clone().unwrap_or_else(|| DVector::zeros(problem.spectrum.lines));
+            for (i, k) in form.iter().enumerate() {
+                let at = free_len(parent) + i;
+                acts.axpy(minimum.step[at] * free[at].sigma, &probe.sizes[*k].1, 1.0);
+            }
+            let last = actions.len() - 1;
+            actions[last] = problem.spectrum.powers(&acts);
+            found = Some(minimum);
         }
-        let last = actions.len() - 1;
-        actions[last] = problem.spectrum.powers(&acts);
-        found = Some(minimum);
-    }
-    let found = found?;
-    let price = model.price(&found.noise);
+        let found = found?;
+        let cost = found.misfit + found.penalty + model.price(&found.noise);
+        Some((cost, *liveliness, found, free))
+    });
+    let (cost, liveliness, found, free) = tried.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    member.liveliness = liveliness;
     for (j, spec) in specs.iter().enumerate() {
         if spec.shape || spec.held {
             continue;
@@ -211,7 +234,7 @@ fn of_form(
     for j in &probed.held {
         probed.values[*j] = member.values[*j];
     }
-    Some(Promise { cost: found.misfit + found.penalty + price, member, probed })
+    Some(Promise { cost, member, probed })
 }
 
 fn free_len(parent: &Fit) -> usize {

@@ -25,6 +25,8 @@ pub struct Screened {
     pub action: Vec<f64>,
 }
 
+/// What a closer look may gain beyond a probe's promise.
+const HOPE: f64 = 10.0;
 /// Effects looked at closely on top of one set.
 const CLOSELY: usize = 10;
 
@@ -34,6 +36,7 @@ pub fn screen(problem: &Problem, parent: &Fit, probes: &[&[Probe]]) -> Vec<Scree
     let known = known.curvature();
     let mut promises: Vec<Promise> =
         probes.par_iter().filter_map(|probes| promise(problem, parent, known, probes)).collect();
+    promises.retain(|p| p.cost < parent.cost() + HOPE);
     promises.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     promises.truncate(CLOSELY);
     let best_of = |p: Promise| {

@@ -37,7 +37,7 @@ pub struct Minimum {
 /// Rounds of learning the noise and stepping.
 const ROUNDS: usize = 40;
 /// Rounds end where the merit falls by less than this.
-const ENOUGH: f64 = 0.01;
+const ENOUGH: f64 = 0.03;
 
 impl<'a> Quadratic<'a> {
     /// From a residual (measured less simulated) and the response's derivatives, all as lines.
@@ -89,6 +89,20 @@ impl<'a> Quadratic<'a> {
             curvature.push(gram);
         }
         Self { spectrum, criterion, residual: squares, slope, curvature }
+    }
+
+    /// The same with the last parameters' priors wider or narrower by a factor.
+    pub fn scaled(&self, from: usize, factor: f64) -> Self {
+        let mut slope = self.slope.clone();
+        let mut curvature = self.curvature.clone();
+        for (s, c) in slope.iter_mut().zip(&mut curvature) {
+            for k in from..s.len() {
+                s[k] *= factor;
+                c.row_mut(k).scale_mut(factor);
+                c.column_mut(k).scale_mut(factor);
+            }
+        }
+        Self { residual: self.residual.clone(), slope, curvature, ..*self }
     }
 
     /// Products of the derivatives by band.
