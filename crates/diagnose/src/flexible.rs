@@ -62,8 +62,10 @@ fn curve<T: Real>(values: &[T], points: &[f64; POINTS], at: T) -> T {
 
 /// Heights of a curve, each about as large as `size` may be, then the reach it is laid over.
 fn heights(unit: &'static str, size: f64, reach: f64) -> Vec<Spec> {
-    let mut specs: Vec<Spec> =
-        NAMES.iter().map(|name| Spec::strength(name, unit, 0.2 * size, -20.0 * size, 20.0 * size)).collect();
+    let mut specs: Vec<Spec> = NAMES
+        .iter()
+        .map(|name| Spec::strength(name, unit, 0.2 * size, -20.0 * size, 20.0 * size).sigma(size))
+        .collect();
     specs.push(Spec::held("reach", "1", reach, reach, reach));
     specs
 }
@@ -312,7 +314,8 @@ const SHAFT_STEP: Descriptor = Descriptor {
     forms: &[],
     parameters: |s| {
         vec![
-            Spec::strength("torque_n_m", "N m", 0.02 * s.torque_n_m, -s.torque_n_m, s.torque_n_m),
+            Spec::strength("torque_n_m", "N m", 0.02 * s.torque_n_m, -s.torque_n_m, s.torque_n_m)
+                .sigma(0.1 * s.torque_n_m),
             Spec::shape("from_s", "s", 0.5 * s.duration_s, 0.0, s.duration_s),
         ]
     },

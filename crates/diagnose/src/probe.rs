@@ -124,15 +124,17 @@ pub fn promise(problem: &Problem, parent: &Fit, known: &[DMatrix<f64>], probes: 
     probes
         .iter()
         .flat_map(|probe| {
-            let every: Vec<usize> = (0..probe.sizes.len()).collect();
-            let alone = if every.len() > 1 && probe.sizes.len() <= MOST_ALONE {
-                every.iter().map(|k| vec![*k]).collect()
-            } else {
-                Vec::new()
+            let specs = (probe.member.effect.parameters)(&problem.scale);
+            let forms = probe.member.effect.forms(&specs);
+            let of = move |form: Vec<usize>| {
+                let sizes: Vec<usize> =
+                    (0..probe.sizes.len()).filter(|k| form.contains(&probe.sizes[*k].0)).collect();
+                (probe, form, sizes)
             };
-            alone.into_iter().chain(std::iter::once(every)).map(move |form| (probe, form))
+            forms.into_iter().map(of)
         })
-        .filter_map(|(probe, form)| of_form(problem, parent, known, probe, &form))
+        .filter(|(probe, _, sizes)| !sizes.is_empty() || probe.always.is_some())
+        .filter_map(|(probe, form, sizes)| of_form(problem, parent, known, probe, &form, &sizes))
         .min_by(|a, b| a.cost.total_cmp(&b.cost))
 }
 
@@ -147,6 +149,7 @@ fn of_form(
     parent: &Fit,
     known: &[DMatrix<f64>],
     probe: &Probe,
+    places: &[usize],
     form: &[usize],
 ) -> Option<Promise> {
     let specs = (probe.member.effect.parameters)(&problem.scale);
@@ -211,6 +214,11 @@ fn of_form(
     member.liveliness = liveliness;
     for (j, spec) in specs.iter().enumerate() {
         if spec.shape || spec.held {
+            // A shape that belongs to what the form leaves out says nothing.
+            if !spec.held && !places.contains(&j) {
+                member.held.push(j);
+                member.values[j] = spec.mean;
+            }
             continue;
         }
         let in_form = form.iter().position(|k| probe.sizes[*k].0 == j);

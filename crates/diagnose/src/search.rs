@@ -58,10 +58,16 @@ impl<'a, 'p> Search<'a, 'p> {
 
     /// Cost of a set: of its fit, and of the prior odds of each effect.
     pub fn cost(&self, set: &Set) -> f64 {
-        self.fits.get(set).map_or(f64::INFINITY, |fit| fit.cost() + self.per_effect() * set.len() as f64)
+        self.fits.get(set).map_or(f64::INFINITY, |fit| fit.cost() + self.prior(set))
     }
 
-    /// Cost of one more effect: one of the catalogue at equal odds, and what chance alone may gain.
+    /// Cost of a set's effects before any data: rare physics costs more than common.
+    fn prior(&self, set: &Set) -> f64 {
+        let of = |id: &&'static str| self.descriptor(id).map_or(1.0, |d| d.commonness);
+        set.iter().map(|id| self.per_effect() - 2.0 * of(id).ln()).sum()
+    }
+
+    /// Cost of one more effect of average odds: one of the catalogue at equal odds, and what chance alone may gain.
     pub fn per_effect(&self) -> f64 {
         2.0 * (self.effects.len().max(1) as f64).ln() + self.constants.per_effect
     }
@@ -221,11 +227,13 @@ impl<'a, 'p> Search<'a, 'p> {
         let best = screened.first().map_or(f64::INFINITY, |s| s.cost);
         // What a screen promises is off by a share of the gain where the response bends.
         let doubt = self.constants.rivals + SCREEN_DOUBT * (parent.cost() - best).max(0.0);
-        let prior = self.per_effect() * (set.len() + 1) as f64;
+        let prior = self.prior(set) + self.per_effect();
         let chosen: Vec<&Screened> = screened
             .iter()
             .take(self.constants.exact)
-            .filter(|s| s.cost < best + doubt && s.cost + prior < bar + doubt)
+            .filter(|s| {
+                s.cost < best + doubt && s.cost + prior - 2.0 * s.effect.commonness.ln() < bar + doubt
+            })
             .collect();
         let sets: Vec<Set> = chosen.iter().map(|s| with(s.effect)).collect();
         let new: Vec<(Set, Fit)> = chosen

@@ -6,7 +6,7 @@
 
 use std::sync::Arc;
 
-use kort_thruster::effects::{Descriptor, Scale, Spec, Stretch};
+use kort_thruster::effects::{Descriptor, Scale, Stretch};
 use kort_thruster::models::ModelName;
 use kort_thruster::parameters::{Parameter as P, Parameters};
 use kort_thruster::rig::{Quantity, Rig};
@@ -254,14 +254,14 @@ impl Hypothesis {
             if member.held.contains(&j) {
                 continue;
             }
-            let (mean, sigma) = prior(&spec);
+            let sigma = if spec.acts.is_some() { spec.sigma * member.liveliness } else { spec.sigma };
             larger.free.push(Free {
                 target: Target::Effect(slot, j),
                 name: spec.name,
                 unit: spec.unit,
                 stated: false,
-                mean,
-                sigma: if spec.acts.is_some() { sigma * member.liveliness } else { sigma },
+                mean: spec.mean,
+                sigma,
                 low: spec.low,
                 high: spec.high,
                 acts: spec.acts,
@@ -294,17 +294,4 @@ impl Hypothesis {
     pub fn penalty(&self, values: &[f64]) -> f64 {
         self.free.iter().zip(values).map(|(f, v)| f.score(*v).powi(2)).sum()
     }
-}
-
-/// Prior mean and standard deviation of an effect's value.
-fn prior(spec: &Spec) -> (f64, f64) {
-    if spec.acts.is_some() {
-        return (0.0, 0.3 * spec.high);
-    }
-    if spec.shape {
-        let sigma =
-            (0.7 * spec.start.abs()).max(0.1 * (spec.high - spec.low)).min(0.5 * (spec.high - spec.low));
-        return (spec.start, sigma);
-    }
-    (0.0, (5.0 * spec.start.abs()).min(0.5 * (spec.high - spec.low)))
 }
