@@ -49,7 +49,8 @@ impl Floor {
             starts = !band.continues;
             moving = moving.max(band.signal * band.hz * band.hz);
             let form = criterion.form_error.powi(2) * moving / (band.hz * band.hz);
-            let timing = (std::f64::consts::TAU * band.hz * criterion.timing_s).powi(2) * band.signal;
+            let timing_s = criterion.timing_s.hypot(band.stale_s);
+            let timing = (std::f64::consts::TAU * band.hz * timing_s).powi(2) * band.signal;
             floor.push(band.quantisation + form + timing + ROUNDING);
         }
         Self(floor)
@@ -126,6 +127,7 @@ mod tests {
                 hz: 0.01 * 1.585_f64.powi(k as i32),
                 signal: if k == 3 { 1.0 } else { 1e-12 },
                 quantisation: 0.0,
+                stale_s: 0.0,
                 continues: k < 11,
             })
             .collect()

@@ -27,6 +27,9 @@ pub struct Band {
     pub signal: f64,
     /// Variance of the channel's quantisation, in full scales.
     pub quantisation: f64,
+    /// Doubt of the samples' instants beyond that of the stamps, s: a sensor slower than the log shows each
+    /// sample at the next row.
+    pub stale_s: f64,
     /// Whether the next band continues this channel at higher frequency.
     pub continues: bool,
 }
@@ -84,6 +87,8 @@ impl Spectrum {
                 let less = frame.less.map(|c| recording.channels[c].values.as_slice());
                 frame.transform(&channel.values, less, &mut signal);
                 let quantisation = (quantum(&channel.values) / channel.full_scale).powi(2) / 12.0;
+                let row_s = median_interval(&recording.time_s);
+                let stale_s = if interval_s > 1.5 * row_s { 0.5 * row_s } else { 0.0 };
                 let ranges = band_ranges(n);
                 for (i, range) in ranges.iter().enumerate() {
                     let power: f64 = signal[range.clone()].iter().map(|v| v * v).sum();
@@ -94,6 +99,7 @@ impl Spectrum {
                         hz: middle / (2.0 * n as f64 * interval_s),
                         signal: power / range.len() as f64,
                         quantisation,
+                        stale_s,
                         continues: i + 1 < ranges.len(),
                     });
                 }
