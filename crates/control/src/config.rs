@@ -167,8 +167,10 @@ impl Tunable {
             n if n.starts_with("swirl") => law == LawKind::RotationalFlowInversion,
             n if n.starts_with("look_ahead") => law == LawKind::LookAhead,
             n if n.starts_with("adaptation") => config.estimator != EstimatorKind::Off,
-            "ambient_std_m_s" | "ambient_time_s" | "load_std" | "load_time_s" | "thrust_std"
-            | "flow_std_m_s" => config.observer != ObserverKind::OpenLoop,
+            "ambient_std_m_s" | "ambient_time_s" | "load_std" | "load_time_s" | "blade_load_std"
+            | "blade_load_time_s" | "thrust_std" | "flow_std_m_s" => {
+                config.observer != ObserverKind::OpenLoop
+            }
             _ => true,
         }
     }
@@ -213,6 +215,8 @@ pub const TUNABLES: &[Tunable] = tunables! {
     "ambient_time_s" ["s"] 0.1..1000000.0 "time over which ambient flow forgets itself" => observers.ambient_time_s;
     "load_std" ["1"] 0.00001..1.0 "unexplained load over the largest motor torque" => observers.load_std;
     "load_time_s" ["s"] 0.1..1000000.0 "time over which unexplained load forgets itself" => observers.load_time_s;
+    "blade_load_std" ["1"] 0.00001..1.0 "error of the blades' torque at top speed over the largest motor torque" => observers.blade_load_std;
+    "blade_load_time_s" ["s"] 0.1..1000000.0 "time over which that error forgets itself" => observers.blade_load_time_s;
     "thrust_std" ["1"] 0.00001..10.0 "noise of force sensor and thrust model over the largest thrust" => observers.thrust_std;
     "flow_std_m_s" ["m/s"] 0.0001..100.0 "noise of one flow meter reading" => observers.flow_std_m_s;
     "adaptation_gain_per_s" ["1/s"] 0.0..50.0 "gain of the gradient" => adaptation.gain_per_s;

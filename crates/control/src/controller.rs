@@ -173,7 +173,7 @@ impl Controller {
                 self.limited = false;
                 self.last_speed_rad_s = speed;
                 return Output {
-                    command: self.command(0.0, 0.0, speed, &measured, &mut limits),
+                    command: self.command(0.0, 0.0, &estimate, &measured, &mut limits),
                     estimate,
                     limits,
                     thrust_reference_n: None,
@@ -224,7 +224,7 @@ impl Controller {
             || limits.contains(Limit::Voltage)
             || limits.contains(Limit::AntiSpin);
         self.last_speed_rad_s = speed;
-        let command = self.command(applied, demand.speed_rad_s, speed, &measured, &mut limits);
+        let command = self.command(applied, demand.speed_rad_s, &estimate, &measured, &mut limits);
         Output {
             command,
             estimate,
@@ -339,11 +339,13 @@ impl Controller {
         &self,
         current_a: f64,
         target: f64,
-        speed: f64,
+        estimate: &Estimate,
         measured: &Measurement,
         limits: &mut LimitSet,
     ) -> DriveCommand {
         let model = &self.model;
+        // The back-EMF is that of the speed itself, not of what its filter shows later.
+        let speed = estimate.shaft_speed_rad_s.value;
         match model.amplifier {
             AmplifierKind::Current => DriveCommand { current_a, ..DriveCommand::default() },
             AmplifierKind::Voltage => {

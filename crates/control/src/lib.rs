@@ -15,6 +15,7 @@
 //! suites in `tests/` reach every one.
 
 pub mod about;
+pub mod advice;
 pub mod config;
 pub mod controller;
 pub mod estimators;
@@ -25,6 +26,7 @@ pub mod observers;
 pub mod signals;
 
 pub use about::About;
+pub use advice::{Advice, TimeScales, advise};
 pub use config::{ConfigError, ControllerConfig, TUNABLES, Tunable};
 pub use controller::{Controller, Output};
 pub use estimators::EstimatorKind;

@@ -329,6 +329,16 @@ impl ControlModel {
         viscous + self.coulomb_friction_n_m * speed_rad_s / (speed_rad_s.abs() + knee)
     }
 
+    /// Which way the shaft turns, -1 to 1: smoothed over a hundredth of top speed.
+    pub fn sense(&self, speed_rad_s: f64) -> f64 {
+        speed_rad_s / (speed_rad_s.abs() + 0.01 * self.speed_max_rad_s)
+    }
+
+    /// Shaft speed squared with its sign, as a share of top speed's: how the blades' torque grows.
+    pub fn square(&self, speed_rad_s: f64) -> f64 {
+        speed_rad_s * speed_rad_s.abs() / (self.speed_max_rad_s * self.speed_max_rad_s)
+    }
+
     /// Thrust and torque at a shaft speed, flow and swirl.
     pub fn load(&self, speed_rad_s: f64, flow_m_s: f64, swirl_m_s: f64) -> BladeLoad {
         self.row.load(self.row.lever_m * speed_rad_s - swirl_m_s, flow_m_s)

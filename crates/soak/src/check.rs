@@ -16,6 +16,7 @@ impl Scenario {
         within("settle_s", self.settle_s, 0.0, 0.9 * self.duration_s, "shorter than the run")?;
         within("control_rate_hz", self.control_rate_hz, 50.0, 10_000.0, "1000 is usual")?;
         within("seeds", f64::from(self.seeds), 1.0, 1000.0, "4 gives a first interval")?;
+        within("aim_of_plain", self.aim_of_plain, 0.01, 10.0, "0.5 for half the plain law's thrust error")?;
         within("truth.spread", self.truth.spread, 0.0, 0.5, "0.05 for five percent")?;
         within("noise.thrust", self.noise.thrust, 0.0, 1.0, "share of the largest thrust")?;
         within("noise.flow", self.noise.flow, 0.0, 2.0, "share of the flow")?;

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use crate::limits;
+use crate::run::Prepared;
 use crate::score::{Outcome, SCORES, Window};
 use crate::summary::{Score, summarise, summarise_ratios};
 use crate::verdict::verdict;
@@ -62,7 +64,9 @@ impl LawResult {
     /// would honour a law for thrust it does not give.
     pub fn efficient(&self, laws: &[Self]) -> bool {
         let better = |o: &Self, score| o.mean(score) < self.mean(score);
-        !laws.iter().any(|o| better(o, "thrust_rms_n") && better(o, "energy_per_impulse_j_n_s"))
+        let told = self.name == limits::NAME;
+        let mut others = laws.iter().filter(|o| o.name != limits::NAME);
+        !told && !others.any(|o| better(o, "thrust_rms_n") && better(o, "energy_per_impulse_j_n_s"))
     }
 }
 
@@ -72,6 +76,10 @@ pub struct ScenarioResult {
     pub name: String,
     /// What it is for.
     pub what: String,
+    /// Name of the rig.
+    pub rig: String,
+    /// What the default law is held to, thrust error over the plain law's.
+    pub aim_of_plain: f64,
     /// Largest steady thrust, N.
     pub thrust_max_n: f64,
     /// Its controllers, in the order asked for.
@@ -82,14 +90,28 @@ pub struct ScenarioResult {
 
 impl ScenarioResult {
     /// With its verdict.
-    pub fn new(name: &str, what: &str, thrust_max_n: f64, laws: Vec<LawResult>) -> Self {
-        let verdict = verdict(&laws);
-        Self { name: name.into(), what: what.into(), thrust_max_n, laws, verdict }
+    pub fn new(prepared: &Prepared, laws: Vec<LawResult>) -> Self {
+        let scenario = prepared.scenario;
+        Self {
+            name: scenario.name.clone(),
+            what: scenario.what.clone(),
+            rig: prepared.rig.name.clone(),
+            aim_of_plain: scenario.aim_of_plain,
+            thrust_max_n: prepared.thrust_max_n,
+            verdict: verdict(&laws),
+            laws,
+        }
+    }
+
+    /// A law by name.
+    pub fn law(&self, name: &str) -> Option<&LawResult> {
+        self.laws.iter().find(|l| l.name == name)
     }
 
     /// The law with the least thrust error.
     pub fn best(&self) -> Option<&LawResult> {
-        self.laws.iter().min_by(|a, b| a.mean("thrust_rms_n").total_cmp(&b.mean("thrust_rms_n")))
+        let laws = self.laws.iter().filter(|l| l.name != limits::NAME);
+        laws.min_by(|a, b| a.mean("thrust_rms_n").total_cmp(&b.mean("thrust_rms_n")))
     }
 
     /// A score, or the thrust error over the plain law's.
@@ -99,6 +121,6 @@ impl ScenarioResult {
 
     /// The plain law, if it ran.
     pub fn plain(&self) -> Option<&LawResult> {
-        self.laws.iter().find(|l| l.name == PLAIN)
+        self.law(PLAIN)
     }
 }

@@ -13,10 +13,12 @@ mod check;
 mod comparison;
 mod disc;
 mod faults;
+pub mod limits;
 mod reference;
 mod run;
 mod scenario;
 mod score;
+mod script;
 mod sea;
 mod sensors;
 mod summary;
@@ -29,8 +31,8 @@ pub use disc::Disc;
 pub use reference::{Player, Replayed};
 pub use run::{Knows, Prepared, Progress, run, stream};
 pub use scenario::{
-    Ambient, Change, Channel, Depth, EffectSpec, Fitted, Lie, Noise, ProcessFault, ProcessFaultKind, Sag,
-    Scenario, Segment, SensorFault, Truth,
+    Ambient, Change, Channel, Depth, EffectSpec, Fitted, Lie, NEVER_WORSE, Noise, ProcessFault,
+    ProcessFaultKind, Sag, Scenario, Segment, SensorFault, Truth,
 };
 pub use score::{Outcome, Point, SCORES, Sample, Tally, Window};
 pub use summary::{Score, summarise, summarise_ratios};

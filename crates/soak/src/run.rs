@@ -1,20 +1,18 @@
 //! One controller through one scenario with one seed, on virtual time.
 
-use std::collections::HashMap;
-
 use kort_control::{ControllerConfig, Limit, ModelError};
 use kort_thruster::parameters::{Parameter, Parameters};
-use kort_thruster::plant::{Plant, Tick};
+use kort_thruster::plant::Plant;
 use kort_thruster::rig::{AmplifierKind, Rig};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use crate::chain::{Chain, Driven};
+use crate::chain::Chain;
 use crate::faults::{Faults, Process};
-use crate::reference::{Player, Replayed};
+use crate::reference::Replayed;
 use crate::scenario::Scenario;
 use crate::score::{Outcome, Sample, Tally};
-use crate::sea::{Now, STEP_S, Sea};
+use crate::script::{Moment, Script};
 use crate::sensors::Sensors;
 use crate::truth;
 
@@ -111,37 +109,20 @@ impl<'a, C: Chain> Bench<'a, C> {
     }
 
     fn run(mut self, progress: Progress) -> Result<Outcome, ModelError> {
-        let scenario = self.prepared.scenario;
-        let rig = self.prepared.rig;
-        let scale = self.prepared.thrust_max_n;
-        let mut player = Player::new(&scenario.references, self.prepared.replayed, stream(self.seed, 1));
-        let mut sea = Sea::new(
-            &scenario.ambient,
-            scenario.depth,
-            &scenario.supply_sags,
-            rig.amplifier.supply_v,
-            stream(self.seed, 2),
-        );
-        let mut tally = Tally::new(self.dt, rig, scale, scenario.settle_s);
+        let (prepared, scenario) = (self.prepared, self.prepared.scenario);
+        let mut script = Script::new(prepared, self.seed);
+        let mut tally = Tally::new(self.dt, prepared.rig, prepared.thrust_max_n, scenario.settle_s);
         let ticks = (scenario.duration_s / self.dt).round() as u64;
-        let (mut sea_from, mut sea_to) = (Now::default(), sea.at(0.0));
-        let mut sea_time = -STEP_S;
         let changes = if self.knows == Knows::Stated { scenario.truth.change.as_slice() } else { &[] };
         let mut changes = changes.iter().peekable();
         let report_every = (ticks / 200).max(1);
         for k in 0..ticks {
-            let time = k as f64 * self.dt;
-            if time >= sea_time + STEP_S {
-                sea_time += STEP_S;
-                sea_from = sea_to;
-                sea_to = sea.at(sea_time + STEP_S);
+            let moment = script.next(k as f64 * self.dt);
+            if let Some(change) = changes.next_if(|c| moment.time_s >= c.at_s) {
+                truth::change(&mut self.truth, &change.factors);
+                self.plant = truth::changed(prepared, &self.truth, &self.plant, self.dt);
             }
-            if let Some(change) = changes.next_if(|c| time >= c.at_s) {
-                self.change(&change.factors);
-            }
-            let reference_n = scale * player.next(self.dt);
-            let sample = self.tick(time, reference_n, (&sea_from, &sea_to), (time - sea_time) / STEP_S);
-            tally.tick(&sample);
+            tally.tick(&self.tick(&moment));
             if k % report_every == 0 {
                 progress(k as f64 / ticks as f64, tally.rms_n(), tally.energy_j());
             }
@@ -159,19 +140,20 @@ impl<'a, C: Chain> Bench<'a, C> {
         Ok(tally.finish(&extra))
     }
 
-    fn tick(&mut self, time: f64, reference_n: f64, sea: (&Now, &Now), part: f64) -> Sample {
+    fn tick(&mut self, moment: &Moment) -> Sample {
+        let time = moment.time_s;
         let process = self.faults.controller(time);
         if process == Process::Restarted {
             self.chain.restart();
         }
         let (faults, sensed) = (&mut self.faults, self.plant.sensed());
-        let measured = self.sensors.measure(time, &sensed, sea.0, |until_s| faults.inject(until_s));
-        let driven = self.chain.tick(&measured, reference_n, process == Process::Alive);
-        self.plant.step(&self.water(time, driven, sea, part));
+        let measured = self.sensors.measure(time, &sensed, &moment.sea, |until_s| faults.inject(until_s));
+        let driven = self.chain.tick(&measured, moment.reference_n, process == Process::Alive);
+        self.plant.step(&moment.drive(driven.command));
         let truth = *self.plant.truth();
         let sample = Sample {
             time_s: time,
-            reference_n,
+            reference_n: moment.reference_n,
             thrust_n: truth.thrust_n,
             shaft_speed_rad_s: truth.shaft_speed_rad_s,
             current_a: truth.current_a,
@@ -184,21 +166,6 @@ impl<'a, C: Chain> Bench<'a, C> {
         };
         self.faults.watch(&sample, self.prepared.thrust_max_n);
         sample
-    }
-
-    /// What drives the plant over one tick: the command, and the water's straight line between two
-    /// instants of the sea.
-    fn water(&self, time: f64, driven: Driven, (from, to): (&Now, &Now), part: f64) -> Tick {
-        let next = part + self.dt / STEP_S;
-        let mix = |p: f64| from.ambient_m_s + (to.ambient_m_s - from.ambient_m_s) * p.min(1.0);
-        Tick {
-            time_s: time,
-            command: driven.command,
-            ambient_m_s: (mix(part), mix(next)),
-            supply_v: from.supply_v,
-            depth_m: from.depth_m.zip(to.depth_m).map(|(a, b)| a + (b - a) * part),
-            ..Tick::default()
-        }
     }
 
     fn saturated(&self) -> bool {
@@ -221,18 +188,12 @@ impl<'a, C: Chain> Bench<'a, C> {
             || speed_rad_s.abs() > 1.75 * 1.15 * model.speed_max_rad_s
     }
 
-    fn change(&mut self, factors: &HashMap<Parameter, f64>) {
-        truth::change(&mut self.truth, factors);
-        let (at, sensed) = (*self.plant.truth(), self.plant.sensed());
-        self.plant = truth::plant(self.prepared, &self.truth, self.dt);
-        self.plant.start(at.time_s, at.shaft_speed_rad_s, at.axial_m_s, sensed.current_a, at.shaft_angle_rad);
-    }
-
     fn parameter_error(&self) -> f64 {
         let model = self.chain.controller().model();
         // The flux coefficient is learnt where both sensors are fitted.
         let sensors = &self.prepared.scenario.sensors;
-        let flux = sensors.flow && sensors.thrust;
+        let rig = &self.prepared.rig.sensors;
+        let flux = sensors.flow && sensors.thrust && rig.flow_meter && rig.thrust_sensor;
         let pairs = [
             (model.blade.lift_max, Parameter::LiftMax),
             (model.blade.drag_max, Parameter::DragMax),

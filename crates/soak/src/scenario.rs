@@ -11,6 +11,9 @@ use kort_thruster::models::ModelName;
 use kort_thruster::parameters::Parameter;
 use serde::Deserialize;
 
+/// A default law is never worse than the plain one by more than this factor.
+pub const NEVER_WORSE: f64 = 1.02;
+
 /// A scenario as written.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -37,6 +40,9 @@ pub struct Scenario {
     pub seeds: u32,
     /// Controllers compared, unless the command line says: files of `config/controllers/`.
     pub controllers: Vec<String>,
+    /// What the default law is held to, thrust error over the plain law's, where the drive's limits allow it.
+    #[serde(default = "never_worse")]
+    pub aim_of_plain: f64,
     /// Which of the rig's sensors are fitted.
     #[serde(default)]
     pub sensors: Fitted,
@@ -80,6 +86,9 @@ fn rate() -> f64 {
 }
 fn seeds() -> u32 {
     4
+}
+fn never_worse() -> f64 {
+    NEVER_WORSE
 }
 fn yes() -> bool {
     true
@@ -158,6 +167,10 @@ pub struct EffectSpec {
     /// Values by parameter; a parameter left out stands where a fit would start.
     #[serde(default)]
     pub values: BTreeMap<String, f64>,
+    /// Values as shares of the rig's largest of their kind (torque, speed, thrust, flow, current, supply), so that
+    /// one scenario serves a thruster of any size.
+    #[serde(default)]
+    pub shares: BTreeMap<String, f64>,
 }
 
 /// One stretch of references.

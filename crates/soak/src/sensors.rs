@@ -58,12 +58,12 @@ impl<'a> Sensors<'a> {
         if fitted.current && !speed_drive {
             channels[1] = Some(at.current_a + noise.current * self.current_limit_a * normal(&mut self.noise));
         }
-        if fitted.thrust {
+        if fitted.thrust && self.rig.sensors.thrust_sensor {
             let raw = at.thrust_n + noise.thrust * self.scales[2] * normal(&mut self.noise);
             let quantum = self.thrust_quantum_n;
             channels[2] = Some(if quantum > 0.0 { (raw / quantum).round() * quantum } else { raw });
         }
-        if fitted.flow {
+        if fitted.flow && self.rig.sensors.flow_meter {
             if time_s + 1e-9 >= self.flow_due_s {
                 self.flow_due_s += self.rig.sensors.flow_rate_hz.map_or(self.dt_s, |f| 1.0 / f);
                 let turbulent = at.flow_m_s * (1.0 + noise.flow * normal(&mut self.noise));

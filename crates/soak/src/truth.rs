@@ -88,20 +88,27 @@ pub fn effects(scenario: &Scenario, rig: &Rig, model: &ControlModel) -> Result<V
     let context = Context { parameters: &parameters, rig, tick_s: model.period_s };
     let mut states = 0;
     let mut hooked = Vec::with_capacity(scenario.effects.len());
-    for EffectSpec { id, values } in &scenario.effects {
+    for EffectSpec { id, values, shares } in &scenario.effects {
         let descriptor = effects::find(id).ok_or_else(|| {
             let known: Vec<_> = effects::ALL.iter().map(|d| d.id).collect();
             format!("effect `{id}` is not in the catalogue\nhint: known are {}", known.join(", "))
         })?;
         let specs = (descriptor.parameters)(&scale);
-        if let Some(unknown) = values.keys().find(|k| specs.iter().all(|s| s.name != k.as_str())) {
+        if let Some(unknown) =
+            values.keys().chain(shares.keys()).find(|k| specs.iter().all(|s| s.name != k.as_str()))
+        {
             let known: Vec<_> = specs.iter().map(|s| s.name).collect();
             return Err(format!("effect `{id}` has no value `{unknown}`\nhint: it has {}", known.join(", ")));
         }
         let mut chosen = Vec::with_capacity(specs.len());
         for spec in &specs {
-            let value = values.get(spec.name).copied().unwrap_or(spec.start);
-            if values.contains_key(spec.name) && !(value >= spec.low && value <= spec.high) {
+            let share = match shares.get(spec.name) {
+                Some(share) => Some(share * largest(&scale, id, spec.name, spec.unit)?),
+                None => None,
+            };
+            let stated = values.get(spec.name).copied().or(share);
+            let value = stated.unwrap_or(spec.start);
+            if stated.is_some() && !(value >= spec.low && value <= spec.high) {
                 return Err(format!(
                     "`{id}.{}` = {value} is outside what is allowed: {} to {} ({})\nhint: {} is small but visible",
                     spec.name, spec.low, spec.high, spec.unit, spec.start
@@ -120,9 +127,32 @@ pub fn effects(scenario: &Scenario, rig: &Rig, model: &ControlModel) -> Result<V
     Ok(hooked)
 }
 
+/// What a share of 1 of a unit stands for on the rig.
+fn largest(scale: &Scale, id: &str, name: &str, unit: &str) -> Result<f64, String> {
+    match unit {
+        "N m" => Ok(scale.torque_n_m),
+        "rad/s" => Ok(scale.shaft_speed_rad_s),
+        "N" => Ok(scale.thrust_n),
+        "m/s" => Ok(scale.flow_m_s),
+        "A" => Ok(scale.current_a),
+        "V" => Ok(scale.supply_v),
+        other => Err(format!(
+            "`{id}.{name}` in [{other}] cannot be given as a share of the rig's largest\nhint: give it under values"
+        )),
+    }
+}
+
 /// The plant that parameters and the scenario's effects make.
 pub fn plant(prepared: &Prepared, truth: &Parameters, dt: f64) -> Plant {
     let effects: Vec<(&Descriptor, &[f64])> =
         prepared.effects.iter().map(|(d, v)| (*d, v.as_slice())).collect();
     Plant::new(prepared.scenario.model, prepared.rig, truth, &effects, dt).with_encoder_quantised(true)
+}
+
+/// The same plant under other parameters, going on from where it is.
+pub fn changed(prepared: &Prepared, truth: &Parameters, before: &Plant, dt: f64) -> Plant {
+    let (at, sensed) = (*before.truth(), before.sensed());
+    let mut plant = plant(prepared, truth, dt);
+    plant.start(at.time_s, at.shaft_speed_rad_s, at.axial_m_s, sensed.current_a, at.shaft_angle_rad);
+    plant
 }

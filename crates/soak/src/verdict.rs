@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use crate::comparison::{LawResult, PLAIN};
+use crate::limits;
 use crate::summary::Score;
 
 /// What adaptation is held to: error over that with true parameters.
@@ -18,7 +19,8 @@ fn interval(s: Score) -> String {
 
 /// Who is best, beside the plain law and the next, how sure that is, and what went wrong.
 pub(crate) fn verdict(laws: &[LawResult]) -> String {
-    let mut order: Vec<&LawResult> = laws.iter().collect();
+    // What is told everything is no law that one could take.
+    let mut order: Vec<&LawResult> = laws.iter().filter(|l| l.name != limits::NAME).collect();
     order.sort_by(|a, b| a.mean("thrust_rms_n").total_cmp(&b.mean("thrust_rms_n")));
     let Some(best) = order.first() else { return "nothing ran".into() };
     let mut words = format!(

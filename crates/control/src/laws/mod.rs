@@ -3,7 +3,9 @@
 //! A law never limits itself to the drive: it asks, the controller limits, and the law is then
 //! told what was applied ([`Law::settle`]) so that its integrators follow.
 
+pub mod aim;
 mod combined_anti_spin;
+pub mod lead;
 mod look_ahead;
 mod model1_inversion;
 mod model2_inversion;

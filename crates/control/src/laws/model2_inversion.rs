@@ -1,19 +1,22 @@
-//! Model 2 inverted to torque.
+//! Model 2 inverted, with the drive.
 //!
-//! Reference: Healey et al. 1995 for the model; docs/control.md D5 for the law:
-//! `Omr` from `T(Omr, v^) = Td`, then `tau = Q(Omr, v^) + friction + I Omr' + kfb (Omr - Om)`.
+//! Reference: Healey et al. 1995 for the model; docs/control.md D5 for the law: `Omr` from `T(Omr, v) = Td` in the
+//! flow that the shaft will meet ([`super::aim`]), and a model of shaft and drive led there within the drive's
+//! limits ([`super::lead`]): `tau = Q + friction + I Om'` behind the inverted lag of the drive, and
+//! `kfb (Omm - Om)` with an integral on what the model does not know.
 //! The cascade is input-to-state stable if the flow estimate's error is bounded.
 //!
-//! The target speed moves no faster than the drive can follow, so that `I Omr'` asks only for
-//! torque that is there, and is compared with the measurement behind the same lags
-//! ([`super::speed_loop::MatchedTarget`]).
+//! How far it looks ahead follows from the rig: a drive that is slow beside its water makes it a servo on the
+//! steady map (with the observed ambient flow), one that is fast an inversion in the present flow.
 //!
-//! Assumes: blade coefficients, inertia and torque constant known.
+//! Assumes: blade coefficients, inertia, torque constant and the drive's lag known.
 //! Needs measured: shaft speed; current, thrust or flow sharpen `v^`.
 //!
 //! Fails: as `model3_inversion` for errors of `v^` and blade coefficients; a wrong torque constant
 //! or unknown friction is taken up by the servo's integral, slowly.
 
+use super::aim::Aim;
+use super::lead::{Lead, Led, Meets};
 use super::speed_loop::{MatchedTarget, ServoOptions, SpeedLoop};
 use super::{Demand, LawInput};
 use crate::limits::{Limit, LimitSet};
@@ -24,23 +27,20 @@ use crate::model::ControlModel;
 pub struct Model2Inversion {
     servo: SpeedLoop,
     matched: MatchedTarget,
-    bandwidth_rad_s: f64,
-    wanted_rad_s: f64,
-    target_rad_s: f64,
-    started: bool,
+    aim: Aim,
+    lead: Lead,
+    last_thrust_n: Option<f64>,
 }
 
 impl Model2Inversion {
     /// At rest.
     pub fn new(model: &ControlModel, options: &ServoOptions) -> Self {
-        let quickest = 0.5 / (model.amplifier_lag_s + model.period_s);
         Self {
             servo: SpeedLoop::new(model, options),
-            matched: MatchedTarget::new(model),
-            bandwidth_rad_s: quickest.min(250.0),
-            wanted_rad_s: 0.0,
-            target_rad_s: 0.0,
-            started: false,
+            matched: MatchedTarget::behind_sensors(model),
+            aim: Aim::default(),
+            lead: Lead::new(model),
+            last_thrust_n: None,
         }
     }
 
@@ -48,33 +48,29 @@ impl Model2Inversion {
     pub fn tick(&mut self, input: &LawInput) -> Demand {
         let (model, estimate, dt) = (input.model, input.estimate, input.dt_s);
         let speed = input.speed_rad_s();
-        if !self.started {
-            self.started = true;
-            self.target_rad_s = speed;
+        let last = self.last_thrust_n.replace(input.thrust_n).unwrap_or_else(|| {
+            self.lead.reset(speed, input.measured.current_a.unwrap_or(0.0));
             self.matched.reset(speed);
-        }
-        let (flow, swirl) = (estimate.flow_m_s.value, estimate.swirl_m_s.value);
-        let wanted = model.speed_for_thrust_rad_s(input.thrust_n, flow, swirl, self.wanted_rad_s);
-        let cap = 1.1 * model.speed_max_rad_s;
-        self.wanted_rad_s = wanted.clamp(-cap, cap);
+            input.thrust_n
+        });
+        let arrives_s = 1.0 / self.lead.pace().shaft_per_s;
+        let target = self.aim.at(model, estimate, input.thrust_n, arrives_s);
         let mut limits = LimitSet::default();
-        if self.wanted_rad_s != wanted {
+        if target.capped {
             limits.set(Limit::ShaftSpeed);
         }
-        // Acceleration that the drive has left over the load, with a tenth kept for feedback.
-        let load =
-            model.load(self.target_rad_s, flow, swirl).torque_n_m + model.friction_n_m(self.target_rad_s);
-        let torque_max = 0.9 * model.torque_constant_nm_a * model.current_limit_a;
-        let (up, down) = ((torque_max - load).max(0.0), (torque_max + load).max(0.0));
-        let acceleration = (self.bandwidth_rad_s * (self.wanted_rad_s - self.target_rad_s))
-            .clamp(-down / model.inertia_kg_m2, up / model.inertia_kg_m2);
-        let share = 1.0 / (1.0 + self.bandwidth_rad_s * dt);
-        let acceleration = acceleration * share;
-        self.target_rad_s += acceleration * dt;
-        let seen = self.matched.step(self.target_rad_s, dt);
-        let feedforward = load + model.inertia_kg_m2 * acceleration;
-        let torque = self.servo.tick(feedforward, seen, speed, dt);
-        Demand { torque_n_m: torque, speed_rad_s: self.target_rad_s, limits }
+        let meets = Meets {
+            flow_m_s: estimate.flow_m_s.value,
+            swirl_m_s: estimate.swirl_m_s.value,
+            load_n_m: estimate.load_torque_n_m.value * model.sense(estimate.shaft_speed_rad_s.value),
+            supply_v: input.measured.supply_v,
+        };
+        let rate = target.by_thrust * (input.thrust_n - last) / dt;
+        let Led { torque_n_m, speed_command_rad_s, speed_rad_s } =
+            self.lead.step(model, target.speed_rad_s, rate, &meets, dt);
+        let seen = self.matched.step(speed_rad_s, dt);
+        let torque = self.servo.tick(torque_n_m, seen, speed, dt);
+        Demand { torque_n_m: torque, speed_rad_s: speed_command_rad_s, limits }
     }
 
     /// Back-calculation.

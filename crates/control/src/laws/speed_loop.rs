@@ -78,8 +78,7 @@ impl SpeedLoop {
     }
 }
 
-/// A target speed as the measurement will see it: behind the drive's lag, the hold and the speed
-/// filter. Comparing like with like leaves no error when the model is right, so that feedforward
+/// A target as its measurement will see it: behind the hold and the sensor's filter. Comparing like with like leaves no error when the model is right, so that feedforward
 /// acts at once and feedback only on what the model does not know.
 #[derive(Clone, Copy, Debug)]
 pub struct MatchedTarget {
@@ -90,10 +89,21 @@ pub struct MatchedTarget {
 }
 
 impl MatchedTarget {
-    /// At rest.
-    pub fn new(model: &ControlModel) -> Self {
-        let [drive, filter, delay] = model.loop_lags_s();
-        Self { drive_s: drive + delay, filter_s: filter, shaft_rad_s: 0.0, seen_rad_s: 0.0 }
+    /// For a target that the drive's lag has already been taken into: behind the hold and the speed filter alone.
+    pub fn behind_sensors(model: &ControlModel) -> Self {
+        let [_, filter, delay] = model.loop_lags_s();
+        Self { drive_s: delay, filter_s: filter, shaft_rad_s: 0.0, seen_rad_s: 0.0 }
+    }
+
+    /// For a thrust that a led shaft brings at a rate, 1/s: behind that, the hold and the force sensor's filter.
+    pub fn of_thrust(model: &ControlModel, shaft_per_s: f64) -> Self {
+        let [_, _, delay] = model.loop_lags_s();
+        Self {
+            drive_s: delay + 1.0 / shaft_per_s,
+            filter_s: model.thrust_filter_s,
+            shaft_rad_s: 0.0,
+            seen_rad_s: 0.0,
+        }
     }
 
     /// The target as the measurement will show it, rad/s.

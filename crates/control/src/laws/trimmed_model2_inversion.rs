@@ -14,6 +14,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::lead::Pace;
 use super::model2_inversion::Model2Inversion;
 use super::speed_loop::{MatchedTarget, ServoOptions};
 use super::{Demand, LawInput};
@@ -58,7 +59,7 @@ impl TrimmedModel2Inversion {
         let (crossover, _) = model.speed_loop(servo.phase_margin_deg.to_radians());
         Self {
             inner: Model2Inversion::new(model, servo),
-            matched: MatchedTarget::new(model),
+            matched: MatchedTarget::of_thrust(model, Pace::of(model).shaft_per_s),
             bandwidth_rad_s: options.bandwidth_fraction.min(0.2) * crossover,
             authority: options.authority,
             trim: Integrator::default(),

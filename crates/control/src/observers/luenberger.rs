@@ -41,7 +41,7 @@ impl Luenberger {
 
     /// This observer has no load state: a load found by another is left to its corrections.
     pub(super) fn start_in(&mut self, water: Water) {
-        self.water = Water { load_n_m: 0.0, ..water };
+        self.water = Water { load_n_m: 0.0, blade_load_n_m: 0.0, ..water };
         self.filtered_rad_s = water.speed_rad_s;
         self.started = true;
     }

@@ -1,11 +1,13 @@
 //! Observers: measurements in, an estimate of shaft, water and load out.
 
+mod belief;
 mod ekf;
 mod load_torque;
 mod luenberger;
 mod open_loop;
 mod ukf;
 
+use kort_thruster::rig::AmplifierKind;
 use serde::{Deserialize, Serialize};
 
 use crate::model::ControlModel;
@@ -64,24 +66,35 @@ pub struct ObserverOptions {
     pub load_std: f64,
     /// Time over which the unexplained load forgets itself, s.
     pub load_time_s: f64,
+    /// Standard deviation of the error of the blades' torque at top speed, share of the largest motor torque.
+    pub blade_load_std: f64,
+    /// Time over which that error forgets itself, s: blades change slowly.
+    pub blade_load_time_s: f64,
     /// Standard deviation of the force sensor and the thrust model together, share of the largest thrust.
     pub thrust_std: f64,
     /// Standard deviation of one reading of the flow meter, m/s: turbulence and where it sits.
     pub flow_std_m_s: f64,
 }
 
+impl ObserverOptions {
+    /// What a configuration leaves out.
+    pub const DEFAULT: Self = Self {
+        use_thrust: true,
+        use_flow: true,
+        ambient_std_m_s: 0.5,
+        ambient_time_s: 5.0,
+        load_std: 0.03,
+        load_time_s: 10.0,
+        blade_load_std: 0.1,
+        blade_load_time_s: 300.0,
+        thrust_std: 0.02,
+        flow_std_m_s: 0.2,
+    };
+}
+
 impl Default for ObserverOptions {
     fn default() -> Self {
-        Self {
-            use_thrust: true,
-            use_flow: true,
-            ambient_std_m_s: 0.5,
-            ambient_time_s: 5.0,
-            load_std: 0.03,
-            load_time_s: 10.0,
-            thrust_std: 0.02,
-            flow_std_m_s: 0.2,
-        }
+        Self::DEFAULT
     }
 }
 
@@ -136,7 +149,9 @@ impl Observer {
             flow_m_s: last.flow_m_s.value,
             swirl_m_s: if model.swirl.is_some() { last.swirl_m_s.value } else { 0.0 },
             ambient_m_s: last.ambient_m_s.value,
-            load_n_m: last.load_torque_n_m.value,
+            load_n_m: last.load_torque_n_m.value * model.sense(last.shaft_speed_rad_s.value),
+            // What part of it grows with speed the next observer finds by itself.
+            blade_load_n_m: 0.0,
         }
         .boxed(model);
         match &mut observer {
@@ -159,14 +174,19 @@ impl Observer {
     }
 }
 
-/// Shaft, water and what drives them: the physical part of every observer's state.
+/// Shaft, water and what drives them: the physical part of every observer's state. What load the model does not
+/// explain opposes the turning shaft, as friction and an error of the blades' torque do, so that a reversal
+/// finds it known.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Water {
     speed_rad_s: f64,
     flow_m_s: f64,
     swirl_m_s: f64,
     ambient_m_s: f64,
+    /// Unexplained load that opposes the turning shaft at any speed, as friction does.
     load_n_m: f64,
+    /// Unexplained load at top speed that grows with speed squared, as an error of the blades' torque does.
+    blade_load_n_m: f64,
 }
 
 /// Rates of shaft, flow and swirl, and how fast the swirl is washed out, 1/s: a light swirl is
@@ -178,12 +198,21 @@ impl Water {
     fn rates(&self, model: &ControlModel, motor_n_m: f64) -> Rates {
         let load = model.load(self.speed_rad_s, self.flow_m_s, self.swirl_m_s);
         [
-            (motor_n_m - load.torque_n_m - model.friction_n_m(self.speed_rad_s) - self.load_n_m)
+            (motor_n_m
+                - load.torque_n_m
+                - model.friction_n_m(self.speed_rad_s)
+                - self.unexplained_n_m(model))
                 / model.inertia_kg_m2,
             model.flow_acceleration(load.thrust_n, self.flow_m_s, self.ambient_m_s),
             model.swirl_acceleration(load.torque_n_m, self.flow_m_s, self.swirl_m_s),
             model.swirl_decay_per_s(self.flow_m_s),
         ]
+    }
+
+    /// Load that the model does not explain, N m; positive opposes ahead.
+    #[inline]
+    fn unexplained_n_m(&self, model: &ControlModel) -> f64 {
+        self.load_n_m * model.sense(self.speed_rad_s) + self.blade_load_n_m * model.square(self.speed_rad_s)
     }
 
     #[inline]
@@ -196,8 +225,11 @@ impl Water {
         }
     }
 
-    /// One period with the motor's torque held.
+    /// One period with the motor's torque held; a drive with a speed loop of its own holds the speed.
     fn step(&self, model: &ControlModel, motor_n_m: f64, dt_s: f64) -> Self {
+        if model.amplifier == AmplifierKind::Speed {
+            return self.step_at_speed(model, dt_s);
+        }
         self.midpoint(model, dt_s, |now| now.rates(model, motor_n_m))
     }
 
@@ -228,7 +260,12 @@ impl Water {
         let speed = 2.0 * model.speed_max_rad_s;
         let flow = 3.0 * model.map.flow_m * model.speed_max_rad_s + 4.0;
         let load = 0.5 * model.torque_constant_nm_a * model.current_limit_a;
-        let sum = self.speed_rad_s + self.flow_m_s + self.swirl_m_s + self.ambient_m_s + self.load_n_m;
+        let sum = self.speed_rad_s
+            + self.flow_m_s
+            + self.swirl_m_s
+            + self.ambient_m_s
+            + self.load_n_m
+            + self.blade_load_n_m;
         if !sum.is_finite() {
             return Self::default();
         }
@@ -237,6 +274,7 @@ impl Water {
         self.swirl_m_s = self.swirl_m_s.clamp(-flow, flow);
         self.ambient_m_s = self.ambient_m_s.clamp(-4.0, 4.0);
         self.load_n_m = self.load_n_m.clamp(-load, load);
+        self.blade_load_n_m = self.blade_load_n_m.clamp(-load, load);
         self
     }
 
@@ -248,7 +286,7 @@ impl Water {
             flow_m_s: unsure(self.flow_m_s),
             ambient_m_s: unsure(self.ambient_m_s),
             thrust_n: unsure(model.load(self.speed_rad_s, self.flow_m_s, self.swirl_m_s).thrust_n),
-            load_torque_n_m: unsure(self.load_n_m),
+            load_torque_n_m: unsure(self.unexplained_n_m(model)),
             swirl_m_s: unsure(self.swirl_m_s),
             gated: 0,
         }

@@ -10,7 +10,7 @@
 //! Fails: as `ekf`, model error goes into load or inflow; at several times the cost of `ekf`, for little
 //! away from standstill.
 
-use super::ekf::{Belief, FILTERED, FLOW, Matrix, N, SPEED, SWIRL, Vector};
+use super::belief::{Belief, FILTERED, FLOW, Matrix, N, SPEED, SWIRL, Vector};
 use super::{ObserverInput, ObserverOptions, Water};
 use crate::model::ControlModel;
 use crate::signals::Estimate;

@@ -41,6 +41,8 @@ pub(super) const KEYS: &[Key] = &[
     ("sensors", "flow_rate_hz", Some((0.01, 1e5)), "Hz"),
     ("sensors", "torque", None, ""),
     ("sensors", "ambient_flow", None, ""),
+    ("sensors", "thrust", None, ""),
+    ("sensors", "flow", None, ""),
     ("load", "kind", None, ""),
     ("load", "mass_kg", Some((1e-6, 1e6)), "kilogram: the weight that swings, or what the axis moves"),
     ("load", "length_m", Some((1e-4, 100.0)), "metres from the shaft to the centre of the mass"),

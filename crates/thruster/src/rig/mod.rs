@@ -193,6 +193,10 @@ pub struct Sensors {
     pub torque_transducer: bool,
     /// The ambient flow is a column of the recording.
     pub ambient_flow_recorded: bool,
+    /// There is a force sensor (`sensors.thrust = "none"` says that there is not).
+    pub thrust_sensor: bool,
+    /// There is a flow meter (`sensors.flow = "none"` says that there is not).
+    pub flow_meter: bool,
 }
 
 impl Sensors {
@@ -209,6 +213,8 @@ impl Sensors {
         flow_rate_hz: None,
         torque_transducer: false,
         ambient_flow_recorded: false,
+        thrust_sensor: true,
+        flow_meter: true,
     };
 }
 

@@ -92,6 +92,16 @@ impl Rig {
                 ));
             }
         };
+        let fitted = |key: &str| match t.text("sensors", key)?.as_deref() {
+            None | Some("fitted") => Ok(true),
+            Some("none") => Ok(false),
+            Some(other) => Err(value_error(
+                &format!("sensors.{key}"),
+                other,
+                "\"fitted\" or \"none\"",
+                "\"none\" if nothing measures it",
+            )),
+        };
         Ok(Self {
             load: Load::read(&t)?,
             effects: known::read(&table)?,
@@ -118,6 +128,8 @@ impl Rig {
                 flow_rate_hz: t.number("sensors", "flow_rate_hz")?,
                 torque_transducer,
                 ambient_flow_recorded,
+                thrust_sensor: fitted("thrust")?,
+                flow_meter: fitted("flow")?,
             },
             water: t.text("run", "water")?.unwrap_or_else(|| "not stated".into()),
         })

@@ -1,9 +1,11 @@
 //! `kort explain`: the catalogue of omitted physics, the control laws, observers and estimators, or one of
 //! them in full.
 
+mod advice;
 mod controllers;
 
 use std::fmt::Write;
+use std::path::PathBuf;
 
 use kort_control::About;
 use kort_thruster::effects::{self, ALL, Descriptor, Scale};
@@ -14,6 +16,7 @@ use crate::failure::{Failure, Outcome, print, print_json};
 const EXAMPLE: &str = "\
 Example: kort explain rotational_flow
          kort explain look_ahead
+         kort explain --for t200
          kort explain --json | jq '.effects[] | select(.path == \"shaft\") | .effect'
          kort explain --markdown > docs/catalogue.md";
 
@@ -29,6 +32,9 @@ const WIDTH: usize = 96;
 pub struct Args {
     /// One effect, law, observer or estimator by its name in reports [default: the whole catalogue]
     effect: Option<String>,
+    /// The default controller of a rig, by file or name, with its time scales and the reasons
+    #[arg(long = "for", value_name = "RIG", conflicts_with_all = ["effect", "markdown"])]
+    rig: Option<PathBuf>,
     /// Print one JSON document (kort.explain/1)
     #[arg(long, conflicts_with = "markdown")]
     json: bool,
@@ -42,6 +48,9 @@ pub struct Args {
 /// # Errors
 /// The effect is not in the catalogue; the message names the nearest one.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
+    if let Some(rig) = &args.rig {
+        return advice::run(rig, args.json);
+    }
     let controller = args.effect.as_deref().map(plain).and_then(|name| About::find(&name));
     let chosen = match (&args.effect, controller) {
         (_, Some(_)) => Vec::new(),

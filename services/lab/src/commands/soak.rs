@@ -6,20 +6,28 @@ use std::path::PathBuf;
 use clap::Args as ClapArgs;
 
 use crate::failure::{Failure, Outcome, check_writable, print, print_json, write_text};
-use crate::soak::{self, Metrics, SoakError, Watch};
+use crate::files;
+use crate::soak::{self, Instead, Loaded, Metrics, SoakError, Watch};
+
+/// A scenario that takes this long, s, is run when it is asked for by name.
+const LONG_S: f64 = 3600.0 + 1.0;
 
 /// Run several controllers on the same plant, faults and references, and compare them
 ///
 /// Virtual time by default; --live drives a running service through the same script in real time.
 #[derive(Debug, ClapArgs)]
 #[command(
-    after_help = "Example:\n  kort soak config/scenarios/soak-towed.toml --controllers velocity_servo,model2_inversion --seeds 4 --html soak.html"
+    after_help = "Example:\n  kort soak config/scenarios/soak-towed.toml --controllers velocity_servo,model2_inversion --seeds 4 --html soak.html\n  kort soak soak-towed --rig my-rig.toml --controllers velocity_servo,default,drive_limits\n  kort soak all --rig all --seed 901 --markdown docs/control.md"
 )]
 pub struct Args {
-    /// Scenario files; the shipped ones are config/scenarios/soak-*.toml
+    /// Scenarios: files, or names of shipped ones; `all` for every one of an hour or less
     #[arg(required = true, value_name = "SCENARIO")]
     scenarios: Vec<PathBuf>,
-    /// Controllers to compare: files of config/controllers/ without .toml, or laws (`kort explain` lists them)
+    /// Rigs instead of the scenario's: files, or names of shipped ones; `all` for every one with a propeller
+    #[arg(long, value_name = "RIG,…", value_delimiter = ',')]
+    rig: Vec<PathBuf>,
+    /// Controllers to compare: files of config/controllers/ without .toml, laws (`kort explain` lists them), `default`
+    /// (the rig's own), `drive_limits` (what the drive leaves a law that is told everything)
     /// [default: the scenario's]
     #[arg(long, value_name = "A,B,…", value_delimiter = ',')]
     controllers: Option<Vec<String>>,
@@ -38,6 +46,10 @@ pub struct Args {
     /// Write one self-contained page
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
+    /// Put a table of rigs and scenarios into a page, between its marks; compares velocity_servo, default and
+    /// drive_limits unless --controllers says otherwise
+    #[arg(long, value_name = "FILE", conflicts_with = "live")]
+    markdown: Option<PathBuf>,
     /// Drive a running service, for example http://127.0.0.1:8080, in real time
     #[arg(long, value_name = "URL")]
     live: Option<String>,
@@ -54,14 +66,8 @@ pub struct Args {
 /// # Errors
 /// [`Failure`] names the file, the key and what is allowed.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
-    let controllers = args.controllers.as_deref();
-    let loaded = args
-        .scenarios
-        .iter()
-        .map(|path| soak::load(path, controllers, args.seeds))
-        .collect::<Result<Vec<_>, SoakError>>()
-        .map_err(Failure::input)?;
-    if let Some(file) = &args.html {
+    let loaded = load(args).map_err(Failure::input)?;
+    for file in args.html.iter().chain(&args.markdown) {
         check_writable(file)?;
     }
     let metrics = args.metrics_addr.map(Metrics::serve).transpose().map_err(Failure::input)?;
@@ -76,10 +82,51 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     if let Some(file) = &args.html {
         write_text(file, &soak::page(&report))?;
     }
+    if let Some(file) = &args.markdown {
+        soak::put_into(file, &report, args.seed)?;
+    }
     if args.json {
         print_json(&report.json())?;
     } else {
         print(&report.text());
     }
     Ok(Outcome::Done)
+}
+
+/// Every scenario on its own rig, or on every rig asked for.
+fn load(args: &Args) -> Result<Vec<Loaded>, SoakError> {
+    let is_all = |list: &[PathBuf]| list.len() == 1 && list[0].as_os_str() == "all";
+    let every_scenario = is_all(&args.scenarios);
+    let scenarios: Vec<PathBuf> = if every_scenario {
+        files::soak_scenarios().into_iter().map(PathBuf::from).collect()
+    } else {
+        args.scenarios.clone()
+    };
+    let every_rig = is_all(&args.rig);
+    let rigs: Vec<Option<PathBuf>> = match (every_rig, args.rig.is_empty()) {
+        (true, _) => files::rigs().into_iter().map(|name| Some(PathBuf::from(name))).collect(),
+        (false, true) => vec![None],
+        (false, false) => args.rig.iter().cloned().map(Some).collect(),
+    };
+    let table = ["velocity_servo", soak::DEFAULT, kort_soak::limits::NAME].map(str::to_owned);
+    let controllers = match (&args.controllers, &args.markdown) {
+        (Some(controllers), _) => Some(controllers.as_slice()),
+        (None, Some(_)) => Some(table.as_slice()),
+        (None, None) => None,
+    };
+    let mut loaded = Vec::new();
+    for scenario in &scenarios {
+        for rig in &rigs {
+            // A dry rig has no thrust to control; asked for by name it is refused with that reason.
+            if every_rig
+                && rig.as_deref().is_some_and(|r| files::read_rig(r).is_ok_and(|r| r.propeller.is_none()))
+            {
+                continue;
+            }
+            let instead = Instead { rig: rig.as_deref(), controllers, seeds: args.seeds };
+            loaded.push(soak::load(scenario, &instead)?);
+        }
+    }
+    loaded.retain(|l| !every_scenario || l.scenario.duration_s < LONG_S);
+    Ok(loaded)
 }

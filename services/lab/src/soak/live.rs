@@ -15,7 +15,7 @@ use tokio_tungstenite::tungstenite::{self, Message, WebSocket};
 
 use kort_soak::{LawResult, Outcome, Player, Sample, ScenarioResult, Tally};
 
-use super::{Loaded, Report, Watch};
+use super::{Contestant, Loaded, Report, Watch};
 
 /// States a second, and how often the reference is looked at.
 const RATE_HZ: f64 = 50.0;
@@ -72,7 +72,13 @@ pub fn live(
     let bar = crate::progress::bar(all_s as u64, "seconds driven");
     for l in loaded {
         let mut laws = Vec::new();
-        for (name, config) in &l.controllers {
+        let laws_of = |(name, contestant): &'_ (String, Contestant)| match contestant {
+            Contestant::Law(config) => Some((name.clone(), **config)),
+            // The running service's truth is not known: nothing can be told it.
+            Contestant::Limits => None,
+        };
+        for (name, config) in l.controllers.iter().filter_map(laws_of) {
+            let (name, config) = (name.as_str(), &config);
             bar.say(&format!("{}: {name} for {:.0} s", l.scenario.name, l.scenario.duration_s));
             service.switch(config)?;
             let outcome = drive(&service, l, seed, &|share, rms_n, energy_j| {
@@ -88,7 +94,7 @@ pub fn live(
             }
             laws.push(law);
         }
-        scenarios.push(ScenarioResult::new(&l.scenario.name, &l.scenario.what, l.thrust_max_n, laws));
+        scenarios.push(ScenarioResult::new(&l.prepared(), laws));
     }
     drop(bar);
     eprintln!("{played_s:.0} s driven in {:.1} s", started.elapsed().as_secs_f64());

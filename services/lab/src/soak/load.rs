@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use kort_control::{ConfigError, ControlModel, ControllerConfig, LawKind, ModelError};
+use kort_control::{ConfigError, ControlModel, ControllerConfig, LawKind, ModelError, advise};
 use kort_soak::{Hooked, Prepared, Replayed, Scenario, Segment};
 use kort_thruster::rig::Rig;
 use thiserror::Error;
@@ -28,7 +28,7 @@ pub enum SoakError {
     Scenario(#[from] ScenarioError),
     /// A controller that is not known.
     #[error(
-        "controller `{name}` is not known{near}\nhint: a file of config/controllers/ without .toml, a path to one, or a law: {laws}"
+        "controller `{name}` is not known{near}\nhint: a file of config/controllers/ without .toml, a path to one, `default` (the rig's own), `drive_limits` (what no law can better), or a law: {laws}"
     )]
     UnknownController {
         /// What was asked for.
@@ -70,6 +70,18 @@ pub enum SoakError {
     Threads(#[from] rayon::ThreadPoolBuildError),
 }
 
+/// The name under which a rig's own default controller runs.
+pub const DEFAULT: &str = "default";
+
+/// What is compared.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Contestant {
+    /// A controller.
+    Law(Box<ControllerConfig>),
+    /// The law that is told everything: what the drive's limits leave.
+    Limits,
+}
+
 /// A scenario with all it names, read and checked.
 pub struct Loaded {
     /// The scenario.
@@ -82,8 +94,8 @@ pub struct Loaded {
     pub replayed: Vec<Option<Replayed>>,
     /// Largest steady thrust that a share of 1 stands for, N.
     pub thrust_max_n: f64,
-    /// Controllers to compare, by name.
-    pub controllers: Vec<(String, ControllerConfig)>,
+    /// What is compared, by name.
+    pub controllers: Vec<(String, Contestant)>,
     /// How many seeds.
     pub seeds: u32,
 }
@@ -101,40 +113,67 @@ impl Loaded {
     }
 }
 
-/// Reads a scenario, its rig, its recordings and the controllers to compare.
+/// What of a scenario the command line has its own mind about.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Instead<'a> {
+    /// Rig.
+    pub rig: Option<&'a Path>,
+    /// Controllers.
+    pub controllers: Option<&'a [String]>,
+    /// How many seeds.
+    pub seeds: Option<u32>,
+}
+
+/// Reads a scenario, by path or name, its rig, its recordings and the controllers to compare.
 ///
 /// # Errors
 /// [`SoakError`] names the file, the key and what is allowed.
-pub fn load(path: &Path, controllers: Option<&[String]>, seeds: Option<u32>) -> Result<Loaded, SoakError> {
-    let (scenario, rig) = read(path)?;
+pub fn load(path: &Path, instead: &Instead) -> Result<Loaded, SoakError> {
+    let (scenario, rig) = read(path, instead.rig)?;
     let period_s = 1.0 / scenario.control_rate_hz;
     let model = ControlModel::from_rig(&rig, period_s)
         .map_err(|source| SoakError::Model { file: path.display().to_string(), source })?;
     let effects = kort_soak::effects(&scenario, &rig, &model)
         .map_err(|message| ScenarioError { file: path.display().to_string(), message })?;
     let folder = path.parent().unwrap_or(Path::new("."));
-    let names = controllers.map_or_else(|| scenario.controllers.clone(), <[String]>::to_vec);
+    let names = instead.controllers.map_or_else(|| scenario.controllers.clone(), <[String]>::to_vec);
     let controllers = names
         .iter()
-        .map(|name| Ok((name.clone(), controller(name, folder)?)))
+        .map(|name| {
+            let contestant = match name.as_str() {
+                kort_soak::limits::NAME => Contestant::Limits,
+                DEFAULT => Contestant::Law(Box::new(
+                    advise(&rig, period_s)
+                        .map_err(|source| SoakError::Model { file: path.display().to_string(), source })?
+                        .config,
+                )),
+                _ => Contestant::Law(Box::new(controller(name, folder)?)),
+            };
+            Ok((name.clone(), contestant))
+        })
         .collect::<Result<_, SoakError>>()?;
     let replayed = scenario
         .references
         .iter()
         .map(|s| replay(s, folder, model.thrust_max_n))
         .collect::<Result<_, _>>()?;
-    let seeds = seeds.unwrap_or(scenario.seeds);
+    let seeds = instead.seeds.unwrap_or(scenario.seeds);
     Ok(Loaded { scenario, rig, effects, replayed, thrust_max_n: model.thrust_max_n, controllers, seeds })
 }
 
-/// A scenario and its rig.
-fn read(path: &Path) -> Result<(Scenario, Rig), ScenarioError> {
+/// A scenario, and its rig or another.
+fn read(path: &Path, rig: Option<&Path>) -> Result<(Scenario, Rig), SoakError> {
+    let text = files::soak_scenario_text(path)?;
     let error = |path: &Path, message: String| ScenarioError { file: path.display().to_string(), message };
-    let text = std::fs::read_to_string(path).map_err(|e| {
-        let hint = "scenarios shipped with kort are config/scenarios/soak-*.toml";
-        error(path, format!("{e}\nhint: {hint}"))
-    })?;
     let scenario = Scenario::from_toml(&text).map_err(|message| error(path, message))?;
+    if let Some(rig) = rig {
+        return Ok((scenario, files::read_rig(rig)?));
+    }
+    if !path.is_file() {
+        // A scenario by name goes with a rig by name.
+        let rig = files::read_rig(Path::new(scenario.rig.file_stem().unwrap_or_default()))?;
+        return Ok((scenario, rig));
+    }
     let rig = path.parent().unwrap_or(Path::new(".")).join(&scenario.rig);
     let text = std::fs::read_to_string(&rig).map_err(|e| {
         error(&rig, format!("{e}\nhint: `rig` in {} is taken relative to that file", path.display()))

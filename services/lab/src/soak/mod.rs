@@ -4,6 +4,7 @@
 mod chain;
 mod live;
 mod load;
+mod markdown;
 mod metrics;
 mod page;
 mod report;
@@ -15,7 +16,8 @@ use rayon::prelude::*;
 
 use chain::ProductionChain;
 pub use live::{LiveError, live};
-pub use load::{Loaded, SoakError, load};
+pub use load::{Contestant, DEFAULT, Instead, Loaded, SoakError, load};
+pub use markdown::put_into;
 pub use metrics::{Metrics, MetricsError};
 pub use page::page;
 pub use report::Report;
@@ -45,7 +47,7 @@ pub fn soak(loaded: &[Loaded], seed: u64, jobs: usize, watch: &Watch) -> Result<
         runs.par_iter()
             .map(|&(s, c, k)| {
                 let l = &loaded[s];
-                let (name, config) = &l.controllers[c];
+                let (name, contestant) = &l.controllers[c];
                 let prepared = l.prepared();
                 let last = AtomicU64::new(0);
                 let moved = |virtual_s: f64| {
@@ -63,6 +65,9 @@ pub fn soak(loaded: &[Loaded], seed: u64, jobs: usize, watch: &Watch) -> Result<
                 let seed = seed.wrapping_add(u64::from(k));
                 let failed = |source| SoakError::Model { file: l.scenario.name.clone(), source };
                 let run = kort_soak::run::<ProductionChain>;
+                let Contestant::Law(config) = contestant else {
+                    return kort_soak::limits::limits(&prepared, seed, &progress).map_err(failed);
+                };
                 let mut outcome = run(&prepared, config, seed, Knows::Stated, &progress).map_err(failed)?;
                 if l.scenario.against_true_parameters {
                     let progress = |share: f64, _: f64, _: f64| moved((1.0 + share) * l.scenario.duration_s);
@@ -86,11 +91,12 @@ pub fn soak(loaded: &[Loaded], seed: u64, jobs: usize, watch: &Watch) -> Result<
             }
             laws.push(law);
         }
-        scenarios.push(ScenarioResult::new(&l.scenario.name, &l.scenario.what, l.thrust_max_n, laws));
+        scenarios.push(ScenarioResult::new(&l.prepared(), laws));
     }
     let took = started.elapsed().as_secs_f64();
+    let threads = pool.current_num_threads().min(runs.len());
     eprintln!(
-        "{virtual_s:.0} virtual seconds in {took:.1} s: {:.0} times real time",
+        "{virtual_s:.0} virtual seconds in {took:.1} s: {:.0} times real time on {threads} threads",
         virtual_s / took.max(1e-9)
     );
     Ok(Report::new(loaded.iter().map(|l| l.scenario.duration_s).sum(), virtual_s, scenarios))
@@ -115,8 +121,9 @@ mod tests {
         let path = folder.path().join("mine.toml");
         std::fs::write(&path, example.replace("../thrusters/t200.toml", rig)).unwrap();
         let named = |name: &str| ControllerConfig::with_law(LawKind::from_name(name).unwrap());
-        let loaded = load(&path, None, None).unwrap_or_else(|e| panic!("{e}"));
-        assert_eq!(loaded.controllers[1].1.law, named("model2_inversion").law);
+        let loaded = load(&path, &Instead::default()).unwrap_or_else(|e| panic!("{e}"));
+        let Contestant::Law(config) = &loaded.controllers[1].1 else { panic!("{:?}", loaded.controllers) };
+        assert_eq!(config.law, named("model2_inversion").law);
         let watch = Watch { metrics: None };
         let report = soak(&[loaded], 1, 1, &watch).unwrap();
         assert_eq!(report.virtual_seconds, 480.0);
@@ -129,7 +136,7 @@ mod tests {
         for entry in std::fs::read_dir(folder).unwrap() {
             let path = entry.unwrap().path();
             if path.file_name().is_some_and(|n| n.to_string_lossy().starts_with("soak-")) {
-                let loaded = load(&path, None, None).unwrap_or_else(|e| panic!("{e}"));
+                let loaded = load(&path, &Instead::default()).unwrap_or_else(|e| panic!("{e}"));
                 names.push(loaded.scenario.name);
             }
         }

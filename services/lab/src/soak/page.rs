@@ -17,7 +17,7 @@ pub fn page(report: &Report) -> String {
         ),
     );
     for s in &report.scenarios {
-        page.section(&s.name, scenario(s));
+        page.section(&format!("{} on {}", s.name, s.rig), scenario(s));
     }
     let words: Vec<(&str, String)> = SCORES.iter().map(|(n, w)| (*n, (*w).to_owned())).collect();
     page.section("What the scores are", facts(&words));

@@ -74,7 +74,7 @@ impl Report {
                         })
                     })
                     .collect();
-                json!({ "name": s.name, "what": s.what, "thrust_max_n": s.thrust_max_n, "laws": laws, "verdict": s.verdict })
+                json!({ "name": s.name, "rig": s.rig, "what": s.what, "thrust_max_n": s.thrust_max_n, "laws": laws, "verdict": s.verdict })
             })
             .collect();
         json!({
@@ -89,7 +89,7 @@ impl Report {
     pub fn text(&self) -> String {
         let mut out = String::new();
         for s in &self.scenarios {
-            let _ = writeln!(out, "{}: {}", s.name, s.what);
+            let _ = writeln!(out, "{} on {}: {}", s.name, s.rig, s.what);
             // Where no fault was put in, none survived says nothing.
             let faults = s.laws.iter().any(|l| l.score("faults_injected").is_some_and(|f| f.mean > 0.0));
             let shown = |score: &str| {
