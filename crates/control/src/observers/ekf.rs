@@ -133,6 +133,15 @@ fn transition(model: &ControlModel, x: &Vector, noise: &Noise, dt: f64) -> Matri
     a[(AMBIENT, AMBIENT)] = -1.0 / noise.ambient_time_s;
     a[(LOAD, LOAD)] = -1.0 / noise.load_time_s;
     a[(BLADE, BLADE)] = -1.0 / noise.blade_time_s;
+    // What settles within a tick has settled: the series below would make it grow.
+    for i in [SPEED, FLOW] {
+        let within = -a[(i, i)] * dt;
+        if within > 1.0 {
+            for j in 0..N {
+                a[(i, j)] /= within;
+            }
+        }
+    }
     // As implicit as the step itself.
     let swirl_step = 1.0 / (1.0 - dt * a[(SWIRL, SWIRL)]);
     for j in 0..N {

@@ -10,7 +10,7 @@ use crate::files;
 use crate::soak::{self, Instead, Loaded, Metrics, SoakError, Watch};
 
 /// A scenario that takes this long, s, is run when it is asked for by name.
-const LONG_S: f64 = 3600.0 + 1.0;
+const LONG_S: f64 = 3600.0;
 
 /// Run several controllers on the same plant, faults and references, and compare them
 ///
@@ -20,7 +20,7 @@ const LONG_S: f64 = 3600.0 + 1.0;
     after_help = "Example:\n  kort soak config/scenarios/soak-towed.toml --controllers velocity_servo,model2_inversion --seeds 4 --html soak.html\n  kort soak soak-towed --rig my-rig.toml --controllers velocity_servo,default,drive_limits\n  kort soak all --rig all --seed 901 --markdown docs/control.md"
 )]
 pub struct Args {
-    /// Scenarios: files, or names of shipped ones; `all` for every one of an hour or less
+    /// Scenarios: files, or names of shipped ones; `all` for every one of less than an hour
     #[arg(required = true, value_name = "SCENARIO")]
     scenarios: Vec<PathBuf>,
     /// Rigs instead of the scenario's: files, or names of shipped ones; `all` for every one with a propeller
