@@ -58,14 +58,6 @@ const LINES: usize = 400;
 /// Files that are longer, with what they may have: to be split.
 const LONG: &[(&str, usize)] = &[
     ("crates/control/src/model.rs", 640),
-    ("crates/identify/src/changes.rs", 600),
-    ("crates/identify/src/data.rs", 800),
-    ("crates/identify/src/diagnose.rs", 580),
-    ("crates/identify/src/fit.rs", 460),
-    ("crates/identify/src/judge.rs", 520),
-    ("crates/identify/src/library.rs", 480),
-    ("crates/identify/src/search.rs", 460),
-    ("crates/identify/src/words.rs", 440),
     ("crates/soak/src/score.rs", 460),
     ("crates/scenario/src/excitation.rs", 620),
     ("crates/scenario/src/run.rs", 480),
