@@ -294,7 +294,7 @@ fn forms_are_parts_that_act() {
         let forms = effect.forms(&specs);
         assert!(!forms.is_empty());
         for form in &forms {
-            assert!(form.iter().all(|k| !specs[*k].held), "{} {form:?}", effect.id);
+            assert!(form.iter().all(|k| !specs[*k].held || !specs[*k].shape), "{} {form:?}", effect.id);
             let acts = |k: &usize| !specs[*k].shape;
             let shapes_alone = specs.iter().all(|s| s.shape);
             let switch = specs.iter().all(|s| s.held);
@@ -344,7 +344,7 @@ fn each_strength_alone_is_visible() {
             let specs = (effect.parameters)(&bench.scale);
             // The first level is rest: what acts then alone is not seen.
             let at_rest = |s: &Spec| s.acts.is_some_and(|a| a.from_s + a.length_s <= LEVEL_S);
-            for (k, spec) in specs.iter().enumerate().filter(|(_, s)| !s.shape && !at_rest(s)) {
+            for (k, spec) in specs.iter().enumerate().filter(|(_, s)| !s.shape && !s.held && !at_rest(s)) {
                 let values: Vec<f64> = specs
                     .iter()
                     .enumerate()

@@ -146,15 +146,14 @@ pub struct Descriptor {
 
 impl Descriptor {
     /// The sets of parameters that a fit may free, by their places, smallest first where the entry lists
-    /// them so; at least one, the whole effect. Parameters that a fit holds are in none.
+    /// them so; at least one, the whole effect. A shape that a fit holds is in none; a strength that it holds is
+    /// free in the forms that list it.
     pub fn forms(&self, specs: &[Spec]) -> Vec<Vec<usize>> {
-        let free = |places: &mut dyn Iterator<Item = usize>| -> Vec<usize> {
-            places.filter(|k| specs.get(*k).is_some_and(|s| !s.held)).collect()
-        };
         if self.forms.is_empty() {
-            return vec![free(&mut (0..specs.len()))];
+            return vec![(0..specs.len()).filter(|k| !specs[*k].held).collect()];
         }
-        self.forms.iter().map(|form| free(&mut form.iter().copied())).collect()
+        let free = |k: &usize| specs.get(*k).is_some_and(|s| !s.held || !s.shape);
+        self.forms.iter().map(|form| form.iter().copied().filter(free).collect()).collect()
     }
 }
 

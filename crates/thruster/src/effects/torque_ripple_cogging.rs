@@ -65,16 +65,13 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
         |name| Spec::strength(name, "N m", 0.02 * torque, -0.5 * torque, 0.5 * torque).sigma(0.04 * torque);
     let ripple =
         |name| Spec::strength(name, "N m/A", 0.02 * per_a, -0.5 * per_a, 0.5 * per_a).sigma(0.04 * per_a);
-    let order = |[order, sin, cos, ripple_sin, ripple_cos]: [&'static str; EACH], usual| {
-        [
-            Spec::held(order, "1", usual, 1.0, 720.0),
-            cogging(sin),
-            cogging(cos),
-            ripple(ripple_sin),
-            ripple(ripple_cos),
-        ]
+    let order = |place: usize, [order, sin, cos, ripple_sin, ripple_cos]: [&'static str; EACH]| {
+        let parts = [cogging(sin), cogging(cos), ripple(ripple_sin), ripple(ripple_cos)];
+        // A fit frees the orders beyond the first only in a form that lists them.
+        let parts = parts.map(|s| if place == 0 { s } else { Spec { start: 0.0, held: true, ..s } });
+        std::iter::once(Spec::held(order, "1", USUAL[place], 1.0, 720.0)).chain(parts)
     };
-    NAMES.into_iter().zip(USUAL).flat_map(|(names, usual)| order(names, usual)).collect()
+    NAMES.into_iter().enumerate().flat_map(|(place, names)| order(place, names)).collect()
 }
 
 /// One start a first order: what misalignment gives, the poles, the slots, six times the pole pairs, and the

@@ -144,7 +144,7 @@ fn in_range(key: &str, quantity: Quantity, spec: &Spec) -> Result<Quantity, RigE
 fn needed(effect: &Descriptor, specs: &[Spec], stated: &[usize], place: usize) -> bool {
     if specs[place].held {
         // It belongs to the strengths that follow it up to the next of its kind, or to all.
-        let group = specs[place + 1..].iter().take_while(|s| !s.held).count();
+        let group = specs[place + 1..].iter().take_while(|s| !(s.held && s.shape)).count();
         return group == 0 || stated.iter().any(|k| *k > place && *k <= place + group);
     }
     let fits = |form: &Vec<usize>| stated.iter().all(|k| specs[*k].held || form.contains(k));
