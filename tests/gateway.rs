@@ -32,7 +32,7 @@ impl Answer {
 fn send(port: u16, method: &str, path: &str, headers: &[(&str, &str)], body: &[u8]) -> Answer {
     let mut socket = wait("a connection", || TcpStream::connect(("127.0.0.1", port)).ok());
     socket.set_read_timeout(Some(Duration::from_secs(15))).unwrap();
-    let mut request = format!("{method} {path} HTTP/1.1\r\nHost: kort\r\nConnection: close\r\n");
+    let mut request = format!("{method} {path} HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n");
     if !body.is_empty() || method != "GET" {
         request += &format!("Content-Length: {}\r\n", body.len());
     }
@@ -156,6 +156,10 @@ fn every_error_is_a_problem_document_with_its_type() {
             "foreign-origin",
         ),
         ("GET", "/v1/thrusters/t1/stream", &[("Origin", "null")], "", 403, "foreign-origin"),
+        ("GET", "/v1/events?since=yesterday", &[], "", 422, "out-of-range"),
+        ("GET", "/v1/events?limit=0", &[], "", 422, "out-of-range"),
+        ("GET", "/v1/thrusters", &[("Authorization", "Basic eHg6eHg=")], "", 400, "malformed-header"),
+        ("GET", "/v1/thrusters", &[("Authorization", "Bearer nobody.00")], "", 401, "token-required"),
         ("GET", "/v1/faults/9999", &[], "", 404, "unknown-fault"),
         ("GET", "/v1/faults/x", &[], "", 400, "malformed-path"),
     ];
@@ -237,9 +241,9 @@ fn one_commander_at_a_time_and_an_ended_lease_ends_the_thrust() {
     assert_eq!(foreign.json()["holder"], "bench");
     assert_problem(
         &send(port, "PUT", path, &[JSON], br#"{"thrust_n": 5}"#),
-        403,
-        "lease-required",
-        "no lease at all",
+        409,
+        "lease-held",
+        "no lease at all while somebody holds one",
     );
     assert_problem(
         &put_json(port, "POST", "/v1/thrusters/t1/arm", "wrong", ""),

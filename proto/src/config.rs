@@ -112,11 +112,13 @@ pub struct ControllerLoop {
     pub file: PathBuf,
     /// Law that runs at start; empty takes the one of the file.
     pub law: String,
+    /// Time in which a setpoint may go from zero to the largest, s, 0 to 60; left out: what suits the law.
+    pub setpoint_rise_s: Option<f64>,
 }
 
 impl Default for ControllerLoop {
     fn default() -> Self {
-        Self { rate_hz: 250.0, priority: 70, file: PathBuf::new(), law: String::new() }
+        Self { rate_hz: 250.0, priority: 70, file: PathBuf::new(), law: String::new(), setpoint_rise_s: None }
     }
 }
 
@@ -194,6 +196,9 @@ impl Config {
                 t.servo.rate_hz,
                 "at most the servo's rate",
             )?;
+            if let Some(rise_s) = t.controller.setpoint_rise_s {
+                check("controller.setpoint_rise_s", rise_s, 0.0, 60.0, "leave it out for what suits the law")?;
+            }
             let ratio = t.servo.rate_hz / t.controller.rate_hz;
             if (ratio - ratio.round()).abs() > 1e-6 {
                 return Err(fail(format!(

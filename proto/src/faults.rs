@@ -32,6 +32,8 @@ pub enum Fault {
     LoopStalled = 12,
     /// Another controller process began to command while armed.
     ControllerRestarted = 13,
+    /// The servo ended while armed; its successor latches this at its start.
+    ServoRestarted = 14,
     /// No word from the gateway within its time-out while armed.
     GatewayLost = 33,
     /// No telemetry from the servo within its time-out while armed.
@@ -44,7 +46,7 @@ pub enum Fault {
 
 impl Fault {
     /// Every fault, in the order of codes.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 18] = [
         Self::OverCurrent,
         Self::OverSpeed,
         Self::ThermalOverload,
@@ -58,6 +60,7 @@ impl Fault {
         Self::OverTemperature,
         Self::LoopStalled,
         Self::ControllerRestarted,
+        Self::ServoRestarted,
         Self::GatewayLost,
         Self::ServoLost,
         Self::ControlNotFinite,
@@ -90,6 +93,7 @@ impl Fault {
             Self::OverTemperature => "over_temperature",
             Self::LoopStalled => "loop_stalled",
             Self::ControllerRestarted => "controller_restarted",
+            Self::ServoRestarted => "servo_restarted",
             Self::GatewayLost => "gateway_lost",
             Self::ServoLost => "servo_lost",
             Self::ControlNotFinite => "control_not_finite",
@@ -121,6 +125,9 @@ impl Fault {
             Self::OverTemperature => "the motor is too hot: let it cool, check cooling and load",
             Self::LoopStalled => "the servo's loop stood still: the machine is overloaded or was suspended",
             Self::ControllerRestarted => "the controller was replaced while armed: arm again",
+            Self::ServoRestarted => {
+                "the servo ended while armed (killed, hung or the whole service died): see the event log, then clear and arm again"
+            }
             Self::GatewayLost => "the gateway stopped while armed: take the lease and arm again",
             Self::ServoLost => "the servo stopped sending telemetry: see its log",
             Self::ControlNotFinite => "the control law gave no number: check its parameters",

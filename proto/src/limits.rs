@@ -31,6 +31,8 @@ pub enum Limit {
     AntiSpin = 22,
     /// The trim on the force sensor is at its authority.
     Trim = 23,
+    /// The setpoint is still on its way: it moves no faster than its rise time says.
+    SetpointRise = 30,
     /// The controller ramps to zero because the lease ended.
     LeaseRamp = 31,
 }
@@ -40,7 +42,7 @@ pub const FIRST_OF_CONTROL: u32 = Limit::Current as u32;
 
 type Row = (Limit, &'static str, &'static str, &'static str);
 
-const TABLE: [Row; 14] = [
+const TABLE: [Row; 15] = [
     (Limit::DriveRange, "drive_range", "the servo clips the drive at its range", "limits.current_a"),
     (Limit::DriveSlew, "drive_slew", "the servo slows the change of the drive", "limits.full_drive_s"),
     (
@@ -108,6 +110,12 @@ const TABLE: [Row; 14] = [
         "trim",
         "the trim on the force sensor is at its authority",
         "trim_authority of the controller",
+    ),
+    (
+        Limit::SetpointRise,
+        "setpoint_rise",
+        "the setpoint is on its way: it moves no faster than its rise time says",
+        "controller.setpoint_rise_s",
     ),
     (Limit::LeaseRamp, "lease_ramp", "the lease ended, the controller ramps to zero", "ttl_ms of the lease"),
 ];

@@ -91,6 +91,8 @@ enumeration! {
         ClearFaults = 3 "clear-faults",
         /// Switch the control law, or change its parameters.
         SetController = 4 "set-controller",
+        /// Ramp the setpoint to zero and hold it there, whoever commands: the service is about to end.
+        Rest = 5 "rest",
     }
 }
 
@@ -259,6 +261,20 @@ message! { "kort.Command",
     }
 }
 
+message! { "kort.Trip",
+    /// A stop that nobody asked for, and what the thruster did just before it.
+    Trip {
+        /// When, on CLOCK_MONOTONIC, ns; zero: there was none.
+        at_ns: u64,
+        /// Thrust before, N; NaN if not measured.
+        thrust_n: f64,
+        /// Shaft speed before, rad/s; NaN if not measured.
+        shaft_speed_rad_s: f64,
+        /// Drive before, in the unit of the drive.
+        drive: f64,
+    }
+}
+
 message! { "kort.Telemetry",
     /// Servo to all, one a servo tick: a whole row of the recording and the servo's state.
     Telemetry {
@@ -292,6 +308,8 @@ message! { "kort.Telemetry",
         thermal_load: f64,
         /// Largest drive the servo takes, in the unit of the drive.
         drive_max: f64,
+        /// The last stop that nobody asked for; all zero without one.
+        tripped: Trip,
         /// The loop's timing.
         timing: Timing,
     }

@@ -1,6 +1,7 @@
 //! `kort`: thrust control for marine thrusters, and a laboratory that finds what the model left
 //! out. This file parses and dispatches; every subcommand lives in a folder of its own.
 
+mod token;
 mod up;
 
 use std::path::PathBuf;
@@ -8,6 +9,7 @@ use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand};
 use kort_proto::config::Config;
+use kort_proto::messages::Trip;
 use kort_proto::transport::Deployment;
 
 /// Done.
@@ -48,6 +50,11 @@ enum Command {
         /// Open the shared memory that another process owns, instead of creating it
         #[arg(long)]
         join: bool,
+        #[command(flatten)]
+        latched: Latched,
+        /// The stop that ended the servo before: time in ns, thrust in N, shaft speed in rad/s
+        #[arg(long, value_name = "NS,N,RAD/S", hide = true, value_parser = trip, allow_hyphen_values = true)]
+        tripped: Option<Trip>,
     },
     /// The controller alone: from setpoint to drive command
     #[command(after_help = "Example: kort controller --config config/kort.toml --thruster t1")]
@@ -56,10 +63,15 @@ enum Command {
         service: Service,
         #[command(flatten)]
         which: Which,
+        #[command(flatten)]
+        latched: Latched,
     },
     /// The gateway alone: console, REST API, WebSocket, metrics, recordings
     #[command(after_help = "Example: kort gateway --config config/kort.toml")]
     Gateway(Service),
+    /// Make a token: who may read, command or administer
+    #[command(subcommand)]
+    Token(token::Token),
     #[command(flatten)]
     Lab(kort_lab::Command),
 }
@@ -79,6 +91,26 @@ struct Which {
     /// Thruster to serve
     #[arg(long, value_name = "ID", default_value = "t1")]
     thruster: String,
+}
+
+#[derive(Args)]
+struct Latched {
+    /// Faults that the process before had latched, as a bitset: they stay until somebody clears them
+    #[arg(long, value_name = "BITS", default_value_t = 0, hide = true)]
+    latched: u64,
+}
+
+/// Reads `--tripped`.
+fn trip(text: &str) -> Result<Trip, String> {
+    let words = || "three numbers, for example 1000000000,80.0,63.0".to_owned();
+    let parts: Vec<&str> = text.split(',').collect();
+    let [at, thrust, speed] = parts.as_slice() else { return Err(words()) };
+    Ok(Trip {
+        at_ns: at.parse().map_err(|_| words())?,
+        thrust_n: thrust.parse().map_err(|_| words())?,
+        shaft_speed_rad_s: speed.parse().map_err(|_| words())?,
+        drive: f64::NAN,
+    })
 }
 
 impl Service {
@@ -108,21 +140,24 @@ fn dispatch(command: Command) -> Result<ExitCode, ExitCode> {
             let (config, deployment) = service.load()?;
             finish(up::run(&config, &deployment))
         }
-        Command::Servo { service, which, join } => {
+        Command::Servo { service, which, join, latched, tripped } => {
             log();
             let (config, deployment) = service.load()?;
-            finish(kort_servo::run(&config, &deployment, &which.thruster, join))
+            let inherited =
+                kort_servo::Inherited { latched: latched.latched, tripped: tripped.unwrap_or_default() };
+            finish(kort_servo::run(&config, &deployment, &which.thruster, join, inherited))
         }
-        Command::Controller { service, which } => {
+        Command::Controller { service, which, latched } => {
             log();
             let (config, deployment) = service.load()?;
-            finish(kort_controller::run(&config, &deployment, &which.thruster))
+            finish(kort_controller::run(&config, &deployment, &which.thruster, latched.latched))
         }
         Command::Gateway(service) => {
             log();
             let (config, deployment) = service.load()?;
             finish(kort_gateway::run(&config, &deployment))
         }
+        Command::Token(command) => token::run(command),
         Command::Lab(command) => Ok(kort_lab::run(command)),
     }
 }
@@ -138,7 +173,13 @@ trait Blames {
 
 impl Blames for up::UpError {
     fn blames_input(&self) -> bool {
-        matches!(self, Self::Config(_) | Self::Refused { .. })
+        match self {
+            Self::Config(_) | Self::Refused { .. } => true,
+            Self::Servo(e) => e.blames_input(),
+            Self::Controller(e) => e.blames_input(),
+            Self::Gateway(e) => e.blames_input(),
+            Self::Transport(_) | Self::System { .. } | Self::DoesNotStart { .. } => false,
+        }
     }
 }
 
@@ -156,7 +197,7 @@ impl Blames for kort_controller::ControllerError {
 
 impl Blames for kort_gateway::GatewayError {
     fn blames_input(&self) -> bool {
-        matches!(self, Self::Config(_))
+        matches!(self, Self::Config(_) | Self::NoTokens { .. } | Self::Tokens(_) | Self::Tls(_))
     }
 }
 

@@ -1,29 +1,40 @@
 //! `kort up`: owns the shared memory, runs servo, controller and gateway as child processes,
-//! replaces one that dies, and stops with thrust at zero first.
+//! replaces one that dies or hangs, and stops with thrust at zero first.
 
-use std::os::unix::process::{CommandExt, ExitStatusExt};
-use std::path::Path;
-use std::process::{Child, Command};
+mod role;
+mod scribe;
+mod watch;
+
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use kort_proto::config::{Config, ConfigError};
-use kort_proto::messages::{Request, RequestKind};
-use kort_proto::transport::{Deployment, GatewayPorts, Owner, TransportError};
-use rustix::process::{Pid, Signal, kill_process, set_parent_process_death_signal};
+use kort_proto::events::{Before, Event, EventKind, EventLog};
+use kort_proto::messages::RequestKind;
+use kort_proto::transport::{Deployment, Owner, Restarts, TransportError, Watched};
 use thiserror::Error;
 use tracing::{info, warn};
 
+use role::Role;
+use scribe::Scribe;
+use watch::Watch;
+
 /// How often children are looked at.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
-/// A child that lived shorter than this did not start properly.
-const START: Duration = Duration::from_secs(3);
 /// Failed starts in a row after which the shared memory is created afresh.
 const STARTS_PER_GENERATION: u32 = 3;
 /// Fresh generations without a proper start after which `up` gives up.
 const GENERATIONS: u32 = 3;
-/// How long the servo may take to be at zero, and a child to end.
+/// A look that comes later than this: the whole machine stood still, and nobody is to blame.
+const STOOD_STILL: Duration = Duration::from_millis(500);
+/// How things stand is written down this often while a drive is armed.
+const NOTE_EVERY: Duration = Duration::from_secs(1);
+/// How long a thruster may take to come to rest before its drive is switched off, and after.
+const REST_WITHIN: Duration = Duration::from_millis(2500);
+const COAST_WITHIN: Duration = Duration::from_secs(3);
+/// How long a child may take to end.
 const STOP_WITHIN: Duration = Duration::from_secs(2);
 
 /// Why `up` cannot run.
@@ -38,6 +49,12 @@ pub enum UpError {
     /// The gateway could not start.
     #[error(transparent)]
     Gateway(#[from] kort_gateway::GatewayError),
+    /// A servo could not start.
+    #[error(transparent)]
+    Servo(#[from] kort_servo::ServoError),
+    /// A controller could not start.
+    #[error(transparent)]
+    Controller(#[from] kort_controller::ControllerError),
     /// The system refuses.
     #[error("{what}: {error}")]
     System {
@@ -60,7 +77,7 @@ pub enum UpError {
     },
 }
 
-/// Runs the deployment until SIGINT or SIGTERM.
+/// Runs the deployment until SIGINT, SIGTERM or SIGHUP.
 ///
 /// # Errors
 /// [`UpError`] if it cannot start, or a child does not stay up.
@@ -70,215 +87,320 @@ pub fn run(config: &Config, deployment: &Deployment) -> Result<(), UpError> {
         move |error| UpError::System { what, error }
     };
     let gateway = kort_gateway::Settings::new(config)?;
+    for id in config.thrusters.keys() {
+        kort_servo::check(config, id)?;
+        kort_controller::check(config, id)?;
+    }
     let stop = Arc::new(AtomicBool::new(false));
-    for signal in [signal_hook::consts::SIGTERM, signal_hook::consts::SIGINT] {
+    for signal in [signal_hook::consts::SIGTERM, signal_hook::consts::SIGINT, signal_hook::consts::SIGHUP] {
         signal_hook::flag::register(signal, Arc::clone(&stop))
             .map_err(system("signals cannot be watched"))?;
     }
-    let thrusters: Vec<&str> = config.thrusters.keys().map(String::as_str).collect();
-    let mut owner = deployment.own()?;
+    let owner = deployment.own()?;
     kort_gateway::check(&gateway)?;
-    owner.create(&thrusters)?;
+    let log = EventLog::open(&gateway.events).map_err(system("the event log"))?;
+    let scribe = Scribe::start(log, deployment.watched_file()).map_err(system("a thread"))?;
     let program = std::env::current_exe().map_err(system("this program's own path"))?;
-    let mut roles: Vec<Role> = thrusters
-        .iter()
-        .flat_map(|id| [Role::new("servo", Some(id)), Role::new("controller", Some(id))])
-        .chain([Role::new("gateway", None)])
-        .collect();
-    let start = |role: &mut Role| role.start(&program, config.file.as_deref(), deployment.root());
-    for role in &mut roles {
-        start(role)?;
-    }
+    let mut service = Service::new(config, owner, scribe, program);
+    service.begin()?;
     match &config.file {
         Some(file) => println!("config   {}", file.display()),
         None => {
             println!("config   as built in; --config FILE takes another, config/kort.toml is found by itself")
         }
     }
-    println!("console  http://{}/", gateway.bind);
-    println!("API      http://{}/v1/thrusters   (described at /docs)", gateway.bind);
+    let address = format!("{}://{}", gateway.scheme(), gateway.bind);
+    println!("console  {address}/");
+    println!("API      {address}/v1/thrusters   (described at /docs)");
     println!("Ctrl-C stops all, thrust at zero first");
-
-    let mut generations = 0;
-    let result = loop {
-        if stop.load(Ordering::Relaxed) {
-            break Ok(());
-        }
-        std::thread::sleep(LOOK_EVERY);
-        let mut dead = Vec::new();
-        for (i, role) in roles.iter_mut().enumerate() {
-            if role.has_died() {
-                dead.push(i);
-            }
-        }
-        if dead.is_empty() {
-            if roles.iter().all(Role::is_up) {
-                generations = 0;
-            }
-            continue;
-        }
-        if let Some(role) = roles.iter().find(|role| role.refused) {
-            break Err(UpError::Refused { name: role.name.to_owned() });
-        }
-        // What the dead held in shared memory is freed before anyone takes their place.
-        owner.clear_up_after_the_dead();
-        let spent = roles.iter().find(|role| role.failed_starts >= STARTS_PER_GENERATION);
-        let restarted = if let Some(role) = spent {
-            generations += 1;
-            if generations > GENERATIONS {
-                break Err(UpError::DoesNotStart { name: role.name.to_owned() });
-            }
-            warn!(
-                "{} failed to start {STARTS_PER_GENERATION} times: creating the shared memory afresh",
-                role.name
-            );
-            roles.iter_mut().for_each(Role::end);
-            owner.create(&thrusters).map_err(UpError::from).and_then(|_| roles.iter_mut().try_for_each(start))
-        } else {
-            dead.into_iter().try_for_each(|i| roles.get_mut(i).map_or(Ok(()), start))
-        };
-        if let Err(e) = restarted {
-            break Err(e);
-        }
-    };
-    // A servo that never came up has nothing to set to zero.
-    if roles.iter().any(|role| role.name == "servo" && role.child.is_some()) {
-        go_to_zero(&owner, &thrusters);
-    }
-    // The gateway first: nobody commands any more; the servo last.
-    roles.iter_mut().rev().for_each(Role::end);
-    info!("stopped");
+    let result = service.watch_until(&stop);
+    service.end();
     result
 }
 
-/// Disarms every thruster and waits until the servos say so.
-fn go_to_zero(owner: &Owner, thrusters: &[&str]) {
-    let end = Instant::now() + STOP_WITHIN;
-    for id in thrusters {
-        let Ok(mut ports) = GatewayPorts::open(owner.deployment(), id) else { continue };
-        let disarm = Request { kind: RequestKind::Disarm as u32, ..Request::default() };
-        let mut asked = Instant::now() - LOOK_EVERY;
-        loop {
-            if asked.elapsed() >= LOOK_EVERY {
-                asked = Instant::now();
-                let _ = ports.request.send(disarm);
-            }
-            std::thread::sleep(Duration::from_millis(2));
-            match ports.telemetry.latest() {
-                Some(telemetry) if telemetry.armed == 0 => {
-                    info!(thruster = id, "thrust at zero, disarmed");
-                    break;
-                }
-                _ if Instant::now() >= end => {
-                    warn!(thruster = id, "the servo does not answer; its end switches the drive off");
-                    break;
-                }
-                _ => {}
-            }
-        }
-    }
+/// Everything under the supervisor.
+struct Service {
+    owner: Owner,
+    scribe: Scribe,
+    program: PathBuf,
+    config: Option<PathBuf>,
+    ids: Vec<String>,
+    roles: Vec<Role>,
+    watches: Vec<Watch>,
+    written: Watched,
+    written_at: Instant,
+    generations: u32,
 }
 
-/// One child process and how it fares.
-struct Role {
-    name: &'static str,
-    thruster: Option<String>,
-    child: Option<Child>,
-    started: Instant,
-    failed_starts: u32,
-    refused: bool,
-}
-
-impl Role {
-    fn new(name: &'static str, thruster: Option<&str>) -> Self {
+impl Service {
+    fn new(config: &Config, owner: Owner, scribe: Scribe, program: PathBuf) -> Self {
+        let before = Watched::read(&owner.deployment().watched_file());
+        let ids: Vec<String> = config.thrusters.keys().cloned().collect();
+        let watches =
+            ids.iter().map(|id| Watch::new(id, before.thrusters.get(id).copied().unwrap_or_default()));
+        let roles = ids
+            .iter()
+            .flat_map(|id| [Role::new("servo", Some(id)), Role::new("controller", Some(id))])
+            .chain([Role::new("gateway", None)]);
         Self {
-            name,
-            thruster: thruster.map(Into::into),
-            child: None,
-            started: Instant::now(),
-            failed_starts: 0,
-            refused: false,
+            watches: watches.collect(),
+            roles: roles.collect(),
+            owner,
+            scribe,
+            program,
+            config: config.file.clone(),
+            ids,
+            written: Watched::default(),
+            written_at: Instant::now(),
+            generations: 0,
         }
     }
 
-    fn start(&mut self, program: &Path, config: Option<&Path>, root: &Path) -> Result<(), UpError> {
-        let mut command = Command::new(program);
-        command.arg(self.name).arg("--root").arg(root);
-        if let Some(config) = config {
-            command.arg("--config").arg(config);
+    /// Creates the shared memory and starts every process.
+    fn begin(&mut self) -> Result<(), UpError> {
+        let ids: Vec<&str> = self.ids.iter().map(String::as_str).collect();
+        self.owner.create(&ids)?;
+        for watch in &mut self.watches {
+            if watch.stood.armed {
+                let words = format!("the service ended while {} was armed, at {}", watch.id(), watch.words());
+                warn!("{words}");
+                let before = Before {
+                    thrust_n: watch.stood.thrust_n,
+                    shaft_speed_rad_s: watch.stood.shaft_speed_rad_s,
+                };
+                let event = Event::now(EventKind::ProcessEnded, Some(watch.id()), "supervisor", words);
+                self.scribe.event(event.before(before));
+            }
         }
-        if let Some(thruster) = &self.thruster {
-            command.arg("--thruster").arg(thruster);
+        for at in 0..self.roles.len() {
+            self.start(at)?;
         }
-        if self.name == "servo" {
-            command.arg("--join");
+        for watch in &mut self.watches {
+            watch.servo_ended();
         }
-        // A group of its own: Ctrl-C on the terminal reaches only the supervisor.
-        command.process_group(0);
-        // The servo must set its drive to zero when the supervisor dies; the others just end.
-        let last = if self.name == "servo" { Signal::TERM } else { Signal::KILL };
-        let supervisor = rustix::process::getpid();
-        // SAFETY: prctl and getppid are async-signal-safe and allocate nothing.
-        unsafe {
-            command.pre_exec(move || {
-                set_parent_process_death_signal(Some(last))?;
-                // The supervisor may have died before the line above.
-                if rustix::process::getppid() != Some(supervisor) {
-                    return Err(std::io::ErrorKind::Interrupted.into());
-                }
-                Ok(())
-            });
-        }
-        let child = command
-            .spawn()
-            .map_err(|error| UpError::System { what: format!("starting {}", self.name), error })?;
-        info!(thruster = self.thruster, process = child.id(), "{} started", self.name);
-        self.child = Some(child);
-        self.started = Instant::now();
         Ok(())
     }
 
-    /// Up for long enough to believe in it; forgets failed starts.
-    fn is_up(&self) -> bool {
-        self.child.is_some() && self.started.elapsed() >= START
+    /// Starts one process, with what its predecessor left.
+    fn start(&mut self, at: usize) -> Result<(), UpError> {
+        let Some(role) = self.roles.get_mut(at) else { return Ok(()) };
+        let of_role = self.watches.iter().find(|watch| role.thruster.as_deref() == Some(watch.id()));
+        let heritage = of_role.map(|watch| watch.heritage(role.name)).unwrap_or_default();
+        role.start(&self.program, self.config.as_deref(), self.owner.deployment().root(), heritage)?;
+        let (name, thruster) = (role.name, role.thruster.clone());
+        let words = format!("{name} started");
+        self.scribe.event(Event::now(EventKind::ProcessStarted, thruster.as_deref(), "supervisor", words));
+        Ok(())
     }
 
-    /// Did it end? Counts a start that failed.
-    fn has_died(&mut self) -> bool {
-        let Some(child) = &mut self.child else { return true };
-        let Ok(Some(status)) = child.try_wait() else {
-            if self.is_up() {
-                self.failed_starts = 0;
+    /// Watches and replaces until told to stop.
+    fn watch_until(&mut self, stop: &AtomicBool) -> Result<(), UpError> {
+        let mut looked = Instant::now();
+        while !stop.load(Ordering::Relaxed) {
+            std::thread::sleep(LOOK_EVERY);
+            if looked.elapsed() > STOOD_STILL {
+                self.roles.iter_mut().for_each(|role| role.beat = Instant::now());
             }
-            return false;
+            looked = Instant::now();
+            self.hear();
+            self.end_the_hung();
+            let ended = self.find_the_ended();
+            if let Some(role) = self.roles.iter().find(|role| role.refused) {
+                return Err(UpError::Refused { name: role.name.to_owned() });
+            }
+            if ended {
+                // What the dead held in shared memory is freed before anyone takes their place.
+                self.owner.clear_up_after_the_dead();
+            }
+            self.replace()?;
+            self.write_down();
+        }
+        Ok(())
+    }
+
+    /// Reads what the processes sent.
+    fn hear(&mut self) {
+        let now = Instant::now();
+        for watch in &mut self.watches {
+            let beats = watch.look(self.owner.deployment());
+            for role in &mut self.roles {
+                let mine = role.thruster.as_deref().is_none_or(|id| id == watch.id());
+                let beat = match role.name {
+                    "servo" => beats.servo,
+                    "controller" => beats.controller,
+                    _ => beats.gateway,
+                };
+                if mine && beat {
+                    role.beat = now;
+                }
+            }
+        }
+    }
+
+    /// A process that does not beat any more is ended; it is replaced like any other that ended.
+    fn end_the_hung(&mut self) {
+        for role in self.roles.iter_mut().filter(|role| role.hangs()) {
+            let words = format!("{} did not beat for {} s, ended", role.name, role::HUNG_AFTER.as_secs());
+            warn!(thruster = role.thruster, "{words}");
+            self.scribe.event(Event::now(
+                EventKind::ProcessHung,
+                role.thruster.as_deref(),
+                "supervisor",
+                words,
+            ));
+            role.kill();
+            // Told once: it is gone at one of the next looks.
+            role.beat = Instant::now();
+        }
+    }
+
+    /// Notes who ended, and what its thrusters did just before.
+    fn find_the_ended(&mut self) -> bool {
+        let mut any = false;
+        for role in &mut self.roles {
+            let Some(ended) = role.look() else { continue };
+            any = true;
+            let words = format!("{} ended: {}", role.name, ended.why);
+            let mut told = false;
+            for watch in &mut self.watches {
+                if role.thruster.as_deref().is_some_and(|id| id != watch.id()) {
+                    continue;
+                }
+                // The last samples still lie in shared memory.
+                watch.look(self.owner.deployment());
+                if watch.stood.armed {
+                    let before = Before {
+                        thrust_n: watch.stood.thrust_n,
+                        shaft_speed_rad_s: watch.stood.shaft_speed_rad_s,
+                    };
+                    let words = format!("{words}, while armed");
+                    let event = Event::now(EventKind::ProcessEnded, Some(watch.id()), "supervisor", words);
+                    self.scribe.event(event.before(before));
+                    told = true;
+                }
+            }
+            if !told {
+                let thruster = role.thruster.as_deref();
+                self.scribe.event(Event::now(EventKind::ProcessEnded, thruster, "supervisor", words));
+            }
+        }
+        any
+    }
+
+    /// Starts anew whoever is away and due.
+    fn replace(&mut self) -> Result<(), UpError> {
+        if self.roles.iter().all(Role::is_up) {
+            self.generations = 0;
+        }
+        if let Some(spent) = self.roles.iter().find(|role| role.failed_starts >= STARTS_PER_GENERATION) {
+            self.generations += 1;
+            if self.generations > GENERATIONS {
+                return Err(UpError::DoesNotStart { name: spent.name.to_owned() });
+            }
+            warn!(
+                "{} failed to start {STARTS_PER_GENERATION} times: creating the shared memory afresh",
+                spent.name
+            );
+            for role in &mut self.roles {
+                role.end();
+                role.failed_starts = 0;
+                role.restarts += 1;
+            }
+            let ids: Vec<&str> = self.ids.iter().map(String::as_str).collect();
+            self.owner.create(&ids)?;
+            return (0..self.roles.len()).try_for_each(|at| self.start(at));
+        }
+        for at in 0..self.roles.len() {
+            if !self.roles[at].due() {
+                continue;
+            }
+            self.roles[at].restarts += 1;
+            self.start(at)?;
+            let Role { name, thruster, .. } = &self.roles[at];
+            if *name == "servo"
+                && let Some(watch) = self.watches.iter_mut().find(|w| Some(w.id()) == thruster.as_deref())
+            {
+                watch.servo_ended();
+            }
+        }
+        Ok(())
+    }
+
+    /// Notes how things stand where that changed, and each second while a drive is armed.
+    fn write_down(&mut self) {
+        let restarts = self.roles.iter().map(|role| Restarts {
+            process: role.name.to_owned(),
+            thruster: role.thruster.clone(),
+            count: role.restarts,
+            pid: role.child.as_ref().map(std::process::Child::id),
+        });
+        let stood = self.watches.iter().map(|watch| (watch.id().to_owned(), watch.stood));
+        let now = Watched { restarts: restarts.collect(), thrusters: stood.collect() };
+        let key = |watched: &Watched| -> Vec<(bool, u64, u64)> {
+            watched.thrusters.values().map(|s| (s.armed, s.servo_faults, s.controller_faults)).collect()
         };
-        // Killed from outside is no failed start: whoever killed it may do so at any instant.
-        let killed = status.signal() == Some(Signal::KILL.as_raw());
-        self.failed_starts = if killed || self.is_up() { 0 } else { self.failed_starts + 1 };
-        // Exit code 2: wrong input, and no restart makes it right.
-        self.refused = status.code() == Some(2) && !self.is_up();
-        let full = status.signal() == Some(Signal::BUS.as_raw());
-        let hint = if full { "\nhint: /dev/shm is full (df /dev/shm)" } else { "" };
-        warn!(thruster = self.thruster, "{} ended ({status}){hint}", self.name);
-        self.child = None;
-        true
+        let armed = now.thrusters.values().any(|stood| stood.armed);
+        let changed = now.restarts != self.written.restarts || key(&now) != key(&self.written);
+        if changed || (armed && self.written_at.elapsed() >= NOTE_EVERY) {
+            self.written_at = Instant::now();
+            self.written = now.clone();
+            self.scribe.watched(now);
+        }
     }
 
-    /// Ends it: asks, and kills what does not answer.
-    fn end(&mut self) {
-        let Some(mut child) = self.child.take() else { return };
-        if let Some(pid) = i32::try_from(child.id()).ok().and_then(Pid::from_raw) {
-            let _ = kill_process(pid, Signal::TERM);
+    /// Thrust to zero, then every process ends: the gateway first, so that nobody commands any more; the servo last.
+    fn end(mut self) {
+        // A servo that never came up has nothing to set to zero.
+        if self.roles.iter().any(|role| role.name == "servo" && role.child.is_some()) {
+            self.go_to_zero();
         }
-        let end = Instant::now() + STOP_WITHIN;
-        while Instant::now() < end {
-            if !matches!(child.try_wait(), Ok(None)) {
-                return;
+        self.roles.iter_mut().rev().for_each(Role::end);
+        for watch in &mut self.watches {
+            watch.stood.armed = false;
+        }
+        self.write_down();
+        self.scribe.event(Event::now(EventKind::ServiceStopped, None, "supervisor", "the service was stopped"));
+        self.scribe.finish();
+        info!("stopped");
+    }
+
+    /// Ramps every thruster down, disarms it at rest, and says what is left of thrust and speed.
+    fn go_to_zero(&mut self) {
+        self.hear();
+        let begun = Instant::now();
+        let mut asked = begun - LOOK_EVERY;
+        // First the controllers brake; whoever is at rest, or does not get there in time, is disarmed.
+        while self.watches.iter().any(|watch| watch.speaks() && watch.stood.armed) {
+            let late = begun.elapsed() >= REST_WITHIN;
+            if begun.elapsed() >= REST_WITHIN + STOP_WITHIN {
+                break;
             }
-            std::thread::sleep(Duration::from_millis(5));
+            if asked.elapsed() >= LOOK_EVERY {
+                asked = Instant::now();
+                for watch in self.watches.iter_mut().filter(|watch| watch.stood.armed) {
+                    let kind = if late || watch.at_rest() { RequestKind::Disarm } else { RequestKind::Rest };
+                    watch.ask(kind);
+                }
+            }
+            std::thread::sleep(Duration::from_millis(4));
+            self.hear();
         }
-        warn!(thruster = self.thruster, "{} does not end, killed", self.name);
-        let _ = child.kill();
-        let _ = child.wait();
+        // A shaft that was not braked coasts down.
+        let disarmed = Instant::now();
+        while disarmed.elapsed() < COAST_WITHIN
+            && self.watches.iter().any(|watch| watch.speaks() && !watch.at_rest())
+        {
+            std::thread::sleep(LOOK_EVERY);
+            self.hear();
+        }
+        for watch in &self.watches {
+            let (thruster, words) = (watch.id(), watch.words());
+            match (watch.speaks(), watch.stood.armed, watch.at_rest()) {
+                (false, ..) => warn!(thruster, "the servo does not answer; its end switches the drive off"),
+                (true, true, _) => warn!(thruster, "the servo does not disarm; its end switches the drive off"),
+                (true, false, true) => info!(thruster, "thrust at zero ({words}), disarmed"),
+                (true, false, false) => warn!(thruster, "disarmed, the drive is off, but the shaft still turns: {words}"),
+            }
+        }
     }
 }

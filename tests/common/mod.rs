@@ -34,6 +34,8 @@ impl Site {
 [gateway]
 bind = "127.0.0.1:{port}"
 recordings = "{folder}/recordings"
+events = "{folder}/events"
+tokens = "{folder}/tokens.toml"
 [thrusters.t1]
 rig = "{rig}"
 amplifier = "simulated"
@@ -183,6 +185,22 @@ impl Stack {
         let mut response = agent.run(request.body(body).ok()?).ok()?;
         let text = response.body_mut().read_to_string().ok()?;
         Some((response.status().as_u16(), serde_json::from_str(&text).unwrap_or(Value::Null)))
+    }
+
+    /// A page of the gateway as text.
+    pub fn text(&self, path: &str) -> Option<String> {
+        let agent: ureq::Agent = ureq::Agent::config_builder()
+            .http_status_as_error(false)
+            .timeout_global(Some(Duration::from_secs(5)))
+            .build()
+            .into();
+        let url = format!("http://127.0.0.1:{}{path}", self.site.port);
+        agent.get(url).call().ok()?.body_mut().read_to_string().ok()
+    }
+
+    /// A document of the gateway.
+    pub fn get(&self, path: &str) -> Option<Value> {
+        serde_json::from_str(&self.text(path)?).ok()
     }
 
     pub fn state(&self) -> Option<Value> {

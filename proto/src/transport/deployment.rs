@@ -8,7 +8,7 @@
 //! the previous one cannot put anything in the way of the next.
 
 use std::fs;
-use std::os::unix::fs::DirBuilderExt;
+use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -71,6 +71,27 @@ pub enum TransportError {
         free_files: u64,
         /// Needed space, KiB.
         needed_kib: u64,
+    },
+    /// Too few files may be open.
+    #[error(
+        "open files: at most {limit} are allowed here; {needed} are needed\nhint: raise the limit (ulimit -n {needed}; in systemd LimitNOFILE={needed})"
+    )]
+    OpenFiles {
+        /// Files a process may have open.
+        limit: u64,
+        /// Files needed.
+        needed: u64,
+    },
+    /// A file or folder that somebody else could write.
+    #[error(
+        "{}: {why}\nhint: whoever can write it could hold or forge this deployment; remove it, or choose a folder of your own with --root DIR or transport.root in kort.toml",
+        path.display()
+    )]
+    Foreign {
+        /// The file or folder.
+        path: PathBuf,
+        /// What is wrong with it.
+        why: String,
     },
     /// iceoryx2 said no.
     #[error(
@@ -147,15 +168,22 @@ impl Deployment {
             let path = path.to_path_buf();
             move |error| TransportError::File { path, error }
         };
+        allow_files(1)?;
         if let Some(parent) = self.root.parent() {
             fs::create_dir_all(parent).map_err(file_error(parent))?;
+            nobody_else_may_replace(parent)?;
         }
+        ours_alone(&self.root)?;
         let lock_path = self.beside("lock");
+        ours_alone(&lock_path)?;
         let lock = fs::OpenOptions::new()
             .create(true)
             .truncate(false)
             .write(true)
             .read(true)
+            .mode(0o600)
+            // A link that somebody laid here would have us write elsewhere.
+            .custom_flags(libc::O_NOFOLLOW)
             .open(&lock_path)
             .map_err(file_error(&lock_path))?;
         if flock(&lock, FlockOperation::NonBlockingLockExclusive).is_err() {
@@ -215,6 +243,11 @@ impl Deployment {
         format!("kort_{hash:08x}_")
     }
 
+    /// The file in which the supervisor notes what it watches, see [`super::Watched`].
+    pub fn watched_file(&self) -> PathBuf {
+        self.beside("watched")
+    }
+
     fn generation_file(&self) -> PathBuf {
         self.beside("generation")
     }
@@ -248,6 +281,7 @@ impl Owner {
     /// [`TransportError`] if iceoryx2 or the file system refuses.
     pub fn create(&mut self, thrusters: &[&str]) -> Result<u64, TransportError> {
         room_for(thrusters.len() as u64)?;
+        allow_files(thrusters.len() as u64)?;
         let generation = monotonic_ns();
         let node = self.deployment.node("owner", generation)?;
         self.services = thrusters
@@ -257,6 +291,8 @@ impl Owner {
         self.node = Some(node);
         let path = self.deployment.generation_file();
         let draft = self.deployment.beside("generation.new");
+        ours_alone(&path)?;
+        ours_alone(&draft)?;
         fs::write(&draft, generation.to_string())
             .and_then(|()| fs::rename(&draft, &path))
             .map_err(|error| TransportError::File { path, error })?;
@@ -289,6 +325,56 @@ impl Owner {
             }
         }
     }
+}
+
+/// Files that one process opens for its own, and for each thruster.
+const OPEN_FILES: (u64, u64) = (96, 64);
+
+/// Lets this process open as many files as the system permits, and refuses to go on with too few: iceoryx2
+/// would report them as a lack of shared memory.
+fn allow_files(thrusters: u64) -> Result<(), TransportError> {
+    use rustix::process::{Resource, getrlimit, setrlimit};
+    let mut limit = getrlimit(Resource::Nofile);
+    limit.current = limit.maximum.map(|most| most.min(1 << 16)).max(limit.current);
+    let _ = setrlimit(Resource::Nofile, limit);
+    let needed = OPEN_FILES.0 + OPEN_FILES.1 * thrusters;
+    match getrlimit(Resource::Nofile).current {
+        Some(limit) if limit < needed => Err(TransportError::OpenFiles { limit, needed }),
+        _ => Ok(()),
+    }
+}
+
+/// A file or folder of the deployment, if it is there already, must be this user's, and nobody else may write it.
+fn ours_alone(path: &Path) -> Result<(), TransportError> {
+    let Ok(about) = fs::symlink_metadata(path) else { return Ok(()) };
+    let foreign = |why: String| Err(TransportError::Foreign { path: path.to_path_buf(), why });
+    if about.file_type().is_symlink() {
+        return foreign("is a link".into());
+    }
+    let me = rustix::process::getuid().as_raw();
+    if about.uid() != me {
+        return foreign(format!("belongs to user {}, this is user {me}", about.uid()));
+    }
+    if about.mode() & 0o022 != 0 {
+        return foreign(format!("may be written by others (mode {:o})", about.mode() & 0o7777));
+    }
+    Ok(())
+}
+
+/// The folder that holds root and lock: where others may write, they must not be able to replace what is ours.
+fn nobody_else_may_replace(folder: &Path) -> Result<(), TransportError> {
+    let Ok(about) = fs::metadata(folder) else { return Ok(()) };
+    let others_write = about.mode() & 0o002 != 0;
+    let sticky = about.mode() & 0o1000 != 0;
+    let owner = about.uid();
+    let me = rustix::process::getuid().as_raw();
+    if (others_write && !sticky) || (owner != me && owner != 0) {
+        return Err(TransportError::Foreign {
+            path: folder.to_path_buf(),
+            why: format!("user {owner} or others may replace what is in it (mode {:o})", about.mode() & 0o7777),
+        });
+    }
+    Ok(())
 }
 
 /// Has `/dev/shm` room for this many thrusters? Where that cannot be said, it has.

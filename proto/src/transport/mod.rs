@@ -4,7 +4,9 @@
 mod clock;
 mod deployment;
 mod ports;
+mod watched;
 
 pub use clock::{Ticker, monotonic_ns, ordinary, realtime};
 pub use deployment::{Deployment, Owner, TransportError};
-pub use ports::{ControllerPorts, GatewayPorts, Inbox, Outbox, ServoPorts, Ticks, Waker, create_services};
+pub use ports::{ControllerPorts, GatewayPorts, Inbox, Outbox, ServoPorts, SupervisorPorts, Ticks, Waker, create_services};
+pub use watched::{Restarts, Stood, Watched};

@@ -301,3 +301,16 @@ ports! {
     /// From servo and controller.
     reply: Inbox<Reply> = |o| o.inbox(Stream::Reply, Stream::Reply.depth())?;
 }
+
+ports! {
+    /// The supervisor's ports: it listens to everybody's beat, and may ask for rest and disarming.
+    SupervisorPorts, "supervisor";
+    /// To servo and controller.
+    request: Outbox<Request> = |o| o.outbox(Stream::Request)?;
+    /// From the servo.
+    telemetry: Inbox<Telemetry> = |o| o.inbox(Stream::Telemetry, 64)?;
+    /// From the controller.
+    state: Inbox<ControllerState> = |o| o.inbox(Stream::ControllerState, 1)?;
+    /// From the gateway: one a heartbeat.
+    setpoint: Inbox<Setpoint> = |o| o.inbox(Stream::Setpoint, 1)?;
+}

@@ -8,7 +8,8 @@
 mod process;
 #[cfg(test)]
 mod tests;
+pub mod slew;
 pub mod tick;
 
 #[cfg(feature = "process")]
-pub use process::{ControllerError, run};
+pub use process::{ControllerError, check, run};

@@ -17,6 +17,9 @@ use crate::tick::Tick;
 
 /// Telemetry samples read at one wake-up at most.
 const SAMPLES: usize = 64;
+/// Signals that end the process in good order; a terminal that goes away sends SIGHUP.
+const END_SIGNALS: [i32; 3] =
+    [signal_hook::consts::SIGTERM, signal_hook::consts::SIGINT, signal_hook::consts::SIGHUP];
 /// Requests read in one tick at most.
 const REQUESTS: usize = 4;
 
@@ -58,18 +61,32 @@ pub enum ControllerError {
     Signals(#[from] std::io::Error),
 }
 
-/// Runs the controller of one thruster until SIGTERM or SIGINT.
+/// Could the controller of this thruster start? Reads everything it reads.
+///
+/// # Errors
+/// [`ControllerError`] names file, key, value and what is allowed.
+pub fn check(config: &Config, id: &str) -> Result<(), ControllerError> {
+    let thruster = config.thruster(id)?;
+    let (file, text) = config.rig_text(id, thruster)?;
+    let rig = Rig::from_toml(&text).map_err(|error| ControllerError::Rig { file: file.clone(), error })?;
+    let law = law(config, id, thruster)?;
+    Tick::new(&rig, &law, thruster.controller_period_ns(), 0)
+        .map_err(|error| ControllerError::Model { file, error })?;
+    Ok(())
+}
+
+/// Runs the controller of one thruster until SIGTERM, SIGINT or SIGHUP. `latched` are faults that its predecessor had latched: they outlive it until somebody clears them.
 ///
 /// # Errors
 /// [`ControllerError`] if the configuration or shared memory cannot be used.
-pub fn run(config: &Config, deployment: &Deployment, id: &str) -> Result<(), ControllerError> {
+pub fn run(config: &Config, deployment: &Deployment, id: &str, latched: u64) -> Result<(), ControllerError> {
     let thruster = config.thruster(id)?;
     let (file, text) = config.rig_text(id, thruster)?;
     let rig = Rig::from_toml(&text).map_err(|error| ControllerError::Rig { file: file.clone(), error })?;
     let law = law(config, id, thruster)?;
     let period_ns = thruster.controller_period_ns();
     let stop = Arc::new(AtomicBool::new(false));
-    for signal in [signal_hook::consts::SIGTERM, signal_hook::consts::SIGINT] {
+    for signal in END_SIGNALS {
         signal_hook::flag::register(signal, Arc::clone(&stop))?;
     }
     if thruster.controller.priority > 0 {
@@ -89,7 +106,9 @@ pub fn run(config: &Config, deployment: &Deployment, id: &str) -> Result<(), Con
         told = false;
         let mut ports = ControllerPorts::open(deployment, id)?;
         let tick = Tick::new(&rig, &law, period_ns, monotonic_ns())
-            .map_err(|error| ControllerError::Model { file: file.clone(), error })?;
+            .map_err(|error| ControllerError::Model { file: file.clone(), error })?
+            .with_rise(thruster.controller.setpoint_rise_s)
+            .with_latched(latched);
         info!(
             thruster = id,
             law = law.law.name(),

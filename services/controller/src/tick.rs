@@ -15,11 +15,16 @@ use kort_proto::signals::{Estimates, Signals};
 use kort_proto::text::Text;
 use kort_thruster::rig::{AmplifierKind, Rig};
 
+use crate::slew::{Slew, rise_s};
+
 /// After the lease's end the setpoint falls to zero in this time, then the servo is stopped: all
 /// within 500 ms.
 const LEASE_RAMP_NS: u64 = 400_000_000;
 /// Silent controller periods after which a peer counts as lost.
 const GATEWAY_PERIODS: u64 = 3;
+/// A gateway may be silent this long before the setpoint is ramped down: it serves a network, and a hiccup of
+/// it is no reason to stop. With the ramp all is over within 500 ms.
+const GATEWAY_SILENCE_NS: u64 = 100_000_000;
 const SERVO_PERIODS: u64 = 10;
 /// A reading stands that long for what its sensor would say: the slow ones are read at 20 Hz. After
 /// that the value is not measured, and laws and observers go on without it.
@@ -39,7 +44,10 @@ pub struct Tick {
     servo_stamp_ns: u64,
     lease_until_ns: u64,
     setpoint: Option<Accepted>,
-    lease_ended_ns: Option<u64>,
+    ending: Option<Ending>,
+    slew: Slew,
+    /// Time from zero to the largest setpoint, s; `None` takes the law's own, see [`crate::slew`].
+    rise_s: Option<f64>,
     armed: bool,
     armed_at_ns: u64,
     drive_max: f64,
@@ -54,6 +62,17 @@ pub struct Tick {
     refused: Option<(u64, u64)>,
     output: Output,
     in_force: f64,
+}
+
+/// The setpoint goes to zero, and why.
+#[derive(Clone, Copy, Debug)]
+struct Ending {
+    /// When it began, on CLOCK_MONOTONIC, ns.
+    since_ns: u64,
+    /// Fault to latch when zero is reached; none for a lease that ended.
+    cause: Option<Fault>,
+    /// At zero the law goes on holding it, until somebody disarms: the service is about to end.
+    hold: bool,
 }
 
 /// A setpoint that counts.
@@ -92,7 +111,9 @@ impl Tick {
             servo_stamp_ns: 0,
             lease_until_ns: 0,
             setpoint: None,
-            lease_ended_ns: None,
+            ending: None,
+            slew: Slew::default(),
+            rise_s: Some(0.0),
             armed: false,
             armed_at_ns: 0,
             drive_max: 0.0,
@@ -108,6 +129,17 @@ impl Tick {
         })
     }
 
+    /// With setpoints that move no faster than from zero to the largest in `rise_s`; `None` takes the time that
+    /// suits the law. Without this call they step.
+    pub fn with_rise(self, rise_s: Option<f64>) -> Self {
+        Self { rise_s, ..self }
+    }
+
+    /// With the faults that a predecessor had latched.
+    pub fn with_latched(self, latched: u64) -> Self {
+        Self { latched, ..self }
+    }
+
     /// Takes a telemetry sample; call for every one, oldest first.
     pub fn take_telemetry(&mut self, telemetry: &Telemetry, now_ns: u64) {
         let life_ns = SERVO_PERIODS * self.period_ns;
@@ -117,6 +149,10 @@ impl Tick {
         }
         self.servo_stamp_ns = telemetry.header.stamp_ns;
         let armed = telemetry.armed != 0;
+        if sender == Fresh::NewSession && self.armed {
+            // Replaced while it drove: nobody asked for that stop.
+            self.trip(Fault::ServoLost);
+        }
         if !armed || sender == Fresh::NewSession || telemetry.armed_at_ns != self.armed_at_ns {
             self.forget();
         }
@@ -151,13 +187,13 @@ impl Tick {
         // A session is named by when it began. One that is new here but older than the arming is no
         // successor: its arming was merely faster than its first setpoint.
         if sender == Fresh::NewSession && self.armed && message.header.session > self.armed_at_ns {
-            self.trip(Fault::GatewayRestarted);
+            self.end(now_ns, Some(Fault::GatewayRestarted));
         }
         self.gateway_stamp_ns = message.header.stamp_ns;
         self.lease_until_ns = message.lease_until_ns;
         // Only a setpoint given under a living lease, after the arming, before any end of lease.
         let counts = self.armed
-            && self.lease_ended_ns.is_none()
+            && self.ending.is_none()
             && message.given_at_ns > self.armed_at_ns
             && message.given_at_ns <= message.header.stamp_ns
             && now_ns < message.lease_until_ns;
@@ -199,16 +235,14 @@ impl Tick {
             }
             // A gateway that has not spoken since the arming is given as long as one that went silent.
             let last_word = self.gateway_stamp_ns.max(self.armed_at_ns);
-            if now_ns.saturating_sub(last_word) > self.gateway_timeout_ns() {
-                self.trip(Fault::GatewayLost);
+            if now_ns.saturating_sub(last_word) > self.gateway_timeout_ns().max(GATEWAY_SILENCE_NS) {
+                self.end(now_ns, Some(Fault::GatewayLost));
             }
-            if self.lease_ended_ns.is_none()
-                && now_ns >= self.lease_until_ns.max(self.armed_at_ns + self.gateway_timeout_ns())
-            {
-                self.lease_ended_ns = Some(now_ns);
+            if now_ns >= self.lease_until_ns.max(self.armed_at_ns + self.gateway_timeout_ns()) {
+                self.end(now_ns, None);
             }
         }
-        let (reference, stop) = self.reference(now_ns);
+        let (reference, stop) = self.reference(now_ns, dt_s);
         self.output = self.controller.tick(&self.measurement(), reference, dt_s);
         let mut drive = match self.kind {
             DriveKind::Current => self.output.command.current_a,
@@ -241,30 +275,68 @@ impl Tick {
     }
 
     /// What the law is asked for now, and whether the servo must stop.
-    fn reference(&mut self, now_ns: u64) -> (Reference, bool) {
+    fn reference(&mut self, now_ns: u64, dt_s: f64) -> (Reference, bool) {
         self.limits = 0;
         self.in_force = 0.0;
         if !self.armed || self.latched != 0 {
+            self.slew.reset();
             return (Reference::Off, false);
         }
         let mut share = 1.0;
-        if let Some(ended_ns) = self.lease_ended_ns {
-            let since = now_ns.saturating_sub(ended_ns);
+        if let Some(ending) = self.ending {
+            let since = now_ns.saturating_sub(ending.since_ns);
             let nothing = self.setpoint.is_none_or(|s| s.value == 0.0);
-            if nothing || since >= LEASE_RAMP_NS {
+            if !ending.hold && (nothing || since >= LEASE_RAMP_NS) {
+                if let Some(fault) = ending.cause {
+                    self.trip(fault);
+                }
                 return (Reference::Off, true);
             }
             self.limits |= Limit::LeaseRamp.bit();
-            share = 1.0 - since as f64 / LEASE_RAMP_NS as f64;
+            share = (1.0 - since as f64 / LEASE_RAMP_NS as f64).max(0.0);
         }
-        let Some(setpoint) = self.setpoint else { return (Reference::Off, false) };
-        self.in_force = setpoint.value * share;
+        let Some(setpoint) = self.setpoint else {
+            self.slew.reset();
+            return (Reference::Off, false);
+        };
+        self.in_force = self.slewed(setpoint, dt_s) * share;
         let reference = match setpoint.kind {
             SetpointKind::Zero => Reference::Off,
             SetpointKind::Thrust => Reference::Thrust(self.in_force),
             SetpointKind::Speed => Reference::Speed(self.in_force),
         };
         (reference, false)
+    }
+
+    /// The setpoint on its way from the one before.
+    fn slewed(&mut self, setpoint: Accepted, dt_s: f64) -> f64 {
+        let model = self.controller.model();
+        let (full, from) = match setpoint.kind {
+            SetpointKind::Thrust => (model.thrust_max_n, self.output.estimate.thrust_n.value),
+            SetpointKind::Speed => (model.speed_max_rad_s, self.measured.shaft_speed_rad_s),
+            SetpointKind::Zero => {
+                self.slew.reset();
+                return 0.0;
+            }
+        };
+        if self.ending.is_some() {
+            // The ramp down starts from what is in force, not from what was still on its way.
+            return self.slew.step(setpoint.kind, self.slew.value(), full, 0.0, from, dt_s).0;
+        }
+        let rise_s = self.rise_s.unwrap_or_else(|| rise_s(self.config.law));
+        let (value, moving) = self.slew.step(setpoint.kind, setpoint.value, full, rise_s, from, dt_s);
+        if moving {
+            self.limits |= Limit::SetpointRise.bit();
+        }
+        value
+    }
+
+    /// Lets the setpoint end; the first reason stays, but a fault is not forgotten for a lease that ends too.
+    fn end(&mut self, now_ns: u64, cause: Option<Fault>) {
+        match &mut self.ending {
+            Some(ending) => ending.cause = ending.cause.or(cause.filter(|_| !ending.hold)),
+            None => self.ending = Some(Ending { since_ns: now_ns, cause, hold: false }),
+        }
     }
 
     /// Acts on a request; `None` if it is not for the controller, or too old to be meant for now.
@@ -278,6 +350,11 @@ impl Tick {
         };
         match RequestKind::from_u32(request.kind)? {
             RequestKind::Arm => None,
+            RequestKind::Rest => {
+                let since_ns = self.ending.map_or(now_ns, |ending| ending.since_ns);
+                self.ending = Some(Ending { since_ns, cause: None, hold: true });
+                answer(Outcome::Done, format_args!("going to zero"))
+            }
             RequestKind::Disarm => {
                 self.forget();
                 answer(Outcome::Done, format_args!("setpoint forgotten"))
@@ -436,7 +513,7 @@ impl Tick {
     /// No setpoint, no lease's end: as at start. What counts afterwards must be given afterwards.
     fn forget(&mut self) {
         self.setpoint = None;
-        self.lease_ended_ns = None;
+        self.ending = None;
     }
 }
 

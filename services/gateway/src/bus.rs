@@ -4,14 +4,17 @@
 //! thruster's setpoint anew each heartbeat: silence means the gateway is gone, and the controller
 //! then goes to zero by itself.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, mpsc};
 use std::time::{Duration, Instant};
 
-use kort_proto::messages::{Reply, Setpoint as SetpointMessage, SetpointKind, Telemetry};
+use kort_proto::events::{Before, Event, EventKind};
+use kort_proto::faults::Fault;
+use kort_proto::messages::{Reply, Setpoint as SetpointMessage, SetpointKind, Telemetry, Trip};
 use kort_proto::signals::{Kind, SIGNALS};
 use kort_proto::transport::{Deployment, GatewayPorts, Ticker, TransportError, monotonic_ns, realtime};
 
+use crate::events::Events;
 use crate::record::Recorder;
 use crate::tally::Tally;
 use crate::thruster::{ANSWER_WITHIN, Ask, Thruster};
@@ -33,10 +36,41 @@ pub struct Link {
     pub asks: mpsc::Receiver<Ask>,
     /// Period of the heartbeat.
     pub heartbeat: Duration,
+    /// The event log.
+    pub events: Arc<Events>,
+}
+
+/// The runtime that answers requests beats too: a gateway that only this thread keeps alive must not look alive.
+#[derive(Debug)]
+pub struct Pulse {
+    began: Instant,
+    beat_ms: AtomicU64,
+}
+
+impl Pulse {
+    /// How often the runtime beats.
+    pub const EVERY: Duration = Duration::from_millis(100);
+    /// A runtime silent for this long hangs.
+    const LIFE: Duration = Duration::from_secs(2);
+
+    /// Beats now.
+    pub fn new() -> Pulse {
+        Pulse { began: Instant::now(), beat_ms: AtomicU64::new(0) }
+    }
+
+    /// The runtime beats.
+    pub fn beat(&self) {
+        self.beat_ms.store(self.began.elapsed().as_millis() as u64, Ordering::Relaxed);
+    }
+
+    fn alive(&self) -> bool {
+        let last = Duration::from_millis(self.beat_ms.load(Ordering::Relaxed));
+        self.began.elapsed().saturating_sub(last) < Pulse::LIFE
+    }
 }
 
 /// Runs until `stop` is set.
-pub fn run(deployment: &Deployment, links: Vec<Link>, recorder: &Recorder, stop: &AtomicBool) {
+pub fn run(deployment: &Deployment, links: Vec<Link>, recorder: &Recorder, pulse: &Pulse, stop: &AtomicBool) {
     for warning in realtime(PRIORITY, false) {
         tracing::warn!("{warning}");
     }
@@ -44,10 +78,12 @@ pub fn run(deployment: &Deployment, links: Vec<Link>, recorder: &Recorder, stop:
     let mut bridges: Vec<Bridge> = links.into_iter().map(Bridge::new).collect();
     let mut ticker = Ticker::new(period.as_nanos() as u64);
     while !stop.load(Ordering::Relaxed) {
+        let woke_ns = monotonic_ns();
         for bridge in &mut bridges {
-            bridge.tick(deployment, recorder);
+            bridge.tick(deployment, recorder, pulse);
             bridge.link.tally.gateway_timing(&ticker.timing);
         }
+        ticker.worked(woke_ns);
         ticker.wait();
     }
 }
@@ -61,6 +97,10 @@ struct Bridge {
     next_ask: u64,
     last_servo_sequence: (u64, u64),
     held: Held,
+    /// Latched faults of servo and controller as last heard; none before the first word.
+    latched: [Option<u64>; 2],
+    /// What the thruster did when it was last heard armed.
+    before: Option<Before>,
 }
 
 /// The last value of each signal and when it was taken, ns: a flow meter of 20 Hz shows a value in one row of
@@ -113,11 +153,14 @@ impl Bridge {
             next_ask: 1,
             last_servo_sequence: (0, 0),
             held: Held::default(),
+            latched: [None; 2],
+            before: None,
         }
     }
 
-    fn tick(&mut self, deployment: &Deployment, recorder: &Recorder) {
+    fn tick(&mut self, deployment: &Deployment, recorder: &Recorder, pulse: &Pulse) {
         let now = Instant::now();
+        self.tell_notes(now);
         if self.checked.is_none_or(|at| now.duration_since(at) >= REOPEN_EVERY) {
             self.checked = Some(now);
             self.link.thruster.hear(|_| {}); // silence too is news: what was rendered is no longer so
@@ -128,7 +171,10 @@ impl Bridge {
             return;
         };
         self.receive(&ports, recorder, now);
-        let sent = self.send_asks(&mut ports, now).and_then(|()| ports.setpoint.send(self.setpoint(now)));
+        let sent = self.send_asks(&mut ports, now).and_then(|()| match pulse.alive() {
+            true => ports.setpoint.send(self.setpoint(now)),
+            false => Ok(()),
+        });
         self.answer_overdue(now);
         match sent {
             Ok(()) => self.ports = Some(ports),
@@ -166,8 +212,49 @@ impl Bridge {
         }
     }
 
+    /// What the desk noted goes to the event log.
+    fn tell_notes(&self, now: Instant) {
+        let notes = {
+            let mut desk = self.link.thruster.desk();
+            desk.expire(now);
+            desk.notes()
+        };
+        for note in notes {
+            self.link.events.tell(note.kind, Some(&self.link.thruster.id), &note.who, note.detail);
+        }
+    }
+
+    /// Faults that were not latched before go to the event log, with what the thruster did before. Those that this
+    /// gateway finds latched at its start may stand there already.
+    fn tell_tripped(&mut self, who: usize, faults: u64, tripped: Option<&Trip>) {
+        let known = self.latched[who].replace(faults);
+        let id = &self.link.thruster.id;
+        for fault in Fault::in_set(faults & !known.unwrap_or(0)) {
+            let of_fault = |event: &Event| match event.kind {
+                EventKind::Tripped => event.fault == Some(fault.code()),
+                kind => kind == EventKind::FaultsCleared,
+            };
+            let told = self.link.events.latest(id, of_fault).is_some_and(|event| event.kind == EventKind::Tripped);
+            if known.is_none() && told {
+                continue;
+            }
+            let process = ["servo", "controller"][who];
+            let detail = format!("{} (code {}): {}", fault.name(), fault.code(), fault.help());
+            let event = Event::now(EventKind::Tripped, Some(id), process, detail).fault(fault);
+            let before = self.before.or_else(|| {
+                tripped.filter(|trip| trip.at_ns != 0).map(|trip| Before::of(trip.thrust_n, trip.shaft_speed_rad_s))
+            });
+            self.link.events.note(match before {
+                Some(before) => event.before(before),
+                None => event,
+            });
+        }
+        if faults == 0 && known.is_some_and(|known| known != 0) {
+            self.before = None;
+        }
+    }
+
     fn receive(&mut self, ports: &GatewayPorts, recorder: &Recorder, now: Instant) {
-        let thruster = &self.link.thruster;
         let mut last: Option<Telemetry> = None;
         while let Some(telemetry) = ports.telemetry.next() {
             let (session, sequence) = (telemetry.header.session, telemetry.header.sequence);
@@ -178,14 +265,21 @@ impl Bridge {
             let lost = if session == known.0 { sequence - known.1 - 1 } else { 0 };
             self.last_servo_sequence = (session, sequence);
             self.link.tally.telemetry(&telemetry, lost);
-            recorder.offer(&thruster.id, &telemetry, lost);
+            recorder.offer(&self.link.thruster.id, &telemetry, lost);
             self.held.take(&telemetry);
+            if telemetry.armed != 0 {
+                let shown = self.held.fill(telemetry).signals;
+                self.before = Some(Before::of(shown.thrust_n, shown.shaft_speed_rad_s));
+            }
+            self.tell_tripped(0, telemetry.faults, Some(&telemetry.tripped));
             last = Some(telemetry);
         }
         let state = ports.state.latest();
         if let Some(state) = &state {
             self.link.tally.controller(state);
+            self.tell_tripped(1, state.faults, None);
         }
+        let thruster = &self.link.thruster;
         if last.is_some() || state.is_some() {
             thruster.hear(|heard| {
                 if let Some(telemetry) = last {

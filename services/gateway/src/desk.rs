@@ -2,11 +2,27 @@
 //!
 //! Pure: the caller hands in the time and what is known of the thruster.
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
-use crate::lease::{Lease, LeaseDesk};
+use kort_proto::events::EventKind;
+
+use crate::lease::{Lease, LeaseDesk, Wanted};
 use crate::problem::{Kind, Problem};
 use crate::view::{Setpoint, SetpointRange};
+
+/// A setpoint that moves is noted this often.
+const NOTE_EVERY: Duration = Duration::from_secs(1);
+
+/// Something for the event log.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Note {
+    /// What happened.
+    pub kind: EventKind,
+    /// Who did it.
+    pub who: String,
+    /// What exactly.
+    pub detail: String,
+}
 
 /// Lease and setpoint of one thruster.
 #[derive(Debug)]
@@ -19,6 +35,8 @@ pub struct Desk {
     generation: u64,
     accepted: u64,
     version: u64,
+    notes: Vec<Note>,
+    noted: Option<(Instant, Setpoint)>,
 }
 
 impl Desk {
@@ -32,6 +50,8 @@ impl Desk {
             generation: 0,
             accepted: 0,
             version: 0,
+            notes: Vec::new(),
+            noted: None,
         }
     }
 
@@ -60,11 +80,20 @@ impl Desk {
         self.version
     }
 
-    /// Takes command.
-    pub fn take(&mut self, holder: &str, ttl_ms: u64, now: Instant) -> Result<Lease, Problem> {
+    /// Takes command: at rest, whoever had it before.
+    pub fn take(&mut self, wanted: &Wanted, now: Instant) -> Result<Lease, Problem> {
         self.expire(now);
+        let (lease, before) = self.lease.take(&self.thruster, wanted, now)?;
         self.version += 1;
-        self.lease.take(&self.thruster, holder, ttl_ms, now)
+        let who = lease.who();
+        match before {
+            None => self.note(EventKind::LeaseTaken, &who, format!("{who} took command for {} ms", wanted.ttl_ms)),
+            Some(from) => {
+                self.rest();
+                self.note(EventKind::LeaseTakenOver, &who, format!("{who} took command from {from}"));
+            }
+        }
+        Ok(lease)
     }
 
     /// Renews the lease.
@@ -75,9 +104,11 @@ impl Desk {
 
     /// Gives command up: at rest.
     pub fn give(&mut self, id: Option<&str>, now: Instant) -> Result<(), Problem> {
+        let who = self.lease.current(now).map(Lease::who).unwrap_or_default();
         self.lease.give(&self.thruster, id, now)?;
         self.version += 1;
         self.rest();
+        self.note(EventKind::LeaseGivenUp, &who, format!("{who} gave command up"));
         Ok(())
     }
 
@@ -88,6 +119,7 @@ impl Desk {
         self.given = Some(now);
         self.generation += 1;
         self.accepted += 1;
+        self.note_setpoint(now);
         Ok(lease)
     }
 
@@ -96,19 +128,63 @@ impl Desk {
         if self.setpoint.take().is_some() {
             self.generation += 1;
             self.version += 1;
+            self.noted = None;
         }
     }
 
-    /// A request that may come without the lease, but not against it; with it, it renews it.
+    /// May this request change anything? It needs the lease while somebody holds one, and renews nothing: it may
+    /// still be refused. Without a lease in force anybody may, unless an old one is shown.
     pub fn may(&mut self, id: Option<&str>, now: Instant) -> Result<(), Problem> {
-        id.map_or(Ok(()), |id| self.renew(Some(id), now).map(drop))
+        self.expire(now);
+        if self.lease.current(now).is_none() && id.is_none() {
+            return Ok(());
+        }
+        self.lease.check(&self.thruster, id, now)
     }
 
-    /// Ends a lease whose time is over, and with it its setpoint.
+    /// A change was made by the lease's holder: it lives on.
+    pub fn done(&mut self, id: Option<&str>, now: Instant) {
+        if id.is_some() {
+            let _ = self.renew(id, now);
+        }
+    }
+
+    /// Ends a lease whose time is over, and with it its setpoint; notes a setpoint that has come to rest.
     pub fn expire(&mut self, now: Instant) {
+        let holder = self.lease.holder();
         if self.lease.expire(now) {
             self.version += 1;
             self.rest();
+            let who = holder.unwrap_or_default();
+            self.note(EventKind::LeaseExpired, &who, format!("the lease of {who} ran out"));
+        }
+        self.note_setpoint(now);
+    }
+
+    /// Notes something for the event log.
+    pub fn note(&mut self, kind: EventKind, who: &str, detail: impl Into<String>) {
+        self.notes.push(Note { kind, who: who.to_owned(), detail: detail.into() });
+    }
+
+    /// What was noted since the last call.
+    pub fn notes(&mut self) -> Vec<Note> {
+        std::mem::take(&mut self.notes)
+    }
+
+    /// Notes the setpoint if it changed, at most once a second; the last one is noted in the end.
+    fn note_setpoint(&mut self, now: Instant) {
+        let Some(setpoint) = self.setpoint else { return };
+        let due = self.noted.is_none_or(|(at, known)| {
+            known != setpoint && now.saturating_duration_since(at) >= NOTE_EVERY
+        });
+        if due {
+            self.noted = Some((now, setpoint));
+            let who = self.lease.holder().unwrap_or_default();
+            let asked = match setpoint {
+                Setpoint::ThrustN(value) => format!("thrust_n = {value}"),
+                Setpoint::SpeedRadS(value) => format!("speed_rad_s = {value}"),
+            };
+            self.note(EventKind::Commanded, &who, format!("{who} commands {asked}"));
         }
     }
 }
@@ -138,21 +214,55 @@ pub fn check_range(setpoint: Setpoint, range: SetpointRange) -> Result<(), Probl
 mod tests {
     use super::*;
     use proptest::prelude::*;
-    use std::time::Duration;
+
+    fn wants(holder: &str) -> Wanted<'_> {
+        Wanted { holder, token: "local", ttl_ms: 500, takeover: false }
+    }
+
+    #[test]
+    fn a_refused_command_renews_nothing_and_a_moving_setpoint_is_noted_once_a_second() {
+        let (mut desk, t0) = (Desk::new("t1"), Instant::now());
+        let ms = |n: u64| t0 + Duration::from_millis(n);
+        let lease = desk.take(&wants("bench"), t0).unwrap();
+        assert!(desk.may(Some(&lease.id), ms(400)).is_ok());
+        desk.expire(ms(500));
+        assert!(desk.lease.current(ms(500)).is_none(), "asking renews nothing");
+        let lease = desk.take(&Wanted { ttl_ms: 60_000, ..wants("bench") }, ms(500)).unwrap();
+        desk.notes();
+        for n in 0..250 {
+            let now = ms(500 + 10 * n);
+            desk.command(Some(&lease.id), Setpoint::ThrustN(n as f64), now).unwrap();
+        }
+        desk.expire(ms(5000));
+        let noted: Vec<String> = desk.notes().into_iter().map(|note| note.detail).collect();
+        assert_eq!(noted.len(), 4, "{noted:?}");
+        assert!(noted[3].contains("thrust_n = 249"), "the last one is noted: {noted:?}");
+    }
+
+    #[test]
+    fn who_takes_over_starts_at_rest() {
+        let (mut desk, t0) = (Desk::new("t1"), Instant::now());
+        let lease = desk.take(&wants("crashed"), t0).unwrap();
+        desk.command(Some(&lease.id), Setpoint::ThrustN(25.0), t0).unwrap();
+        desk.take(&Wanted { takeover: true, ..wants("bridge") }, t0).unwrap();
+        assert_eq!(desk.setpoint(), None);
+        let last = desk.notes().pop().unwrap();
+        assert_eq!((last.kind, last.detail.as_str()), (EventKind::LeaseTakenOver, "bridge took command from crashed"));
+    }
 
     const RANGE: SetpointRange = SetpointRange { thrust_n: 200.0, speed_rad_s: 120.0 };
 
     #[test]
     fn a_setpoint_ends_with_its_lease() {
         let (mut desk, t0) = (Desk::new("t1"), Instant::now());
-        let lease = desk.take("bench", 500, t0).unwrap();
+        let lease = desk.take(&wants("bench"), t0).unwrap();
         desk.command(Some(&lease.id), Setpoint::ThrustN(25.0), t0).unwrap();
         assert_eq!((desk.setpoint(), desk.accepted()), (Some(Setpoint::ThrustN(25.0)), 1));
         desk.expire(t0 + Duration::from_millis(499));
         assert_eq!(desk.setpoint(), Some(Setpoint::ThrustN(25.0)));
         desk.expire(t0 + Duration::from_millis(500));
         assert_eq!((desk.setpoint(), desk.generation()), (None, 2));
-        let next = desk.take("other", 500, t0 + Duration::from_millis(600)).unwrap();
+        let next = desk.take(&wants("other"), t0 + Duration::from_millis(600)).unwrap();
         assert_ne!(next.id, lease.id);
         assert_eq!(desk.setpoint(), None, "a new holder starts at rest");
     }
@@ -161,7 +271,7 @@ mod tests {
     #[test]
     fn a_lease_given_up_at_rest_shows_at_once() {
         let (mut desk, t0) = (Desk::new("t1"), Instant::now());
-        let lease = desk.take("bench", 500, t0).unwrap();
+        let lease = desk.take(&wants("bench"), t0).unwrap();
         let before = desk.version();
         desk.give(Some(&lease.id), t0).unwrap();
         assert_ne!(desk.version(), before);

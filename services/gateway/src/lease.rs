@@ -18,11 +18,22 @@ pub struct Lease {
     pub id: String,
     /// Name the holder gave itself.
     pub holder: String,
+    /// Name of the token it was taken with.
+    pub token: String,
     ttl: Duration,
     expires: Instant,
 }
 
 impl Lease {
+    /// The holder's name, and the token's where it is another.
+    pub fn who(&self) -> String {
+        if self.token == "local" || self.token == self.holder {
+            self.holder.clone()
+        } else {
+            format!("{} ({})", self.holder, self.token)
+        }
+    }
+
     /// Time left, ms; at least 1 while the lease is in force.
     pub fn expires_in_ms(&self, now: Instant) -> u64 {
         (self.expires.saturating_duration_since(now).as_millis() as u64).max(1)
@@ -33,6 +44,8 @@ impl Lease {
 #[derive(Debug, Default)]
 pub struct LeaseDesk {
     lease: Option<Lease>,
+    /// The lease that was taken over last, and by whom: its holder is told.
+    taken_over: Option<(String, String)>,
     granted: u64,
     expired: u64,
 }
@@ -41,6 +54,11 @@ impl LeaseDesk {
     /// The lease in force, if any.
     pub fn current(&self, now: Instant) -> Option<&Lease> {
         self.lease.as_ref().filter(|lease| now < lease.expires)
+    }
+
+    /// Name of who had or has it, with its token's where that is another.
+    pub fn holder(&self) -> Option<String> {
+        self.lease.as_ref().map(Lease::who)
     }
 
     /// Drops a lease whose time is over; true if one was dropped.
@@ -58,22 +76,29 @@ impl LeaseDesk {
         (self.granted, self.expired)
     }
 
-    /// Takes command, if nobody has it.
+    /// Takes command, if nobody has it or it is asked for over the holder's head. Returns the lease, and whom it
+    /// was taken from.
     pub fn take(
         &mut self,
         thruster: &str,
-        holder: &str,
-        ttl_ms: u64,
+        wanted: &Wanted,
         now: Instant,
-    ) -> Result<Lease, Problem> {
+    ) -> Result<(Lease, Option<String>), Problem> {
+        let Wanted { holder, token, ttl_ms, takeover } = *wanted;
         self.expire(now);
-        if let Some(lease) = &self.lease {
-            return Err(held(thruster, lease, now));
-        }
+        let before = match &self.lease {
+            Some(lease) if !takeover => return Err(held(thruster, lease, now)),
+            Some(lease) => {
+                self.taken_over = Some((lease.id.clone(), holder.to_owned()));
+                Some(lease.holder.clone())
+            }
+            None => None,
+        };
         let ttl = Duration::from_millis(ttl_ms);
         let id = format!("{:032x}", rand::random::<u128>());
         self.granted += 1;
-        Ok(self.lease.insert(Lease { id, holder: holder.to_owned(), ttl, expires: now + ttl }).clone())
+        let (holder, token) = (holder.to_owned(), token.to_owned());
+        Ok((self.lease.insert(Lease { id, holder, token, ttl, expires: now + ttl }).clone(), before))
     }
 
     /// Renews the lease this id names; every accepted command does so.
@@ -91,12 +116,23 @@ impl LeaseDesk {
         Ok(())
     }
 
+    /// Who took this lease over, if somebody did.
+    pub fn taken_over(&self, id: &str) -> Option<&str> {
+        self.taken_over.as_ref().filter(|(lost, _)| lost == id).map(|(_, by)| by.as_str())
+    }
+
     /// Is this the lease in force?
     pub fn check(&mut self, thruster: &str, id: Option<&str>, now: Instant) -> Result<(), Problem> {
         self.expire(now);
         match (&self.lease, id) {
             (Some(lease), Some(id)) if lease.id == id => Ok(()),
-            (Some(lease), Some(_)) => Err(held(thruster, lease, now)),
+            (_, Some(id)) if self.taken_over(id).is_some() => {
+                let by = self.taken_over(id).unwrap_or_default();
+                Err(Problem::new(Kind::LeaseLost, format!("this lease on {thruster} was taken over by \"{by}\""))
+                    .hint("speak to them; POST …/lease with takeover takes it back")
+                    .holder(by))
+            }
+            (Some(lease), _) => Err(held(thruster, lease, now)),
             (None, Some(_)) => Err(Problem::new(
                 Kind::LeaseLost,
                 format!("this lease on {thruster} ran out or was given up"),
@@ -104,17 +140,26 @@ impl LeaseDesk {
             .hint(format!(
                 "POST /v1/thrusters/{thruster}/lease takes a new one; command faster than its ttl_ms"
             ))),
-            (lease, None) => {
-                let problem = Problem::new(Kind::LeaseRequired, "header Lease-Id is missing").hint(format!(
+            (None, None) => {
+                Err(Problem::new(Kind::LeaseRequired, "header Lease-Id is missing").hint(format!(
                     "POST /v1/thrusters/{thruster}/lease, then send its lease_id as header Lease-Id"
-                ));
-                Err(match lease {
-                    Some(lease) => problem.holder(&lease.holder),
-                    None => problem,
-                })
+                )))
             }
         }
     }
+}
+
+/// Who wants command, and how.
+#[derive(Clone, Copy, Debug)]
+pub struct Wanted<'a> {
+    /// Name the holder gives itself.
+    pub holder: &'a str,
+    /// Name of the token.
+    pub token: &'a str,
+    /// Life without a command, ms.
+    pub ttl_ms: u64,
+    /// Take it from who has it.
+    pub takeover: bool,
 }
 
 fn held(thruster: &str, lease: &Lease, now: Instant) -> Problem {
@@ -123,7 +168,7 @@ fn held(thruster: &str, lease: &Lease, now: Instant) -> Problem {
         Kind::LeaseHeld,
         format!("thruster {thruster} is commanded by \"{holder}\" for another {left_ms} ms"),
     )
-    .hint("wait until it ends, or ask the holder to DELETE it")
+    .hint("send its lease_id as header Lease-Id, wait until it ends, ask the holder to DELETE it, or take it over ({\"takeover\": true})")
     .holder(holder)
 }
 
@@ -136,20 +181,45 @@ mod tests {
         Duration::from_millis(n)
     }
 
+    fn wants(holder: &str, ttl_ms: u64) -> Wanted<'_> {
+        Wanted { holder, token: "local", ttl_ms, takeover: false }
+    }
+
+    #[test]
+    fn a_takeover_ends_the_lease_before_and_its_holder_is_told() {
+        let (mut desk, t0) = (LeaseDesk::default(), Instant::now());
+        let (first, nobody) = desk.take("t1", &wants("crashed", 60_000), t0).unwrap();
+        assert_eq!(nobody, None);
+        let (second, from) =
+            desk.take("t1", &Wanted { takeover: true, ..wants("bridge", 500) }, t0 + ms(5)).unwrap();
+        assert_eq!(from.as_deref(), Some("crashed"));
+        assert!(desk.check("t1", Some(&second.id), t0 + ms(6)).is_ok());
+        let told = serde_json::to_string(&desk.check("t1", Some(&first.id), t0 + ms(6)).unwrap_err()).unwrap();
+        assert!(told.contains("lease-lost") && told.contains("taken over") && told.contains("bridge"), "{told}");
+    }
+
+    #[test]
+    fn without_the_id_nothing_is_allowed_while_somebody_holds_it() {
+        let (mut desk, t0) = (LeaseDesk::default(), Instant::now());
+        desk.take("t1", &wants("bench", 500), t0).unwrap();
+        let told = serde_json::to_string(&desk.check("t1", None, t0).unwrap_err()).unwrap();
+        assert!(told.contains("lease-held") && told.contains(r#""holder":"bench""#), "{told}");
+    }
+
     #[test]
     fn a_second_holder_is_refused_with_the_name_of_the_first() {
         let (mut desk, t0) = (LeaseDesk::default(), Instant::now());
-        desk.take("t1", "bench", 500, t0).unwrap();
-        let problem = desk.take("t1", "other", 500, t0 + ms(499)).unwrap_err();
+        desk.take("t1", &wants("bench", 500), t0).unwrap();
+        let problem = desk.take("t1", &wants("other", 500), t0 + ms(499)).unwrap_err();
         let text = serde_json::to_string(&problem).unwrap();
         assert!(text.contains(r#""holder":"bench""#) && text.contains("409"), "{text}");
-        desk.take("t1", "other", 500, t0 + ms(500)).expect("free once the first ran out");
+        desk.take("t1", &wants("other", 500), t0 + ms(500)).expect("free once the first ran out");
     }
 
     #[test]
     fn a_renewed_lease_lives_on_and_a_lost_one_does_not_come_back() {
         let (mut desk, t0) = (LeaseDesk::default(), Instant::now());
-        let lease = desk.take("t1", "bench", 100, t0).unwrap();
+        let (lease, _) = desk.take("t1", &wants("bench", 100), t0).unwrap();
         for step in 1..50 {
             desk.renew("t1", Some(&lease.id), t0 + ms(99 * step)).unwrap();
         }
@@ -167,7 +237,7 @@ mod tests {
             for (action, who, wait) in steps {
                 now += ms(wait);
                 match action {
-                    0 => if let Ok(lease) = desk.take("t1", "x", 200, now) { ids.push(lease.id) },
+                    0 => if let Ok((lease, _)) = desk.take("t1", &Wanted { takeover: wait % 2 == 0, ..wants("x", 200) }, now) { ids.push(lease.id) },
                     1 => { let _ = desk.renew("t1", ids.get(who).map(String::as_str), now); }
                     _ => { let _ = desk.give("t1", ids.get(who).map(String::as_str), now); }
                 }

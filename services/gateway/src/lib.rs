@@ -9,17 +9,26 @@
 )]
 
 mod bus;
+mod connections;
 mod desk;
+mod durations;
+mod events;
 mod extract;
+mod gate;
 mod heard;
+mod hosts;
 mod lease;
 mod openapi;
 mod problem;
+mod process;
 mod record;
 mod routes;
+mod serve;
 mod settings;
 mod tally;
 mod thruster;
+mod tls;
+pub mod token;
 mod view;
 mod windows;
 
@@ -30,19 +39,24 @@ use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 use axum::body::Bytes;
-use axum::serve::ListenerExt;
 use kort_proto::config::{Config, ConfigError};
-use kort_proto::transport::Deployment;
+use kort_proto::transport::{Deployment, Watched};
 use thiserror::Error;
-use tokio::net::{TcpListener, TcpStream};
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::watch;
 use utoipa::openapi::OpenApi;
 
+use bus::Pulse;
+use connections::Connections;
+use durations::Durations;
+use events::Events;
+use gate::Gate;
 use problem::{Kind, Problem};
 use record::Recorder;
 use settings::Deployed;
 pub use settings::Settings;
+use tls::Certificate;
+use token::Tokens;
 use tally::Tally;
 use thruster::Thruster;
 
@@ -68,6 +82,31 @@ pub enum GatewayError {
         /// The system's words.
         error: std::io::Error,
     },
+    /// The folder of the event log cannot be used.
+    #[error("gateway.events = {}: {error}\nhint: name a folder this user can write", folder.display())]
+    Events {
+        /// The folder.
+        folder: PathBuf,
+        /// The system's words.
+        error: std::io::Error,
+    },
+    /// Who may command beyond this machine is not said.
+    #[error(
+        "gateway.bind = {bind} is reached from other machines, and {} holds no token\nhint: kort token new NAME --role viewer|pilot|admin makes one",
+        file.display()
+    )]
+    NoTokens {
+        /// The address.
+        bind: SocketAddr,
+        /// The file of the tokens.
+        file: PathBuf,
+    },
+    /// The tokens cannot be read.
+    #[error(transparent)]
+    Tokens(#[from] token::TokenError),
+    /// Certificate or key cannot be used.
+    #[error(transparent)]
+    Tls(#[from] tls::TlsError),
     /// The configuration cannot be used.
     #[error(transparent)]
     Config(#[from] ConfigError),
@@ -94,9 +133,18 @@ pub(crate) struct App {
     thrusters: Vec<Arc<Thruster>>,
     tallies: Vec<Arc<Tally>>,
     recorder: Arc<Recorder>,
+    events: Arc<Events>,
+    gate: Gate,
+    connections: Arc<Connections>,
+    streams: Streams,
+    address: String,
+    disks: [PathBuf; 2],
+    watched: PathBuf,
     answers: [AtomicU64; 4],
+    durations: Durations,
     stopping: watch::Receiver<bool>,
     document: OnceLock<Bytes>,
+    patterns: OnceLock<Vec<String>>,
 }
 
 impl App {
@@ -120,12 +168,68 @@ impl App {
         &self.recorder
     }
 
+    fn events(&self) -> &Events {
+        &self.events
+    }
+
+    fn gate(&self) -> &Gate {
+        &self.gate
+    }
+
+    fn connections(&self) -> &Connections {
+        &self.connections
+    }
+
+    /// The pattern of the route a path belongs to; `other` for what no route has.
+    fn pattern(&self, path: &str) -> &str {
+        let matches = |pattern: &str| {
+            let (mut theirs, mut ours) = (path.split('/'), pattern.split('/'));
+            loop {
+                match (theirs.next(), ours.next()) {
+                    (None, None) => return true,
+                    (Some(part), Some(of)) if part == of || (of.starts_with('{') && !part.is_empty()) => (),
+                    _ => return false,
+                }
+            }
+        };
+        let patterns = self.patterns.get().map_or(&[][..], Vec::as_slice);
+        patterns.iter().map(String::as_str).find(|pattern| matches(pattern)).unwrap_or("other")
+    }
+
+    /// Scheme and address listened on.
+    fn address(&self) -> &str {
+        &self.address
+    }
+
+    /// Free and whole size of the disks that are written to, bytes, by what is written there.
+    fn disks(&self) -> impl Iterator<Item = (&'static str, f64, f64)> {
+        ["recordings", "events"].into_iter().zip(&self.disks).filter_map(|(what, folder)| {
+            let disk = rustix::fs::statvfs(folder).ok()?;
+            let block = disk.f_frsize as f64;
+            Some((what, disk.f_bavail as f64 * block, disk.f_blocks as f64 * block))
+        })
+    }
+
+    fn durations(&self) -> &Durations {
+        &self.durations
+    }
+
+    fn streams(&self) -> &Streams {
+        &self.streams
+    }
+
+    /// What the supervisor notes beside the shared memory.
+    fn watched(&self) -> Watched {
+        Watched::read(&self.watched)
+    }
+
     fn stopping(&self) -> watch::Receiver<bool> {
         self.stopping.clone()
     }
 
     /// The OpenAPI document, once the routes are known.
     fn publish(&self, document: &OpenApi) {
+        let _ = self.patterns.set(document.paths.paths.keys().cloned().collect());
         let _ = self.document.set(serde_json::to_vec_pretty(document).unwrap_or_default().into());
     }
 
@@ -148,10 +252,28 @@ impl App {
     }
 }
 
-/// States and setpoints are small and urgent: no waiting for more to send.
-fn at_once(stream: &mut TcpStream) {
-    if let Err(error) = stream.set_nodelay(true) {
-        tracing::debug!(%error, "a connection keeps its delay");
+/// How many streams are open.
+#[derive(Debug, Default)]
+pub(crate) struct Streams(Arc<AtomicU64>);
+
+impl Streams {
+    /// One more, until the guard is dropped.
+    fn open(&self) -> StreamGuard {
+        self.0.fetch_add(1, Ordering::Relaxed);
+        StreamGuard(Arc::clone(&self.0))
+    }
+
+    fn count(&self) -> u64 {
+        self.0.load(Ordering::Relaxed)
+    }
+}
+
+/// Counts as an open stream for as long as it lives.
+pub(crate) struct StreamGuard(Arc<AtomicU64>);
+
+impl Drop for StreamGuard {
+    fn drop(&mut self) {
+        self.0.fetch_sub(1, Ordering::Relaxed);
     }
 }
 
@@ -162,7 +284,32 @@ fn at_once(stream: &mut TcpStream) {
 pub fn check(settings: &Settings) -> Result<(), GatewayError> {
     let (bind, folder) = (settings.bind, settings.recordings.clone());
     std::net::TcpListener::bind(bind).map_err(|error| GatewayError::Bind { bind, error })?;
-    std::fs::create_dir_all(&folder).map_err(|error| GatewayError::Recordings { folder, error })
+    std::fs::create_dir_all(&folder).map_err(|error| GatewayError::Recordings { folder, error })?;
+    let events = settings.events.clone();
+    std::fs::create_dir_all(&events).map_err(|error| GatewayError::Events { folder: events, error })?;
+    tokens(settings)?;
+    certificate(settings)?;
+    Ok(())
+}
+
+/// The tokens; beyond this machine there must be one.
+fn tokens(settings: &Settings) -> Result<Tokens, GatewayError> {
+    let tokens = Tokens::open(&settings.tokens)?;
+    if settings.asks_for_tokens() && tokens.count() == 0 {
+        return Err(GatewayError::NoTokens { bind: settings.bind, file: settings.tokens.clone() });
+    }
+    Ok(tokens)
+}
+
+/// The certificate, where TLS is asked for.
+fn certificate(settings: &Settings) -> Result<Option<Arc<Certificate>>, GatewayError> {
+    let Some(keys) = &settings.tls else { return Ok(None) };
+    let mut names = vec!["localhost".to_owned(), "127.0.0.1".to_owned(), "::1".to_owned()];
+    if !settings.bind.ip().is_unspecified() {
+        names.push(settings.bind.ip().to_string());
+    }
+    names.extend(settings.hosts.iter().cloned());
+    Ok(Some(Arc::new(Certificate::open(keys, names)?)))
 }
 
 /// Serves until SIGINT or SIGTERM; then disarms every thruster, closes a running recording and returns.
@@ -185,7 +332,12 @@ async fn serve(
     deployment: Deployment,
 ) -> Result<(), GatewayError> {
     let bind = settings.bind;
-    let listener = TcpListener::bind(bind).await.map_err(|error| GatewayError::Bind { bind, error })?;
+    let listener = serve::listen(bind).map_err(|error| GatewayError::Bind { bind, error })?;
+    let certificate = certificate(&settings)?;
+    let gate = Gate::new(bind, &settings.hosts, tokens(&settings)?, settings.asks_for_tokens());
+    let connections = Arc::new(Connections::new(serve::caps(settings.behind_tls_proxy)));
+    let events = Events::start(&settings.events)
+        .map_err(|error| GatewayError::Events { folder: settings.events.clone(), error })?;
     let recorder = Recorder::open(&settings.recordings)
         .map_err(|error| GatewayError::Recordings { folder: settings.recordings.clone(), error })?;
     let recorder = Arc::new(recorder);
@@ -195,57 +347,79 @@ async fn serve(
         thrusters: Vec::new(),
         tallies: Vec::new(),
         recorder: Arc::clone(&recorder),
+        events: Arc::clone(&events),
+        gate,
+        connections: Arc::clone(&connections),
+        streams: Streams::default(),
+        address: format!("{}://{bind}", settings.scheme()),
+        disks: [settings.recordings.clone(), settings.events.clone()],
+        watched: deployment.watched_file(),
         answers: Default::default(),
-        stopping,
+        durations: Durations::default(),
+        stopping: stopping.clone(),
         document: OnceLock::new(),
+        patterns: OnceLock::new(),
     };
     let mut links = Vec::new();
-    for Deployed { id, range, heartbeat } in &thrusters {
-        let (thruster, asks) = Thruster::new(id, *range);
+    for Deployed { id, range, heartbeat, servo_silence, .. } in &thrusters {
+        let (thruster, asks) = Thruster::new(id, *range, *servo_silence, Arc::clone(&events));
         let (thruster, tally) = (Arc::new(thruster), Arc::new(Tally::default()));
         app.thrusters.push(Arc::clone(&thruster));
         app.tallies.push(Arc::clone(&tally));
-        links.push(bus::Link { thruster, tally, asks, heartbeat: *heartbeat });
+        let events = Arc::clone(&events);
+        links.push(bus::Link { thruster, tally, asks, heartbeat: *heartbeat, events });
     }
     let app = Arc::new(app);
 
     let stop_bus = Arc::new(AtomicBool::new(false));
+    let pulse = Arc::new(Pulse::new());
     let bus = {
-        let (recorder, stop) = (Arc::clone(&recorder), Arc::clone(&stop_bus));
+        let (recorder, pulse, stop) = (Arc::clone(&recorder), Arc::clone(&pulse), Arc::clone(&stop_bus));
         std::thread::Builder::new()
             .name("bus".into())
-            .spawn(move || bus::run(&deployment, links, &recorder, &stop))?
+            .spawn(move || bus::run(&deployment, links, &recorder, &pulse, &stop))?
     };
 
-    let (mut interrupt, mut terminate) = (signal(SignalKind::interrupt())?, signal(SignalKind::terminate())?);
-    tracing::info!("listening on http://{}", listener.local_addr()?);
-    let router = routes::router(Arc::clone(&app));
-    let at_rest = {
-        let app = Arc::clone(&app);
-        async move {
-            tokio::select! { _ = interrupt.recv() => (), _ = terminate.recv() => () }
-            for thruster in
-                app.thrusters().iter().filter(|thruster| thruster.heard().armed(std::time::Instant::now()))
-            {
-                if let Err(problem) = thruster.disarm().await {
-                    tracing::warn!(thruster = thruster.id, ?problem, "could not disarm on the way out");
-                }
-            }
-            let _ = stop_streams.send(true);
+    tokio::spawn(async move {
+        let mut beat = tokio::time::interval(Pulse::EVERY);
+        loop {
+            beat.tick().await;
+            pulse.beat();
         }
+    });
+
+    let mut ends = [SignalKind::interrupt(), SignalKind::terminate(), SignalKind::hangup()]
+        .map(signal)
+        .into_iter()
+        .collect::<Result<Vec<_>, _>>()?
+        .into_iter();
+    let (Some(mut interrupt), Some(mut terminate), Some(mut hangup)) = (ends.next(), ends.next(), ends.next())
+    else {
+        return Err(std::io::Error::other("signals").into());
     };
-    // Clients that keep their connection open do not keep the gateway.
-    let (rested, resting) = tokio::sync::oneshot::channel::<()>();
-    let graceful = async move {
-        at_rest.await;
-        let _ = rested.send(());
-    };
-    tokio::select! {
-        served = axum::serve(listener.tap_io(at_once), router).with_graceful_shutdown(graceful) => served?,
-        () = async { let _ = resting.await; tokio::time::sleep(Duration::from_millis(500)).await } => (),
+    let scheme = if certificate.is_some() { "https" } else { "http" };
+    tracing::info!("listening on {scheme}://{}", listener.local_addr()?);
+    let router = routes::router(Arc::clone(&app));
+    let port = serve::Port { router, certificate, connections, stopping };
+    let serving = tokio::spawn(serve::run(listener, port));
+    tokio::select! { _ = interrupt.recv() => (), _ = terminate.recv() => (), _ = hangup.recv() => () }
+    for thruster in app.thrusters().iter().filter(|thruster| thruster.heard().armed(std::time::Instant::now())) {
+        if let Err(problem) = thruster.disarm("the gateway on its way out").await {
+            tracing::warn!(thruster = thruster.id, ?problem, "could not disarm on the way out");
+        }
+    }
+    let _ = stop_streams.send(true);
+    let _ = serving.await;
+    // Answers under way and close frames get a moment; clients that keep their connection do not keep the gateway.
+    for _ in 0..50 {
+        if app.connections().counts().0 == 0 {
+            break;
+        }
+        tokio::time::sleep(Duration::from_millis(10)).await;
     }
     let _ = recorder.stop();
     stop_bus.store(true, Ordering::Relaxed);
     let _ = bus.join();
+    events.settle();
     Ok(())
 }

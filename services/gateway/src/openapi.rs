@@ -1,7 +1,11 @@
 //! The frame of the OpenAPI document; the routes fill it in from their own code.
 
 use utoipa::openapi::schema::{AdditionalProperties, ObjectBuilder, Schema, Type};
-use utoipa::openapi::{Info, OpenApi, OpenApiBuilder, RefOr, tag::TagBuilder};
+use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityRequirement, SecurityScheme};
+use utoipa::openapi::server::ServerBuilder;
+use utoipa::openapi::{
+    ContentBuilder, Info, OpenApi, OpenApiBuilder, Ref, RefOr, ResponseBuilder, tag::TagBuilder,
+};
 
 use crate::App;
 use crate::problem::Kind;
@@ -24,11 +28,56 @@ pub fn opening() -> OpenApi {
         .build()
 }
 
+/// Tokens: the scheme, where it is asked for, and what comes without one.
+fn secure(document: &mut OpenApi, app: &App) {
+    let scheme = HttpBuilder::new()
+        .scheme(HttpAuthScheme::Bearer)
+        .description(Some("`kort token new NAME --role viewer|pilot|admin` makes one; on loopback none is needed by default"))
+        .build();
+    if let Some(components) = &mut document.components {
+        components.security_schemes.insert("token".into(), SecurityScheme::Http(scheme));
+    }
+    document.servers = Some(vec![
+        ServerBuilder::new().url("/").description(Some(format!("this gateway, {}", app.address()))).build(),
+    ]);
+    let asked: SecurityRequirement = SecurityRequirement::new("token", Vec::<String>::new());
+    // An empty requirement: nothing is asked for.
+    let nobody = SecurityRequirement::default();
+    let refusal = |words: &str| {
+        ResponseBuilder::new()
+            .description(words)
+            .content(
+                "application/problem+json",
+                ContentBuilder::new().schema(Some(Ref::from_schema_name("Problem"))).build(),
+            )
+            .build()
+    };
+    for (path, item) in &mut document.paths.paths {
+        let open = crate::gate::is_open(path);
+        let operations = [&mut item.get, &mut item.put, &mut item.post, &mut item.delete];
+        for operation in operations.into_iter().flatten() {
+            let answers = &mut operation.responses.responses;
+            let mut add = |status: &str, words: &str| {
+                answers.entry(status.into()).or_insert_with(|| refusal(words).into());
+            };
+            add("421", "`foreign-host`: header Host names no gateway we know");
+            if open {
+                operation.security = Some(vec![nobody.clone()]);
+                continue;
+            }
+            add("401", "`token-required`: no token, or one that is not known");
+            add("403", "`role-too-low`, `foreign-origin`");
+            operation.security = Some(vec![asked.clone(), nobody.clone()]);
+        }
+    }
+}
+
 fn description() -> String {
     let mut text = String::from(
         "Thrust control for marine thrusters. SI units throughout, the unit ends each name; positive is ahead.\n\n\
          To move a thruster: `POST …/lease`, `POST …/arm`, `PUT …/setpoint` with header `Lease-Id`, again before the \
-         lease runs out. When the lease ends, thrust is ramped to zero.\n\n\
+         lease runs out. When the lease ends, thrust is ramped to zero. `POST /v1/stop` stops everything, from any pilot.\n\n\
+         Roles: a viewer reads, a pilot commands, an admin changes recordings of others too.\n\n\
          Every error is an RFC 9457 problem document, `application/problem+json`, with one of these types:\n\n\
          | `type` | status | meaning |\n| --- | --- | --- |\n",
     );
@@ -57,6 +106,7 @@ pub fn finish(document: &mut OpenApi, app: &App) {
             }
         }
     }
+    secure(document, app);
     let bounds = [("thrust_n", range(|r| r.thrust_n)), ("speed_rad_s", range(|r| r.speed_rad_s))];
     let Some(components) = &mut document.components else { return };
     let Some(RefOr::T(Schema::OneOf(setpoint))) = components.schemas.get_mut("Setpoint") else { return };

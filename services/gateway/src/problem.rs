@@ -15,8 +15,11 @@ pub enum Kind {
     MalformedQuery,
     MalformedHeader,
     MalformedBody,
+    TokenRequired,
     LeaseRequired,
+    RoleTooLow,
     ForeignOrigin,
+    ForeignHost,
     UnknownRoute,
     UnknownThruster,
     UnknownRecording,
@@ -39,18 +42,22 @@ pub enum Kind {
     Internal,
     RecordingFailed,
     NotReady,
+    Overloaded,
 }
 
 impl Kind {
     /// All kinds, for the documentation and the tests.
-    pub const ALL: [Kind; 29] = [
+    pub const ALL: [Kind; 33] = [
         Kind::MalformedJson,
         Kind::MalformedPath,
         Kind::MalformedQuery,
         Kind::MalformedHeader,
         Kind::MalformedBody,
+        Kind::TokenRequired,
         Kind::LeaseRequired,
+        Kind::RoleTooLow,
         Kind::ForeignOrigin,
+        Kind::ForeignHost,
         Kind::UnknownRoute,
         Kind::UnknownThruster,
         Kind::UnknownRecording,
@@ -73,6 +80,7 @@ impl Kind {
         Kind::Internal,
         Kind::RecordingFailed,
         Kind::NotReady,
+        Kind::Overloaded,
     ];
 
     /// Status code, last part of the `type`, and title.
@@ -84,6 +92,12 @@ impl Kind {
             Kind::MalformedQuery => (S::BAD_REQUEST, "malformed-query", "The query cannot be read"),
             Kind::MalformedHeader => (S::BAD_REQUEST, "malformed-header", "A header cannot be read"),
             Kind::MalformedBody => (S::BAD_REQUEST, "malformed-body", "The body cannot be read"),
+            Kind::TokenRequired => (S::UNAUTHORIZED, "token-required", "This needs a token"),
+            Kind::RoleTooLow => (S::FORBIDDEN, "role-too-low", "The token's role does not allow this"),
+            Kind::ForeignHost => {
+                (S::MISDIRECTED_REQUEST, "foreign-host", "This gateway is not known by that name")
+            }
+            Kind::Overloaded => (S::SERVICE_UNAVAILABLE, "overloaded", "Every connection is taken"),
             Kind::LeaseRequired => (S::FORBIDDEN, "lease-required", "This needs the lease"),
             Kind::ForeignOrigin => (S::FORBIDDEN, "foreign-origin", "A page of another site may not command"),
             Kind::UnknownRoute => (S::NOT_FOUND, "unknown-route", "No such route"),
@@ -201,6 +215,9 @@ impl IntoResponse for Problem {
         response
             .headers_mut()
             .insert(header::CONTENT_TYPE, HeaderValue::from_static("application/problem+json"));
+        if response.status() == StatusCode::UNAUTHORIZED {
+            response.headers_mut().insert(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));
+        }
         response
     }
 }

@@ -10,6 +10,7 @@ use kort_thruster::rig::Rig;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer};
 
+use crate::hosts;
 use crate::view::SetpointRange;
 
 /// Section `[gateway]`.
@@ -21,6 +22,58 @@ pub struct Settings {
     pub bind: SocketAddr,
     /// Folder of the recordings, relative to the working directory; created if it is not there.
     pub recordings: PathBuf,
+    /// Folder of the event log, likewise.
+    pub events: PathBuf,
+    /// File of the tokens, likewise; `kort token new` writes it.
+    pub tokens: PathBuf,
+    /// Ask for a token on loopback too; beyond it one is always asked for.
+    pub require_tokens: bool,
+    /// Names and addresses under which this gateway is reached, beside its own: what `Host` and `Origin` may say.
+    pub hosts: Vec<String>,
+    /// A proxy in front of this address speaks TLS: the traffic here never leaves trusted wires.
+    pub behind_tls_proxy: bool,
+    /// TLS of its own.
+    pub tls: Option<Tls>,
+    /// When a recording ends by itself.
+    pub recording: RecordingLimits,
+}
+
+/// Section `[gateway.tls]`.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Tls {
+    /// Certificate chain, PEM.
+    pub certificate: PathBuf,
+    /// Private key, PEM.
+    pub key: PathBuf,
+    /// Make both, self-signed, if neither is there.
+    #[serde(default)]
+    pub self_signed: bool,
+}
+
+/// Section `[gateway.recording]`.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct RecordingLimits {
+    /// Size at which a recording goes on in a new file, bytes.
+    pub file_bytes_max: u64,
+    /// Files of one recording, after which it ends.
+    pub files_max: u32,
+    /// Time after which a recording ends, s.
+    pub time_max_s: f64,
+    /// Free space that a recording leaves on the disk, bytes.
+    pub free_bytes_min: u64,
+}
+
+impl Default for RecordingLimits {
+    fn default() -> RecordingLimits {
+        RecordingLimits {
+            file_bytes_max: 256 << 20,
+            files_max: 64,
+            time_max_s: 86_400.0,
+            free_bytes_min: 256 << 20,
+        }
+    }
 }
 
 impl Default for Settings {
@@ -28,6 +81,13 @@ impl Default for Settings {
         Settings {
             bind: SocketAddr::from(([127, 0, 0, 1], 8080)),
             recordings: PathBuf::from("kort-state/recordings"),
+            events: PathBuf::from("kort-state/events"),
+            tokens: PathBuf::from("kort-state/tokens.toml"),
+            require_tokens: false,
+            hosts: Vec::new(),
+            behind_tls_proxy: false,
+            tls: None,
+            recording: RecordingLimits::default(),
         }
     }
 }
@@ -36,7 +96,7 @@ fn address<'de, D: Deserializer<'de>>(deserializer: D) -> Result<SocketAddr, D::
     let text = String::deserialize(deserializer)?;
     text.parse().map_err(|_| {
         D::Error::custom(format!(
-            "{text:?} is no address; allowed is IP:PORT\nhint: \"127.0.0.1:8080\", or \"0.0.0.0:8080\" for every interface"
+            "{text:?} is no address; allowed is IP:PORT\nhint: \"127.0.0.1:8080\"; any address beyond this machine also needs tokens and TLS"
         ))
     })
 }
@@ -47,7 +107,62 @@ impl Settings {
     /// # Errors
     /// [`ConfigError`] names an unknown key or a value that is not allowed.
     pub fn new(config: &Config) -> Result<Settings, ConfigError> {
+        let settings: Settings = config.section("gateway", &config.gateway)?;
+        settings.check().map_err(|words| config.error(words))?;
+        Ok(settings)
+    }
+
+    /// Reads the section without asking whether a gateway could run with it: a token can be made first.
+    ///
+    /// # Errors
+    /// [`ConfigError`] names an unknown key or a value of the wrong kind.
+    pub fn new_unchecked(config: &Config) -> Result<Settings, ConfigError> {
         config.section("gateway", &config.gateway)
+    }
+
+    /// What each value alone may be, and what an address beyond this machine needs beside it.
+    fn check(&self) -> Result<(), String> {
+        if self.bind.port() == 0 {
+            return Err("`gateway.bind` has port 0; allowed are 1 to 65535\nhint: \"127.0.0.1:8080\"".into());
+        }
+        if let Some(odd) = self.hosts.iter().find(|host| !hosts::is_host(host)) {
+            return Err(format!(
+                "`gateway.hosts` holds {odd:?}; allowed are names and addresses without scheme, port or path\nhint: \"thruster.example.org\""
+            ));
+        }
+        let limits = &self.recording;
+        for (key, value, low, high) in [
+            ("file_bytes_max", limits.file_bytes_max as f64, 65_536.0, 1e12),
+            ("files_max", f64::from(limits.files_max), 1.0, 10_000.0),
+            ("time_max_s", limits.time_max_s, 1.0, 3.2e7),
+            ("free_bytes_min", limits.free_bytes_min as f64, 0.0, 1e15),
+        ] {
+            if !(low..=high).contains(&value) {
+                return Err(format!(
+                    "`gateway.recording.{key}` = {value} is outside {low} to {high}\nhint: leave the key out for the usual value"
+                ));
+            }
+        }
+        if self.bind.ip().is_loopback() {
+            return Ok(());
+        }
+        if self.tls.is_none() && !self.behind_tls_proxy {
+            return Err(format!(
+                "`gateway.bind` = {} is reached from other machines, and `gateway.tls` is missing\nhint: name certificate and key in [gateway.tls] (self_signed = true makes them), or say behind_tls_proxy = true where a proxy does it",
+                self.bind
+            ));
+        }
+        Ok(())
+    }
+
+    /// Must every request bring a token?
+    pub fn asks_for_tokens(&self) -> bool {
+        self.require_tokens || !self.bind.ip().is_loopback()
+    }
+
+    /// `http` or `https`, as the console is reached.
+    pub fn scheme(&self) -> &'static str {
+        if self.tls.is_some() { "https" } else { "http" }
     }
 }
 
@@ -56,6 +171,10 @@ impl Settings {
 pub struct Deployed {
     /// Its name.
     pub id: String,
+    /// File and text of its rig description, for recordings.
+    pub rig: (String, String),
+    /// Silence of the servo after which it is not shown as armed any more.
+    pub servo_silence: Duration,
     /// Largest setpoints: what the rig can give, and what the limits allow.
     pub range: SetpointRange,
     /// Period at which its setpoint is sent anew: the controller's.
@@ -73,7 +192,7 @@ pub fn thrusters(config: &Config) -> Result<Vec<Deployed>, ConfigError> {
         .map(|(id, thruster)| {
             let (file, text) = config.rig_text(id, thruster)?;
             let rig =
-                Rig::from_toml(&text).map_err(|error| ConfigError { file, message: error.to_string() })?;
+                Rig::from_toml(&text).map_err(|error| ConfigError { file: file.clone(), message: error.to_string() })?;
             let heartbeat = Duration::from_nanos(thruster.controller_period_ns());
             let speed_limit = thruster
                 .limits
@@ -88,7 +207,9 @@ pub fn thrusters(config: &Config) -> Result<Vec<Deployed>, ConfigError> {
                         .min(model.map_or(f64::MAX, |model| model.speed_max_rad_s)),
                 ),
             };
-            Ok(Deployed { id: id.clone(), range, heartbeat })
+            let servo_silence =
+                Duration::from_nanos((5 * thruster.servo_period_ns()).max(2 * thruster.controller_period_ns()));
+            Ok(Deployed { id: id.clone(), rig: (file, text), servo_silence, range, heartbeat })
         })
         .collect()
 }

@@ -1,10 +1,11 @@
 //! One thruster as the gateway sees it: what it asks (the desk) and what it last heard.
 
-use std::sync::{Mutex, MutexGuard, PoisonError, mpsc};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, mpsc};
 use std::time::{Duration, Instant};
 
 use axum::body::Bytes;
-use kort_proto::faults::Fault;
+use kort_proto::events::EventKind;
+use kort_proto::faults::{Fault, Names};
 use kort_proto::limits::Limit;
 use kort_proto::messages::{
     ControllerState, Outcome, PARAMETERS, Parameter, Process, Reply, Request, RequestKind,
@@ -14,12 +15,13 @@ use kort_proto::text::Text;
 use tokio::sync::oneshot;
 
 use crate::desk::{Desk, check_range};
+use crate::events::Events;
 use crate::heard::Heard;
-use crate::lease::Lease;
+use crate::lease::{Lease, Wanted};
 use crate::problem::{Kind, Problem};
 use crate::routes::{ControllerRequest, ControllerView, LawParameter};
 use crate::view::{
-    Estimated, FaultView, LeaseView, LimitView, ParameterEstimate, Setpoint, SetpointRange, ThrusterState,
+    BeforeView, Estimated, FaultView, LeaseView, LimitView, ParameterEstimate, Setpoint, SetpointRange, ThrusterState,
     Values,
 };
 
@@ -47,8 +49,12 @@ pub struct Thruster {
     desk: Mutex<Desk>,
     heard: Mutex<Heard>,
     asks: mpsc::SyncSender<Ask>,
-    rendered: Mutex<((u64, u64), Bytes)>,
+    events: Arc<Events>,
+    rendered: Mutex<(Rendered, Bytes)>,
 }
+
+/// What a rendered state was made of: sample, desk, and whether the servo was silent.
+type Rendered = (u64, u64, bool);
 
 /// A poisoned lock holds plain data that is still whole: no update here can stop half-way.
 pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -57,15 +63,21 @@ pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 impl Thruster {
     /// A thruster nobody commands; the receiver belongs to the bus.
-    pub fn new(id: &str, range: SetpointRange) -> (Thruster, mpsc::Receiver<Ask>) {
+    pub fn new(
+        id: &str,
+        range: SetpointRange,
+        servo_silence: Duration,
+        events: Arc<Events>,
+    ) -> (Thruster, mpsc::Receiver<Ask>) {
         let (asks, inbox) = mpsc::sync_channel(64);
         let thruster = Thruster {
             id: id.to_owned(),
             range,
             desk: Mutex::new(Desk::new(id)),
-            heard: Mutex::default(),
+            heard: Mutex::new(Heard { servo_silence, ..Heard::default() }),
             asks,
-            rendered: Mutex::new(((u64::MAX, u64::MAX), Bytes::new())),
+            events,
+            rendered: Mutex::new(((u64::MAX, u64::MAX, false), Bytes::new())),
         };
         (thruster, inbox)
     }
@@ -100,9 +112,9 @@ impl Thruster {
     }
 
     /// Takes command.
-    pub fn take_lease(&self, holder: &str, ttl_ms: u64) -> Result<(Lease, Instant), Problem> {
+    pub fn take_lease(&self, wanted: &Wanted) -> Result<(Lease, Instant), Problem> {
         let now = Instant::now();
-        self.desk().take(holder, ttl_ms, now).map(|lease| (lease, now))
+        self.desk().take(wanted, now).map(|lease| (lease, now))
     }
 
     /// Renews the lease.
@@ -122,7 +134,7 @@ impl Thruster {
         let now = Instant::now();
         let heard = self.heard();
         let mut desk = self.desk();
-        desk.renew(lease, now)?;
+        desk.lease.check(&self.id, lease, now)?;
         self.ready()?;
         if let Some(fault) = Fault::in_set(heard.faults(now)).next() {
             return Err(latched(fault));
@@ -137,8 +149,8 @@ impl Thruster {
         desk.command(lease, setpoint, now).map(|lease| (lease, now))
     }
 
-    /// Arms, at rest.
-    pub async fn arm(&self, lease: Option<&str>) -> Result<(), Problem> {
+    /// Arms, at rest. `who` asks, for the event log; `lease` must be the one in force, if there is one.
+    pub async fn arm(&self, who: &str, lease: Option<&str>) -> Result<(), Problem> {
         let now = Instant::now();
         self.desk().may(lease, now)?;
         self.ready()?;
@@ -150,22 +162,25 @@ impl Thruster {
         }
         self.ask(request(RequestKind::Arm), &[Process::Servo], Kind::Refused).await?;
         self.settle(|heard, now| heard.armed(now)).await;
+        self.did(who, lease, EventKind::Armed, "armed");
         Ok(())
     }
 
     /// Disarms; the controller need not be there.
-    pub async fn disarm(&self) -> Result<(), Problem> {
+    pub async fn disarm(&self, who: &str) -> Result<(), Problem> {
         self.desk().rest();
         self.ask(request(RequestKind::Disarm), &[Process::Servo], Kind::Refused).await?;
         self.settle(|heard, now| !heard.armed(now)).await;
         self.desk().rest();
+        self.did(who, None, EventKind::Disarmed, "disarmed");
         Ok(())
     }
 
     /// Clears latched faults.
-    pub async fn clear_faults(&self, lease: Option<&str>) -> Result<(), Problem> {
+    pub async fn clear_faults(&self, who: &str, lease: Option<&str>) -> Result<(), Problem> {
         self.desk().may(lease, Instant::now())?;
         self.ready()?;
+        let before = self.heard().faults(Instant::now());
         self.ask(
             request(RequestKind::ClearFaults),
             &[Process::Servo, Process::Controller],
@@ -173,7 +188,21 @@ impl Thruster {
         )
         .await?;
         self.settle(|heard, now| heard.faults(now) == 0).await;
+        if before != 0 {
+            self.did(who, lease, EventKind::FaultsCleared, &format!("cleared {}", Names(before)));
+        }
         Ok(())
+    }
+
+    /// Something was done: it is noted, and the lease it was done with lives on.
+    fn did(&self, who: &str, lease: Option<&str>, kind: EventKind, what: &str) {
+        let mut desk = self.desk();
+        let who = match (lease, desk.lease.holder()) {
+            (Some(_), Some(holder)) => holder,
+            _ => who.to_owned(),
+        };
+        desk.done(lease, Instant::now());
+        desk.note(kind, &who, format!("{who} {what}"));
     }
 
     /// The control law that runs.
@@ -208,6 +237,7 @@ impl Thruster {
     /// Switches the control law, or changes its parameters.
     pub async fn set_controller(
         &self,
+        who: &str,
         lease: Option<&str>,
         wanted: &ControllerRequest,
     ) -> Result<(), Problem> {
@@ -258,6 +288,15 @@ impl Thruster {
         self.ask(message, &[Process::Controller], Kind::Refused).await?;
         let law = wanted.controller.clone().unwrap_or(now.controller);
         self.settle(|heard, now| heard.controller(now).is_some_and(|state| state.law.as_str() == law)).await;
+        let parts = [
+            ("controller", wanted.controller.as_deref()),
+            ("observer", wanted.observer.as_deref()),
+            ("estimator", wanted.estimator.as_deref()),
+        ];
+        let mut changed: Vec<String> =
+            parts.into_iter().filter_map(|(part, name)| Some(format!("{part} = {}", name?))).collect();
+        changed.extend(wanted.parameters.iter().map(|(name, value)| format!("{name} = {value}")));
+        self.did(who, lease, EventKind::ControllerChanged, &format!("set {}", changed.join(", ")));
         Ok(())
     }
 
@@ -269,7 +308,7 @@ impl Thruster {
         let key = {
             let mut desk = self.desk();
             desk.expire(now);
-            (heard, desk.version())
+            (heard, desk.version(), self.heard().servo_silent(now))
         };
         if rendered.0 != key {
             *rendered = (key, serde_json::to_vec(&self.state(now)).unwrap_or_default().into());
@@ -288,7 +327,7 @@ impl Thruster {
         let desk = self.desk();
         ThrusterState {
             id: self.id.clone(),
-            armed: heard.armed(now),
+            armed: heard.shown_armed(now),
             controller: controller.map(|c| c.law.as_str().to_owned()),
             observer: controller.map(|c| c.observer.as_str().to_owned()).filter(|name| !name.is_empty()),
             estimator: controller.map(|c| c.estimator.as_str().to_owned()).filter(|name| !name.is_empty()),
@@ -301,9 +340,7 @@ impl Thruster {
                 values: Values::of_estimates(&controller.map(|c| c.estimates).unwrap_or_default()),
                 parameters: controller.map(estimates).unwrap_or_default(),
             },
-            faults: Fault::in_set(heard.faults(now))
-                .map(|fault| FaultView { code: fault.code(), name: fault.name(), help: fault.help() })
-                .collect(),
+            faults: Fault::in_set(heard.shown_faults(now)).map(|fault| self.fault_view(fault)).collect(),
             limits: Limit::in_set(heard.limits(now))
                 .map(|limit| LimitView {
                     name: limit.name(),
@@ -316,6 +353,24 @@ impl Thruster {
                 expires_in_ms: lease.expires_in_ms(now),
             }),
             time_s: heard.servo.map_or(0.0, |(_, t)| t.time_ns as f64 * 1e-9),
+            age_s: heard.servo.map(|(at, _)| now.saturating_duration_since(at).as_secs_f64()),
+        }
+    }
+
+    /// A fault with what the event log knows of how it came.
+    fn fault_view(&self, fault: Fault) -> FaultView {
+        let tripped = self
+            .events
+            .latest(&self.id, |event| event.kind == EventKind::Tripped && event.fault == Some(fault.code()));
+        FaultView {
+            code: fault.code(),
+            name: fault.name(),
+            help: fault.help(),
+            since: tripped.as_ref().map(|event| event.time.clone()),
+            before: tripped.and_then(|event| event.before).map(|before| BeforeView {
+                thrust_n: before.thrust_n,
+                shaft_speed_rad_s: before.shaft_speed_rad_s,
+            }),
         }
     }
 

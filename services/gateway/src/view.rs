@@ -45,6 +45,8 @@ pub struct ThrusterState {
     pub lease: Option<LeaseView>,
     /// The servo's monotonic time of the measurements, s.
     pub time_s: f64,
+    /// Age of the measurements when this was written, s; null if there never were any.
+    pub age_s: Option<f64>,
 }
 
 /// What is commanded: exactly one of the two.
@@ -126,6 +128,19 @@ pub struct FaultView {
     pub name: &'static str,
     /// What to do, in a line; `GET /v1/faults/{code}` tells it all.
     pub help: &'static str,
+    /// When it was latched, RFC 3339; null if the event log does not say.
+    pub since: Option<String>,
+    /// What the thruster did just before; null if that is not known.
+    pub before: Option<BeforeView>,
+}
+
+/// What a thruster did just before a stop that nobody asked for.
+#[derive(Clone, Copy, Debug, Serialize, ToSchema)]
+pub struct BeforeView {
+    /// Thrust, N; null if not measured.
+    pub thrust_n: Option<f64>,
+    /// Shaft speed, rad/s; null if not measured.
+    pub shaft_speed_rad_s: Option<f64>,
 }
 
 /// A limit in force.

@@ -17,4 +17,4 @@ pub mod settings;
 pub mod tick;
 
 #[cfg(feature = "process")]
-pub use process::{ServoError, run};
+pub use process::{Inherited, ServoError, check, run};

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use kort_proto::config::{Config, ConfigError};
-use kort_proto::messages::Request;
+use kort_proto::messages::{Request, Trip};
 use kort_proto::signals::Signals;
 use kort_proto::transport::{
     Deployment, ServoPorts, Ticker, TransportError, monotonic_ns, ordinary, realtime,
@@ -20,6 +20,19 @@ use crate::tick::{Inputs, Servo};
 
 /// Most requests read in one tick; the rest waits.
 const REQUESTS_PER_TICK: usize = 4;
+
+/// Signals that end the process in good order; a terminal that goes away sends SIGHUP.
+const END_SIGNALS: [i32; 3] =
+    [signal_hook::consts::SIGTERM, signal_hook::consts::SIGINT, signal_hook::consts::SIGHUP];
+
+/// What a servo takes over from the one before it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Inherited {
+    /// Faults it had latched, and the one that its end is; bits of `Fault`.
+    pub latched: u64,
+    /// The stop that ended it.
+    pub tripped: Trip,
+}
 
 /// Why the servo cannot run.
 #[derive(Debug, Error)]
@@ -43,19 +56,38 @@ pub enum ServoError {
     Signals(#[from] std::io::Error),
 }
 
-/// Runs the servo of one thruster until SIGTERM or SIGINT. With `join` another process owns the
+/// Could the servo of this thruster start? Reads everything it reads.
+///
+/// # Errors
+/// [`ServoError`] names file, key, value and what is allowed.
+pub fn check(config: &Config, id: &str) -> Result<(), ServoError> {
+    let thruster = config.thruster(id)?;
+    let (file, text) = config.rig_text(id, thruster)?;
+    let rig = Rig::from_toml(&text).map_err(|error| ServoError::Rig { file, error })?;
+    Settings::new(config, id, thruster, &rig)?;
+    amplifier::build(config, id, thruster, &rig)?;
+    Ok(())
+}
+
+/// Runs the servo of one thruster until SIGTERM, SIGINT or SIGHUP. With `join` another process owns the
 /// shared memory; without, this one creates it.
 ///
 /// # Errors
 /// [`ServoError`] before the loop starts; the loop itself only ends by a signal.
-pub fn run(config: &Config, deployment: &Deployment, id: &str, join: bool) -> Result<(), ServoError> {
+pub fn run(
+    config: &Config,
+    deployment: &Deployment,
+    id: &str,
+    join: bool,
+    inherited: Inherited,
+) -> Result<(), ServoError> {
     let thruster = config.thruster(id)?;
     let (file, text) = config.rig_text(id, thruster)?;
     let rig = Rig::from_toml(&text).map_err(|error| ServoError::Rig { file, error })?;
     let settings = Settings::new(config, id, thruster, &rig)?;
     let mut amplifier = amplifier::build(config, id, thruster, &rig)?;
     let stop = Arc::new(AtomicBool::new(false));
-    for signal in [signal_hook::consts::SIGTERM, signal_hook::consts::SIGINT] {
+    for signal in END_SIGNALS {
         signal_hook::flag::register(signal, Arc::clone(&stop))?;
     }
     let owner = if join { None } else { Some(own(config, deployment, &stop)?) };
@@ -72,7 +104,7 @@ pub fn run(config: &Config, deployment: &Deployment, id: &str, join: bool) -> Re
         amplifier = thruster.amplifier,
         "servo runs, disarmed"
     );
-    let servo = Servo::new(settings, monotonic_ns());
+    let servo = Servo::new(settings, monotonic_ns()).with_latched(inherited.latched, inherited.tripped);
     tick_until_stopped(servo, amplifier.as_mut(), &mut ports, settings.period_ns, &stop);
     info!(thruster = id, "servo ends, drive off");
     drop(ports);

@@ -3,7 +3,7 @@
 use kort_proto::faults::{Fault, Names};
 use kort_proto::messages::{
     Command, DriveKind, Fresh, Freshness, Outcome, Process, REQUEST_LIFE_NS, Reply, Request, RequestKind,
-    Telemetry,
+    Telemetry, Trip,
 };
 use kort_proto::signals::Signals;
 
@@ -21,6 +21,10 @@ pub struct Servo {
     armed: bool,
     armed_at_ns: u64,
     latched: u64,
+    /// The last stop nobody asked for.
+    tripped: Trip,
+    /// What the shaft did last while armed; becomes `tripped` with the stop.
+    before: Trip,
     limits: u64,
     drive: f64,
     invalid: u64,
@@ -54,11 +58,19 @@ impl Servo {
             armed: false,
             armed_at_ns: 0,
             latched: 0,
+            tripped: Trip::default(),
+            before: Trip::default(),
             limits: 0,
             drive: 0.0,
             invalid: 0,
             stale: 0,
         }
+    }
+
+    /// With what a predecessor left: its latched faults, and the stop that ended it. They outlive the process
+    /// until somebody clears them.
+    pub fn with_latched(self, latched: u64, tripped: Trip) -> Self {
+        Self { latched, tripped, ..self }
     }
 
     /// Is the drive's output on?
@@ -90,7 +102,13 @@ impl Servo {
             }
         }
         self.latched |= faults;
+        if self.armed {
+            self.remember(inputs);
+        }
         if self.latched != 0 || self.command.stop != 0 {
+            if self.armed {
+                self.tripped = Trip { at_ns: inputs.now_ns, ..self.before };
+            }
             self.armed = false;
         }
         if !self.armed {
@@ -100,6 +118,15 @@ impl Servo {
         }
         (self.drive, self.limits) = self.guard.limit(self.command.drive, self.drive);
         Some(self.drive)
+    }
+
+    /// Notes what the shaft does, for the record of a stop; a sensor that shows nothing leaves its last word.
+    fn remember(&mut self, inputs: &Inputs) {
+        let keep = |value: f64, last: f64| if value.is_finite() { value } else { last };
+        self.before.thrust_n = keep(inputs.measured.thrust_n, self.before.thrust_n);
+        self.before.shaft_speed_rad_s =
+            keep(inputs.measured.shaft_speed_rad_s, self.before.shaft_speed_rad_s);
+        self.before.drive = self.drive;
     }
 
     /// Zero and disarmed at once; the process is about to end.
@@ -162,6 +189,8 @@ impl Servo {
             RequestKind::Arm => {
                 self.armed = true;
                 self.armed_at_ns = now_ns;
+                self.before =
+                    Trip { thrust_n: f64::NAN, shaft_speed_rad_s: f64::NAN, ..Trip::default() };
                 answer(Outcome::Done, format_args!("armed"))
             }
             RequestKind::Disarm => {
@@ -180,7 +209,7 @@ impl Servo {
                     )
                 }
             }
-            RequestKind::SetController => None,
+            RequestKind::SetController | RequestKind::Rest => None,
         }
     }
 
@@ -217,6 +246,7 @@ impl Servo {
             commands_stale: self.stale,
             thermal_load: self.guard.thermal_load(),
             drive_max: self.guard.limits().drive_max,
+            tripped: self.tripped,
             ..Telemetry::default()
         }
     }

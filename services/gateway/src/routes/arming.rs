@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use axum::extract::State;
+use axum::extract::{Extension, State};
 use axum::response::Response;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
@@ -10,16 +10,17 @@ use super::thrusters::json;
 use crate::App;
 use crate::extract::{LeaseId, Path};
 use crate::problem::Problem;
+use crate::token::Identity;
 use crate::view::ThrusterState;
 
 pub fn routes() -> OpenApiRouter<Arc<App>> {
     OpenApiRouter::new().routes(routes!(arm)).routes(routes!(disarm)).routes(routes!(clear_faults))
 }
 
-/// Arms the drive, at zero: only a setpoint that comes after moves it. A `Lease-Id`, if sent, must be in force.
+/// Arms the drive, at zero: only a setpoint that comes after moves it. Needs the `Lease-Id` in force while somebody holds one.
 #[utoipa::path(post, path = "/v1/thrusters/{id}/arm", tag = "command",
     params(("id" = String, Path, description = "Name of the thruster", example = "t1"),
-           ("Lease-Id" = Option<String>, Header, pattern = "^[!-~]+$", description = "The lease_id, for a commander who holds one")),
+           ("Lease-Id" = Option<String>, Header, pattern = "^[!-~]+$", description = "The lease_id of the lease in force, if there is one")),
     responses(
         (status = 200, description = "Armed", body = ThrusterState),
         (status = 400, description = "`malformed-header`", body = Problem, content_type = "application/problem+json"),
@@ -28,11 +29,12 @@ pub fn routes() -> OpenApiRouter<Arc<App>> {
         (status = 503, description = "`not-ready`: servo or controller is away", body = Problem, content_type = "application/problem+json")))]
 async fn arm(
     State(app): State<Arc<App>>,
+    Extension(who): Extension<Identity>,
     Path(id): Path<String>,
     LeaseId(lease_id): LeaseId,
 ) -> Result<Response, Problem> {
     let thruster = app.thruster(&id)?;
-    thruster.arm(lease_id.as_deref()).await?;
+    thruster.arm(&who.name, lease_id.as_deref()).await?;
     Ok(json(thruster.state_json()))
 }
 
@@ -43,16 +45,20 @@ async fn arm(
         (status = 200, description = "Disarmed", body = ThrusterState),
         (status = 404, description = "`unknown-thruster`", body = Problem, content_type = "application/problem+json"),
         (status = 503, description = "`not-ready`: the servo is away", body = Problem, content_type = "application/problem+json")))]
-async fn disarm(State(app): State<Arc<App>>, Path(id): Path<String>) -> Result<Response, Problem> {
+async fn disarm(
+    State(app): State<Arc<App>>,
+    Extension(who): Extension<Identity>,
+    Path(id): Path<String>,
+) -> Result<Response, Problem> {
     let thruster = app.thruster(&id)?;
-    thruster.disarm().await?;
+    thruster.disarm(&who.name).await?;
     Ok(json(thruster.state_json()))
 }
 
-/// Clears latched faults whose cause is gone. The thruster stays disarmed.
+/// Clears latched faults whose cause is gone. The thruster stays disarmed. Needs the `Lease-Id` in force while somebody holds one.
 #[utoipa::path(post, path = "/v1/thrusters/{id}/clear-faults", tag = "command",
     params(("id" = String, Path, description = "Name of the thruster", example = "t1"),
-           ("Lease-Id" = Option<String>, Header, pattern = "^[!-~]+$", description = "The lease_id, for a commander who holds one")),
+           ("Lease-Id" = Option<String>, Header, pattern = "^[!-~]+$", description = "The lease_id of the lease in force, if there is one")),
     responses(
         (status = 200, description = "No fault is latched", body = ThrusterState),
         (status = 400, description = "`malformed-header`", body = Problem, content_type = "application/problem+json"),
@@ -61,10 +67,11 @@ async fn disarm(State(app): State<Arc<App>>, Path(id): Path<String>) -> Result<R
         (status = 503, description = "`not-ready`: servo or controller is away", body = Problem, content_type = "application/problem+json")))]
 async fn clear_faults(
     State(app): State<Arc<App>>,
+    Extension(who): Extension<Identity>,
     Path(id): Path<String>,
     LeaseId(lease_id): LeaseId,
 ) -> Result<Response, Problem> {
     let thruster = app.thruster(&id)?;
-    thruster.clear_faults(lease_id.as_deref()).await?;
+    thruster.clear_faults(&who.name, lease_id.as_deref()).await?;
     Ok(json(thruster.state_json()))
 }

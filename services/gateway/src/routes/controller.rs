@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use axum::extract::State;
+use axum::extract::{Extension, State};
 use kort_control::{EstimatorKind, LawKind, ObserverKind, TUNABLES};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -14,6 +14,7 @@ use utoipa_axum::{router::OpenApiRouter, routes};
 use crate::App;
 use crate::extract::{Json, LeaseId, Path};
 use crate::problem::Problem;
+use crate::token::Identity;
 
 pub fn routes() -> OpenApiRouter<Arc<App>> {
     OpenApiRouter::new().routes(routes!(get, put))
@@ -118,10 +119,10 @@ async fn get(
     Ok(axum::Json(app.thruster(&id)?.controller()?))
 }
 
-/// Switches the control law, bumpless, also under way. A `Lease-Id`, if sent, must be in force.
+/// Switches the control law, bumpless, also under way. Needs the `Lease-Id` in force while somebody holds one.
 #[utoipa::path(put, path = "/v1/thrusters/{id}/controller", tag = "command", request_body = ControllerRequest,
     params(("id" = String, Path, description = "Name of the thruster", example = "t1"),
-           ("Lease-Id" = Option<String>, Header, pattern = "^[!-~]+$", description = "The lease_id, for a commander who holds one")),
+           ("Lease-Id" = Option<String>, Header, pattern = "^[!-~]+$", description = "The lease_id of the lease in force, if there is one")),
     responses(
         (status = 200, description = "The law that runs now", body = ControllerView),
         (status = 400, description = "`malformed-json`, `malformed-body`, `malformed-header`", body = Problem, content_type = "application/problem+json"),
@@ -133,11 +134,12 @@ async fn get(
         (status = 503, description = "`not-ready`: the controller is away", body = Problem, content_type = "application/problem+json")))]
 async fn put(
     State(app): State<Arc<App>>,
+    Extension(who): Extension<Identity>,
     Path(id): Path<String>,
     LeaseId(lease_id): LeaseId,
     Json(request): Json<ControllerRequest>,
 ) -> Result<axum::Json<ControllerView>, Problem> {
     let thruster = app.thruster(&id)?;
-    thruster.set_controller(lease_id.as_deref(), &request).await?;
+    thruster.set_controller(&who.name, lease_id.as_deref(), &request).await?;
     Ok(axum::Json(thruster.controller()?))
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use axum::extract::State;
+use axum::extract::{Extension, State};
 use axum::http::StatusCode;
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
@@ -11,8 +11,9 @@ use utoipa_axum::{router::OpenApiRouter, routes};
 
 use crate::App;
 use crate::extract::{Json, LeaseId, Path};
-use crate::lease::{Lease, TTL_DEFAULT_MS, TTL_MAX_MS};
+use crate::lease::{Lease, Wanted, TTL_DEFAULT_MS, TTL_MAX_MS};
 use crate::problem::{Kind, Problem};
+use crate::token::Identity;
 
 const HOLDER_CHARS_MAX: usize = 64;
 
@@ -32,6 +33,9 @@ struct LeaseRequest {
     #[serde(default = "ttl_default_ms", deserialize_with = "whole_number")]
     #[schema(minimum = 1, maximum = 60000, default = 500)]
     ttl_ms: i64,
+    /// Take command from whoever has it; the thruster goes to rest, its holder is told, and the event log says so.
+    #[serde(default)]
+    takeover: bool,
 }
 
 fn ttl_default_ms() -> i64 {
@@ -79,6 +83,7 @@ impl LeaseGrant {
         (status = 422, description = "`invalid-field`, `out-of-range`", body = Problem, content_type = "application/problem+json")))]
 async fn take(
     State(app): State<Arc<App>>,
+    Extension(who): Extension<Identity>,
     Path(id): Path<String>,
     Json(request): Json<LeaseRequest>,
 ) -> Result<(StatusCode, axum::Json<LeaseGrant>), Problem> {
@@ -98,7 +103,12 @@ async fn take(
         )
         .hint("a lease is renewed by every accepted command; it need not be long"));
     };
-    let (lease, now) = thruster.take_lease(&request.holder, ttl_ms)?;
+    let (lease, now) = thruster.take_lease(&Wanted {
+        holder: &request.holder,
+        token: &who.name,
+        ttl_ms,
+        takeover: request.takeover,
+    })?;
     Ok((StatusCode::CREATED, axum::Json(LeaseGrant::of(&lease, now))))
 }
 

@@ -11,12 +11,15 @@ use kort_proto::faults::Fault;
 use kort_proto::limits::Limit;
 use kort_proto::messages::{LATENESS_BOUNDS_NS, Timing};
 use kort_proto::signals::Kind as SignalKind;
+use kort_proto::transport::Restarts;
 use prometheus::proto::{Bucket, Counter, Gauge, Histogram, LabelPair, Metric, MetricFamily, MetricType};
 use prometheus::{TEXT_FORMAT, TextEncoder};
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 use crate::App;
+use crate::durations::BOUNDS_S;
 use crate::problem::{Kind, Problem};
+use crate::process::Usage;
 use crate::tally::Tally;
 use crate::thruster::Thruster;
 
@@ -59,6 +62,7 @@ fn gather(app: &App) -> Families {
         &[],
         lost as f64,
     );
+    service(&mut families, app);
     for (class, count) in app.answers() {
         families.counter(
             "http_responses_total",
@@ -68,6 +72,52 @@ fn gather(app: &App) -> Families {
         );
     }
     families
+}
+
+/// What concerns the service as a whole.
+fn service(families: &mut Families, app: &App) {
+    let mut processes = app.watched().restarts;
+    if processes.is_empty() {
+        // No supervisor: of the others nothing is known but what shared memory says.
+        let process = "gateway".to_owned();
+        processes.push(Restarts { process, thruster: None, count: 0, pid: Some(std::process::id()) });
+    }
+    for Restarts { process, thruster, count, pid } in &processes {
+        let labels = [("thruster", thruster.as_deref().unwrap_or("")), ("process", process)];
+        families.counter(
+            "process_restarts_total",
+            "Times the supervisor started this process anew since it started itself.",
+            &labels,
+            *count as f64,
+        );
+        let Some(usage) = pid.and_then(Usage::of) else { continue };
+        families.counter("process_cpu_seconds_total", "Processor time of the process.", &labels, usage.cpu_s);
+        families.gauge("process_resident_bytes", "Memory of the process.", &labels, usage.resident_bytes);
+    }
+    families.gauge("streams_open", "WebSocket streams that are open.", &[], app.streams().count() as f64);
+    let (open, refused, evicted) = app.connections().counts();
+    families.gauge("connections_open", "Connections that are open.", &[], open as f64);
+    families.counter("connections_refused_total", "Connections there was no room for.", &[], refused as f64);
+    families.counter(
+        "connections_evicted_total",
+        "Idle connections that were ended to make room for others.",
+        &[],
+        evicted as f64,
+    );
+    for (what, free, size) in app.disks() {
+        families.gauge("disk_free_bytes", "Space left where this is written.", &[("disk", what)], free);
+        families.gauge("disk_size_bytes", "Size of the disk where this is written.", &[("disk", what)], size);
+    }
+    for (route, counts) in app.durations().counts() {
+        families.histogram(
+            "http_request_duration_seconds",
+            "Time from a request's head to the start of its answer.",
+            &[("route", &route)],
+            BOUNDS_S.into_iter().zip(counts.buckets),
+            counts.buckets.iter().sum(),
+            counts.sum_s,
+        );
+    }
 }
 
 /// One row of `proto/src/signals.rs` is one metric here; a process that is away has no values.
@@ -95,9 +145,9 @@ fn state(families: &mut Families, thruster: &Thruster, tally: &Tally) {
             f64::from(alive),
         );
     }
-    families.gauge("armed", "Is the drive armed?", &label, f64::from(heard.armed(now)));
+    families.gauge("armed", "Is the drive armed?", &label, f64::from(heard.shown_armed(now)));
 
-    let latched = heard.faults(now);
+    let latched = heard.shown_faults(now);
     for (fault, raised) in Fault::ALL.iter().zip(&counts.faults_raised) {
         let labels = [("thruster", id), ("fault", fault.name())];
         families.gauge(
@@ -126,6 +176,10 @@ fn state(families: &mut Families, thruster: &Thruster, tally: &Tally) {
     let (granted, expired) = desk.lease.counts();
     families.counter("leases_granted_total", "Leases granted.", &label, granted as f64);
     families.counter("leases_expired_total", "Leases that ran out.", &label, expired as f64);
+    if let Some(given) = desk.given() {
+        let age_s = now.saturating_duration_since(given).as_secs_f64();
+        families.gauge("setpoint_age_seconds", "Time since the last accepted setpoint.", &label, age_s);
+    }
     families.counter("setpoints_accepted_total", "Setpoints accepted.", &label, desk.accepted() as f64);
     drop(desk);
 
@@ -242,18 +296,33 @@ impl Families {
     }
 
     fn lateness(&mut self, name: &'static str, help: &'static str, labels: &[(&str, &str)], timing: &Timing) {
+        let buckets = LATENESS_BOUNDS_NS.iter().map(|bound| *bound as f64 * 1e-9).zip(timing.histogram);
+        let count = timing.histogram.iter().sum();
+        self.histogram(name, help, labels, buckets, count, timing.lateness_sum_ns as f64 * 1e-9);
+    }
+
+    /// `buckets` are upper bounds with their counts, not cumulative.
+    fn histogram(
+        &mut self,
+        name: &'static str,
+        help: &'static str,
+        labels: &[(&str, &str)],
+        buckets: impl Iterator<Item = (f64, u64)>,
+        count: u64,
+        sum: f64,
+    ) {
         let mut below = 0;
-        let buckets = LATENESS_BOUNDS_NS.iter().zip(timing.histogram).map(|(bound, count)| {
+        let buckets = buckets.map(|(bound, count)| {
             below += count;
             let mut bucket = Bucket::default();
-            bucket.set_upper_bound(*bound as f64 * 1e-9);
+            bucket.set_upper_bound(bound);
             bucket.set_cumulative_count(below);
             bucket
         });
         let mut histogram = Histogram::default();
         histogram.set_bucket(buckets.collect());
-        histogram.set_sample_count(timing.histogram.iter().sum());
-        histogram.set_sample_sum(timing.lateness_sum_ns as f64 * 1e-9);
+        histogram.set_sample_count(count);
+        histogram.set_sample_sum(sum);
         self.add(name, help, MetricType::HISTOGRAM, labels).set_histogram(histogram);
     }
 

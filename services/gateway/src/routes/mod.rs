@@ -4,30 +4,32 @@ mod arming;
 mod console;
 mod controller;
 mod docs;
+mod events;
 mod faults;
 mod health;
 mod lease;
 mod metrics;
 mod recordings;
 mod setpoint;
+mod stop;
 mod stream;
 mod thrusters;
 
 pub use controller::{ControllerRequest, ControllerView, LawParameter};
 
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use axum::Router;
 use axum::extract::{DefaultBodyLimit, Request, State};
-use axum::http::{HeaderMap, StatusCode, header};
+use axum::http::{StatusCode, header};
 use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Response};
 use tower_http::timeout::TimeoutLayer;
 use utoipa_axum::router::OpenApiRouter;
 
 use crate::problem::{Kind, Problem};
-use crate::{App, BODY_BYTES_MAX, openapi};
+use crate::{App, BODY_BYTES_MAX, gate, openapi};
 
 /// Everything the gateway answers.
 pub fn router(app: Arc<App>) -> Router {
@@ -36,6 +38,8 @@ pub fn router(app: Arc<App>) -> Router {
         .merge(lease::routes())
         .merge(arming::routes())
         .merge(setpoint::routes())
+        .merge(stop::routes())
+        .merge(events::routes())
         .merge(controller::routes())
         .merge(stream::routes())
         .merge(recordings::routes())
@@ -52,7 +56,7 @@ pub fn router(app: Arc<App>) -> Router {
         .fallback(unknown_route)
         .layer(DefaultBodyLimit::max(BODY_BYTES_MAX))
         .layer(TimeoutLayer::with_status_code(StatusCode::REQUEST_TIMEOUT, Duration::from_secs(10)))
-        .layer(middleware::from_fn(same_origin))
+        .layer(middleware::from_fn_with_state(Arc::clone(&app), gate::check))
         .layer(middleware::from_fn_with_state(Arc::clone(&app), problems_only))
         .with_state(app)
 }
@@ -62,31 +66,15 @@ async fn unknown_route(request: Request) -> Problem {
         .hint("GET /openapi.json lists every route; /docs shows them")
 }
 
-/// A browser lets any site send simple requests and open WebSockets to this machine; it names that site in `Origin`.
-async fn same_origin(request: Request, next: Next) -> Result<Response, Problem> {
-    match foreign_origin(request.headers()) {
-        Some(origin) => {
-            Err(Problem::new(Kind::ForeignOrigin, format!("the request comes from a page of {origin}"))
-                .hint("open the console of this gateway itself; programs need send no Origin"))
-        }
-        None => Ok(next.run(request).await),
-    }
-}
-
-fn foreign_origin(headers: &HeaderMap) -> Option<String> {
-    let origin = headers.get(header::ORIGIN)?.to_str().unwrap_or("an unreadable origin");
-    let host = headers.get(header::HOST).and_then(|host| host.to_str().ok());
-    let ours = origin.split_once("://").is_some_and(|(_, named)| Some(named) == host);
-    (!ours).then(|| origin.to_owned())
-}
-
 /// Errors that axum or a layer answers by itself (405, time-out, a missing page of the docs) become
 /// problem documents too; their headers, `Allow` above all, stay.
 async fn problems_only(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
     let (method, path) = (request.method().clone(), request.uri().path().to_owned());
+    let (began, route) = (Instant::now(), app.pattern(&path));
     let response = next.run(request).await;
     let status = response.status();
     app.count_answer(status.as_u16());
+    app.durations().count(route, began.elapsed());
     if !(status.is_client_error() || status.is_server_error())
         || response.headers().get(header::CONTENT_TYPE).is_some_and(|kind| kind == "application/problem+json")
     {

@@ -1,11 +1,11 @@
 //! The state, many times a second, over a WebSocket that also takes setpoints.
 
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use axum::extract::State;
+use axum::extract::{Extension, State};
 use axum::extract::ws::{
-    Message, Utf8Bytes, WebSocket, WebSocketUpgrade, rejection::WebSocketUpgradeRejection,
+    CloseFrame, Message, Utf8Bytes, WebSocket, WebSocketUpgrade, rejection::WebSocketUpgradeRejection,
 };
 use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
@@ -18,12 +18,24 @@ use crate::App;
 use crate::extract::{Path, Query};
 use crate::problem::{Kind, Problem};
 use crate::thruster::Thruster;
+use crate::token::{Identity, Role};
 use crate::view::{Setpoint, ThrusterState};
 
 const HZ_MAX: f64 = 500.0;
 const MESSAGE_BYTES_MAX: usize = 4096;
 /// A message up to this size is still read, so that it can be answered; a longer one ends the connection.
 const MESSAGE_BYTES_READ: usize = 1 << 20;
+
+/// What the console offers beside its token.
+const PROTOCOL: &str = "kort";
+/// The client is asked whether it keeps up.
+const PING_EVERY: Duration = Duration::from_secs(1);
+/// Pings without an answer that end the stream.
+const MISSED_MAX: u32 = 3;
+/// A ping older than this, unanswered: the client is behind, and is sent no more states.
+const BEHIND_AFTER: Duration = Duration::from_millis(300);
+/// A message must leave within this time.
+const SEND_WITHIN: Duration = Duration::from_secs(5);
 
 pub fn routes() -> OpenApiRouter<Arc<App>> {
     OpenApiRouter::new().routes(routes!(stream))
@@ -44,18 +56,22 @@ fn hz_default() -> f64 {
     50.0
 }
 
-/// What a client may send.
+/// What a client may send: a setpoint under its lease, or a stop.
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields, expecting = "an object with setpoint and lease_id")]
+#[serde(deny_unknown_fields, expecting = "an object with setpoint and lease_id, or with stop")]
 struct Incoming {
-    setpoint: Setpoint,
-    lease_id: String,
+    setpoint: Option<Setpoint>,
+    lease_id: Option<String>,
+    #[serde(default)]
+    stop: bool,
 }
 
 /// The thruster's state as a WebSocket stream: one text message with a `ThrusterState` per period.
 ///
 /// The client may send `{"setpoint": {"thrust_n": 25.0}, "lease_id": "…"}`; what is refused is answered by one
-/// problem document. A plain GET, without the WebSocket handshake, is answered by one state.
+/// problem document. `{"stop": true}` stops every thruster and is answered by `{"stopped": [ids]}`. The gateway pings
+/// each second; states that the client does not keep up with are left out, and a client that misses three pings is
+/// closed. A plain GET, without the WebSocket handshake, is answered by one state.
 #[utoipa::path(get, path = "/v1/thrusters/{id}/stream", tag = "thrusters",
     params(("id" = String, Path, description = "Name of the thruster", example = "t1"), Rate),
     responses(
@@ -69,6 +85,7 @@ async fn stream(
     State(app): State<Arc<App>>,
     Path(id): Path<String>,
     Query(Rate { hz }): Query<Rate>,
+    Extension(who): Extension<Identity>,
     upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,
 ) -> Result<Response, Problem> {
     use WebSocketUpgradeRejection as Rejection;
@@ -80,7 +97,12 @@ async fn stream(
     match upgrade {
         Ok(upgrade) => Ok(upgrade
             .max_message_size(MESSAGE_BYTES_READ)
-            .on_upgrade(move |socket| serve(app, thruster, socket, Duration::from_secs_f64(1.0 / hz)))
+            .max_frame_size(MESSAGE_BYTES_READ)
+            .protocols([PROTOCOL])
+            .on_upgrade(move |socket| {
+                let period = Duration::from_secs_f64(1.0 / hz);
+                Session { app, thruster, who, lease: None, asked_at: None, missed: 0 }.serve(socket, period)
+            })
             .into_response()),
         Err(Rejection::InvalidConnectionHeader(_) | Rejection::InvalidUpgradeHeader(_)) => {
             Ok(json(thruster.state_json()))
@@ -93,33 +115,123 @@ async fn stream(
     }
 }
 
-async fn serve(app: Arc<App>, thruster: Arc<Thruster>, mut socket: WebSocket, period: Duration) {
-    let mut tick = tokio::time::interval(period);
-    tick.set_missed_tick_behavior(MissedTickBehavior::Skip);
-    let mut stop = app.stopping();
-    loop {
-        let message = tokio::select! {
-            _ = tick.tick() => text(&thruster.state_json()),
-            received = socket.recv() => match received {
-                Some(Ok(Message::Text(body))) => match command(&thruster, &body) {
-                    Ok(()) => continue,
-                    Err(problem) => text(&serde_json::to_vec(&problem).unwrap_or_default()),
+/// One client of the stream.
+struct Session {
+    app: Arc<App>,
+    thruster: Arc<Thruster>,
+    who: Identity,
+    /// The lease it commanded with last: it is told when that is taken over.
+    lease: Option<String>,
+    /// When the ping went out that is not answered yet.
+    asked_at: Option<Instant>,
+    missed: u32,
+}
+
+impl Session {
+    async fn serve(mut self, mut socket: WebSocket, period: Duration) {
+        let mut tick = interval(period);
+        let mut ping = interval(PING_EVERY);
+        let mut stop = self.app.stopping();
+        let _open = self.app.streams().open();
+        loop {
+            let message = tokio::select! {
+                biased;
+                _ = stop.changed() => close(1001, "the gateway stops"),
+                received = socket.recv() => match received {
+                    Some(Ok(received)) => match self.received(received).await {
+                        Some(answer) => answer,
+                        None => continue,
+                    },
+                    Some(Err(error)) => why_closed(&error),
+                    None => return,
                 },
-                Some(Ok(Message::Binary(_))) => text(&serde_json::to_vec(
-                    &Problem::new(Kind::MalformedBody, "a binary message came; commands are JSON in text messages")).unwrap_or_default()),
-                Some(Ok(Message::Ping(_) | Message::Pong(_))) => continue,
-                Some(Ok(Message::Close(_)) | Err(_)) | None => return,
-            },
-            _ = stop.changed() => Message::Close(None),
-        };
-        let last = matches!(message, Message::Close(_));
-        if socket.send(message).await.is_err() || last {
-            return;
+                _ = ping.tick() => match self.ask() {
+                    Some(message) => message,
+                    None => continue,
+                },
+                _ = tick.tick() => match self.state() {
+                    Some(message) => message,
+                    None => continue,
+                },
+            };
+            let last = matches!(message, Message::Close(_));
+            // A client that takes nothing must not keep its old states in the queue, nor this task for ever.
+            let sent = tokio::time::timeout(SEND_WITHIN, socket.send(message)).await;
+            if last || !matches!(sent, Ok(Ok(()))) {
+                return;
+            }
         }
+    }
+
+    /// The next ping, or the end of a client that missed too many.
+    fn ask(&mut self) -> Option<Message> {
+        if self.asked_at.is_some() {
+            self.missed += 1;
+            return (self.missed >= MISSED_MAX).then(|| close(1008, "three pings were not answered"));
+        }
+        self.asked_at = Some(Instant::now());
+        self.missed = 0;
+        Some(Message::Ping(Vec::new().into()))
+    }
+
+    /// The newest state. None for a client that is behind: what it would read later is old by then.
+    fn state(&mut self) -> Option<Message> {
+        if self.asked_at.is_some_and(|at| at.elapsed() > BEHIND_AFTER) {
+            return None;
+        }
+        if let Some(lost) = &self.lease {
+            let taken = self.thruster.desk().lease.taken_over(lost).is_some();
+            if taken {
+                let told = self.thruster.desk().may(self.lease.as_deref(), Instant::now());
+                self.lease = None;
+                return told.err().map(|problem| problem_text(&problem));
+            }
+        }
+        Some(text(&self.thruster.state_json()))
+    }
+
+    /// What a client's message is answered with.
+    async fn received(&mut self, message: Message) -> Option<Message> {
+        match message {
+            Message::Text(body) => match self.command(&body).await {
+                Ok(answer) => answer,
+                Err(problem) => Some(problem_text(&problem)),
+            },
+            Message::Pong(_) => {
+                self.asked_at = None;
+                self.missed = 0;
+                None
+            }
+            Message::Ping(_) => None,
+            Message::Binary(_) => Some(close(1003, "commands are JSON in text messages")),
+            Message::Close(_) => Some(Message::Close(None)),
+        }
+    }
+
+    async fn command(&mut self, body: &str) -> Result<Option<Message>, Problem> {
+        let incoming = parse(body)?;
+        if self.who.role < Role::Pilot {
+            return Err(Problem::new(
+                Kind::RoleTooLow,
+                format!("token {:?} has the role {}; commanding needs pilot", self.who.name, self.who.role.name()),
+            ));
+        }
+        if incoming.stop {
+            let stopped = super::stop::stop_all(&self.app, &self.who.name).await?;
+            return Ok(Some(text(serde_json::json!({ "stopped": stopped }).to_string().as_bytes())));
+        }
+        let missing = |field| Problem::new(Kind::InvalidField, format!("missing field `{field}`")).hint(EXAMPLE);
+        let setpoint = incoming.setpoint.ok_or_else(|| missing("setpoint"))?;
+        let lease = incoming.lease_id.ok_or_else(|| missing("lease_id"))?;
+        self.thruster.command(Some(&lease), setpoint)?;
+        self.lease = Some(lease);
+        Ok(None)
     }
 }
 
-fn command(thruster: &Thruster, body: &str) -> Result<(), Problem> {
+const EXAMPLE: &str = r#"send {"setpoint": {"thrust_n": 25.0}, "lease_id": "…"}, or {"stop": true}"#;
+
+fn parse(body: &str) -> Result<Incoming, Problem> {
     if body.len() > MESSAGE_BYTES_MAX {
         return Err(Problem::new(
             Kind::BodyTooLarge,
@@ -127,12 +239,37 @@ fn command(thruster: &Thruster, body: &str) -> Result<(), Problem> {
         )
         .hint("no command needs that much"));
     }
-    let incoming: Incoming = serde_json::from_str(body).map_err(|error| {
+    serde_json::from_str(body).map_err(|error| {
         let kind = if error.is_data() { Kind::InvalidField } else { Kind::MalformedJson };
-        Problem::new(kind, error.to_string())
-            .hint(r#"send {"setpoint": {"thrust_n": 25.0}, "lease_id": "…"}"#)
-    })?;
-    thruster.command(Some(&incoming.lease_id), incoming.setpoint).map(|_| ())
+        Problem::new(kind, error.to_string()).hint(EXAMPLE)
+    })
+}
+
+/// The close frame for what a client sent against the protocol (RFC 6455, section 7.4.1).
+fn why_closed(error: &axum::Error) -> Message {
+    let words = error.to_string();
+    let lower = words.to_lowercase();
+    if lower.contains("too long") || lower.contains("too big") || lower.contains("capacity") {
+        close(1009, "the message is too large")
+    } else if lower.contains("utf-8") || lower.contains("utf8") {
+        close(1007, "the message is not UTF-8")
+    } else {
+        close(1002, "the message breaks the WebSocket protocol")
+    }
+}
+
+fn close(code: u16, reason: &'static str) -> Message {
+    Message::Close(Some(CloseFrame { code, reason: reason.into() }))
+}
+
+fn interval(period: Duration) -> tokio::time::Interval {
+    let mut interval = tokio::time::interval(period);
+    interval.set_missed_tick_behavior(MissedTickBehavior::Skip);
+    interval
+}
+
+fn problem_text(problem: &Problem) -> Message {
+    text(&serde_json::to_vec(problem).unwrap_or_default())
 }
 
 fn text(json: &[u8]) -> Message {

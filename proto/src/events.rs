@@ -1,0 +1,291 @@
+//! The event log: who armed, took over, commanded and switched, what tripped and what restarted. One JSON
+//! object a line, appended by the gateway and the supervisor alike, and rotated.
+
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, Write};
+use std::os::unix::fs::OpenOptionsExt;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, SystemTime};
+
+use rustix::fs::{FlockOperation, flock};
+use serde::{Deserialize, Serialize};
+
+use crate::faults::Fault;
+
+/// A file that grew beyond this is put aside, bytes.
+const FILE_BYTES_MAX: u64 = 1 << 20;
+/// Files that are kept, the present one among them.
+const FILES: usize = 5;
+
+/// Tries for the lock, 2 ms apart.
+const LOCK_TRIES: u32 = 10;
+
+/// What happened.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum EventKind {
+    /// Somebody took command.
+    LeaseTaken,
+    /// Somebody took command away from its holder.
+    LeaseTakenOver,
+    /// The holder gave command up.
+    LeaseGivenUp,
+    /// A lease ran out.
+    LeaseExpired,
+    /// The drive was armed.
+    Armed,
+    /// The drive was disarmed on request.
+    Disarmed,
+    /// Every thruster was stopped on request.
+    Stopped,
+    /// A setpoint was accepted; while it moves, one a second is noted.
+    Commanded,
+    /// The control law or its parameters were changed.
+    ControllerChanged,
+    /// Latched faults were cleared.
+    FaultsCleared,
+    /// A fault was latched: a stop that nobody asked for, if the drive was armed.
+    Tripped,
+    /// A process of the service started.
+    ProcessStarted,
+    /// A process of the service ended, unasked.
+    ProcessEnded,
+    /// A process did not beat any more and was ended by the supervisor.
+    ProcessHung,
+    /// A recording was started.
+    RecordingStarted,
+    /// A recording was stopped.
+    RecordingStopped,
+    /// A recording ended by itself: no space, a limit, a disk that refuses.
+    RecordingEnded,
+    /// A recording was deleted.
+    RecordingDeleted,
+    /// The service was stopped on request.
+    ServiceStopped,
+}
+
+/// One line of the log.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Event {
+    /// Grows from event to event: wall time in microseconds, made unique.
+    pub id: u64,
+    /// Wall time, RFC 3339.
+    pub time: String,
+    /// CLOCK_MONOTONIC, ns: the time of recordings.
+    pub monotonic_ns: u64,
+    /// What happened.
+    pub kind: EventKind,
+    /// The thruster; none where it concerns all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub thruster: Option<String>,
+    /// Who did it: the token's name and the holder's, or the process.
+    pub who: String,
+    /// What exactly, in words.
+    pub detail: String,
+    /// Code of the fault, where it is about one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fault: Option<u32>,
+    /// What the thruster did just before a stop that nobody asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub before: Option<Before>,
+}
+
+/// What a thruster did just before a stop.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Before {
+    /// Thrust, N; null if not measured.
+    pub thrust_n: Option<f64>,
+    /// Shaft speed, rad/s; null if not measured.
+    pub shaft_speed_rad_s: Option<f64>,
+}
+
+impl Before {
+    /// From measured values, where NaN means "not measured".
+    pub fn of(thrust_n: f64, shaft_speed_rad_s: f64) -> Self {
+        let there = |value: f64| Some(value).filter(|v| v.is_finite());
+        Self { thrust_n: there(thrust_n), shaft_speed_rad_s: there(shaft_speed_rad_s) }
+    }
+}
+
+impl Event {
+    /// An event of now.
+    pub fn now(kind: EventKind, thruster: Option<&str>, who: &str, detail: impl Into<String>) -> Self {
+        static LAST_ID: AtomicU64 = AtomicU64::new(0);
+        let now = SystemTime::now();
+        let micros = now.duration_since(SystemTime::UNIX_EPOCH).map_or(0, |d| d.as_micros() as u64);
+        let next = |last: u64| Some(micros.max(last + 1));
+        let id = LAST_ID.fetch_update(Ordering::Relaxed, Ordering::Relaxed, next).unwrap_or_default();
+        Self {
+            id: micros.max(id + 1),
+            time: humantime::format_rfc3339_micros(now).to_string(),
+            monotonic_ns: monotonic_ns(),
+            kind,
+            thruster: thruster.map(str::to_owned),
+            who: who.to_owned(),
+            detail: detail.into(),
+            fault: None,
+            before: None,
+        }
+    }
+
+    /// About this fault.
+    pub fn fault(self, fault: Fault) -> Self {
+        Self { fault: Some(fault.code()), ..self }
+    }
+
+    /// With what the thruster did before.
+    pub fn before(self, before: Before) -> Self {
+        Self { before: Some(before), ..self }
+    }
+}
+
+fn monotonic_ns() -> u64 {
+    let now = rustix::time::clock_gettime(rustix::time::ClockId::Monotonic);
+    Duration::new(now.tv_sec as u64, now.tv_nsec as u32).as_nanos() as u64
+}
+
+/// The log on disk: `events.jsonl` in a folder, and `events.1.jsonl` … before it.
+#[derive(Clone, Debug)]
+pub struct EventLog {
+    folder: PathBuf,
+}
+
+impl EventLog {
+    /// The log in this folder, which is made if it is not there.
+    ///
+    /// # Errors
+    /// The folder cannot be made.
+    pub fn open(folder: &Path) -> io::Result<Self> {
+        fs::create_dir_all(folder)?;
+        Ok(Self { folder: folder.to_owned() })
+    }
+
+    /// Appends an event; whoever else appends does not get in between.
+    ///
+    /// # Errors
+    /// The disk refuses; nothing is written then, or a torn line, which readers skip.
+    pub fn append(&self, event: &Event) -> io::Result<()> {
+        let mut line = serde_json::to_vec(event)?;
+        line.push(b'\n');
+        let lock = OpenOptions::new()
+            .create(true)
+            .truncate(false)
+            .write(true)
+            .mode(0o640)
+            .open(self.folder.join(".lock"))?;
+        // The lock keeps two from rotating at once. One who holds it may be stopped: nobody waits for ever, and a
+        // line in one piece is appended whole in any case.
+        for _ in 0..LOCK_TRIES {
+            if flock(&lock, FlockOperation::NonBlockingLockExclusive).is_ok() {
+                break;
+            }
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        if fs::metadata(self.file(0)).is_ok_and(|about| about.len() > FILE_BYTES_MAX) {
+            for n in (1..FILES).rev() {
+                let _ = fs::rename(self.file(n - 1), self.file(n));
+            }
+        }
+        let mut file: File = OpenOptions::new().create(true).append(true).mode(0o640).open(self.file(0))?;
+        file.write_all(&line)
+    }
+
+    /// Every event that is kept, oldest first; lines that cannot be read are left out.
+    pub fn read(&self) -> Vec<Event> {
+        let mut events: Vec<Event> = (0..FILES)
+            .rev()
+            .filter_map(|n| fs::read(self.file(n)).ok())
+            .flat_map(|text| parse(&text).collect::<Vec<_>>())
+            .collect();
+        events.sort_by_key(|event| event.id);
+        events
+    }
+
+    /// Where the log ends now.
+    pub fn end(&self) -> Mark {
+        use std::os::unix::fs::MetadataExt;
+        fs::metadata(self.file(0)).map_or(Mark::default(), |about| Mark { inode: about.ino(), bytes: about.len() })
+    }
+
+    /// What was appended after a mark; everything that is kept if the files were rotated meanwhile.
+    pub fn read_after(&self, mark: Mark) -> Vec<Event> {
+        use std::io::{Read, Seek, SeekFrom};
+        let end = self.end();
+        if end.inode != mark.inode || end.bytes < mark.bytes {
+            return self.read();
+        }
+        let mut text = Vec::new();
+        let read = File::open(self.file(0)).and_then(|mut file| {
+            file.seek(SeekFrom::Start(mark.bytes))?;
+            file.read_to_end(&mut text)
+        });
+        match read {
+            Ok(_) => parse(&text).collect(),
+            Err(_) => Vec::new(),
+        }
+    }
+
+    fn file(&self, age: usize) -> PathBuf {
+        match age {
+            0 => self.folder.join("events.jsonl"),
+            n => self.folder.join(format!("events.{n}.jsonl")),
+        }
+    }
+}
+
+/// A place in the log.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Mark {
+    inode: u64,
+    bytes: u64,
+}
+
+fn parse(text: &[u8]) -> impl Iterator<Item = Event> {
+    text.split(|b| *b == b'\n').filter_map(|line| serde_json::from_slice(line).ok())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn event(detail: &str) -> Event {
+        Event::now(EventKind::Armed, Some("t1"), "bench", detail)
+    }
+
+    #[test]
+    fn ids_grow_and_a_torn_line_costs_only_itself() {
+        let folder = tempfile::tempdir().unwrap();
+        let log = EventLog::open(folder.path()).unwrap();
+        log.append(&event("first")).unwrap();
+        fs::OpenOptions::new()
+            .append(true)
+            .open(log.file(0))
+            .unwrap()
+            .write_all(b"{\"id\": 1, \"ti\n")
+            .unwrap();
+        log.append(&event("second").before(Before::of(80.0, f64::NAN))).unwrap();
+        let read = log.read();
+        assert_eq!(read.iter().map(|e| e.detail.as_str()).collect::<Vec<_>>(), ["first", "second"]);
+        assert!(read[0].id < read[1].id);
+        let mark = log.end();
+        log.append(&event("third")).unwrap();
+        assert_eq!(log.read_after(mark).len(), 1);
+        assert_eq!(log.read_after(Mark::default()).len(), 3);
+        assert_eq!(read[1].before, Some(Before { thrust_n: Some(80.0), shaft_speed_rad_s: None }));
+    }
+
+    #[test]
+    fn old_files_are_put_aside_and_at_last_dropped() {
+        let folder = tempfile::tempdir().unwrap();
+        let log = EventLog::open(folder.path()).unwrap();
+        let long = "x".repeat(200_000);
+        for _ in 0..60 {
+            log.append(&event(&long)).unwrap();
+        }
+        let files = fs::read_dir(folder.path()).unwrap().flatten().filter(|e| e.file_name() != ".lock").count();
+        assert_eq!(files, FILES);
+        let kept = log.read().len();
+        assert!((20..40).contains(&kept), "{kept}");
+    }
+}

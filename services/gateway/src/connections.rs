@@ -1,0 +1,235 @@
+//! Who is connected: caps by peer and in all. A slow or silent peer costs connections, never the stop: where a
+//! cap is reached the connection that has been idle longest makes room, and some are kept back that only stop.
+
+use std::future::Future;
+use std::net::IpAddr;
+use std::pin::Pin;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
+use std::task::{Context, Poll};
+use std::time::{Duration, Instant};
+
+use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
+use tokio::sync::Notify;
+use tokio::time::Sleep;
+
+use crate::thruster::lock;
+
+/// A peer that takes nothing for this long is gone: its connection ends.
+const WRITE_TIMEOUT: Duration = Duration::from_secs(15);
+
+/// How many connections there may be.
+#[derive(Clone, Copy, Debug)]
+pub struct Caps {
+    /// In all.
+    pub total: usize,
+    /// From one address.
+    pub per_peer: usize,
+    /// Beyond `total`, for stop and disarm alone.
+    pub reserve: usize,
+}
+
+/// One connection.
+#[derive(Debug)]
+pub struct Slot {
+    number: u64,
+    peer: IpAddr,
+    /// Only stop and disarm are answered here.
+    pub reserved: bool,
+    /// Milliseconds since the table began at which it fell idle; zero while a request is worked on.
+    idle_since_ms: AtomicU64,
+    began: Instant,
+    /// Told to end and make room.
+    pub evicted: Notify,
+}
+
+impl Slot {
+    /// A request is being worked on.
+    pub fn busy(&self) {
+        self.idle_since_ms.store(0, Ordering::Relaxed);
+    }
+
+    /// It waits for the peer.
+    pub fn idle(&self) {
+        let now_ms = self.began.elapsed().as_millis() as u64;
+        self.idle_since_ms.store(now_ms.max(1), Ordering::Relaxed);
+    }
+}
+
+/// All connections.
+#[derive(Debug)]
+pub struct Connections {
+    caps: Caps,
+    began: Instant,
+    open: Mutex<Vec<Arc<Slot>>>,
+    next: AtomicU64,
+    refused: AtomicU64,
+    evicted: AtomicU64,
+}
+
+impl Connections {
+    /// None yet.
+    pub fn new(caps: Caps) -> Connections {
+        Connections {
+            caps,
+            began: Instant::now(),
+            open: Mutex::default(),
+            next: AtomicU64::new(1),
+            refused: AtomicU64::new(0),
+            evicted: AtomicU64::new(0),
+        }
+    }
+
+    /// A place for a new connection of this peer; none if there is no room at all.
+    pub fn admit(&self, peer: IpAddr) -> Option<Arc<Slot>> {
+        let mut open = lock(&self.open);
+        let of_peer = open.iter().filter(|slot| slot.peer == peer).count();
+        let mut reserved = false;
+        if of_peer >= self.caps.per_peer || open.len() >= self.caps.total {
+            let candidate = |slot: &&Arc<Slot>| of_peer < self.caps.per_peer || slot.peer == peer;
+            let idlest = open
+                .iter()
+                .filter(candidate)
+                .map(|slot| (slot.idle_since_ms.load(Ordering::Relaxed), slot.number))
+                .filter(|(since_ms, _)| *since_ms > 0)
+                .min();
+            match idlest.and_then(|(_, number)| open.iter().position(|slot| slot.number == number)) {
+                Some(at) => {
+                    open.swap_remove(at).evicted.notify_one();
+                    self.evicted.fetch_add(1, Ordering::Relaxed);
+                }
+                // All are at work: what comes now may only stop.
+                None if open.iter().filter(|slot| slot.reserved).count() < self.caps.reserve => reserved = true,
+                None => {
+                    self.refused.fetch_add(1, Ordering::Relaxed);
+                    return None;
+                }
+            }
+        }
+        let slot = Arc::new(Slot {
+            number: self.next.fetch_add(1, Ordering::Relaxed),
+            peer,
+            reserved,
+            idle_since_ms: AtomicU64::new(0),
+            began: self.began,
+            evicted: Notify::new(),
+        });
+        slot.idle();
+        open.push(Arc::clone(&slot));
+        Some(slot)
+    }
+
+    fn leave(&self, slot: &Slot) {
+        lock(&self.open).retain(|other| other.number != slot.number);
+    }
+
+    /// Open now; refused and ended for others since start.
+    pub fn counts(&self) -> (usize, u64, u64) {
+        (lock(&self.open).len(), self.refused.load(Ordering::Relaxed), self.evicted.load(Ordering::Relaxed))
+    }
+}
+
+/// A socket that holds its place for as long as it lives, upgrades included, and gives up on a peer that takes
+/// nothing.
+pub struct Seated<S> {
+    socket: S,
+    slot: Arc<Slot>,
+    connections: Arc<Connections>,
+    stuck: Option<Pin<Box<Sleep>>>,
+}
+
+impl<S> Seated<S> {
+    /// Takes the place.
+    pub fn new(socket: S, slot: Arc<Slot>, connections: Arc<Connections>) -> Seated<S> {
+        Seated { socket, slot, connections, stuck: None }
+    }
+
+    /// What a write came to: pending for too long is an error.
+    fn watch<T>(&mut self, cx: &mut Context<'_>, came: Poll<std::io::Result<T>>) -> Poll<std::io::Result<T>> {
+        if came.is_ready() {
+            self.stuck = None;
+            return came;
+        }
+        let stuck = self.stuck.get_or_insert_with(|| Box::pin(tokio::time::sleep(WRITE_TIMEOUT)));
+        match stuck.as_mut().poll(cx) {
+            Poll::Ready(()) => Poll::Ready(Err(std::io::ErrorKind::TimedOut.into())),
+            Poll::Pending => Poll::Pending,
+        }
+    }
+}
+
+impl<S> Drop for Seated<S> {
+    fn drop(&mut self) {
+        self.connections.leave(&self.slot);
+    }
+}
+
+impl<S: AsyncRead + Unpin> AsyncRead for Seated<S> {
+    fn poll_read(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+        buffer: &mut ReadBuf<'_>,
+    ) -> Poll<std::io::Result<()>> {
+        Pin::new(&mut self.socket).poll_read(cx, buffer)
+    }
+}
+
+impl<S: AsyncWrite + Unpin> AsyncWrite for Seated<S> {
+    fn poll_write(mut self: Pin<&mut Self>, cx: &mut Context<'_>, bytes: &[u8]) -> Poll<std::io::Result<usize>> {
+        let came = Pin::new(&mut self.socket).poll_write(cx, bytes);
+        self.watch(cx, came)
+    }
+
+    fn poll_flush(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<std::io::Result<()>> {
+        let came = Pin::new(&mut self.socket).poll_flush(cx);
+        self.watch(cx, came)
+    }
+
+    fn poll_shutdown(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<std::io::Result<()>> {
+        let came = Pin::new(&mut self.socket).poll_shutdown(cx);
+        self.watch(cx, came)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PEERS: [IpAddr; 2] = [
+        IpAddr::V4(std::net::Ipv4Addr::new(10, 0, 0, 1)),
+        IpAddr::V4(std::net::Ipv4Addr::new(10, 0, 0, 2)),
+    ];
+
+    fn table() -> Connections {
+        Connections::new(Caps { total: 6, per_peer: 4, reserve: 2 })
+    }
+
+    #[tokio::test]
+    async fn the_longest_idle_of_a_greedy_peer_makes_room() {
+        let table = table();
+        let other = table.admit(PEERS[1]).unwrap();
+        let first = table.admit(PEERS[0]).unwrap();
+        std::thread::sleep(Duration::from_millis(5));
+        for _ in 0..20 {
+            assert!(!table.admit(PEERS[0]).unwrap().reserved);
+        }
+        first.evicted.notified().await;
+        assert_eq!(table.counts().0, 5, "four of the one, and the other's");
+        assert!(tokio::time::timeout(Duration::from_millis(5), other.evicted.notified()).await.is_err());
+    }
+
+    #[test]
+    fn where_all_are_at_work_some_places_are_kept_for_stop() {
+        let table = table();
+        for _ in 0..4 {
+            table.admit(PEERS[0]).unwrap().busy();
+        }
+        for _ in 0..2 {
+            let slot = table.admit(PEERS[0]).unwrap();
+            assert!(slot.reserved);
+            slot.busy();
+        }
+        assert!(table.admit(PEERS[0]).is_none());
+        assert_eq!(table.counts(), (6, 1, 0));
+    }
+}

@@ -1,0 +1,137 @@
+//! The gate in front of every route: is it meant for us, who asks, and may they?
+
+use std::net::SocketAddr;
+use std::sync::Arc;
+
+use axum::extract::{Request, State};
+use axum::http::{HeaderMap, Method, header};
+use axum::middleware::Next;
+use axum::response::Response;
+use tokio::sync::Semaphore;
+
+use crate::App;
+use crate::hosts::Hosts;
+use crate::problem::{Kind, Problem};
+use crate::serve::Reserved;
+use crate::token::{Identity, Role, Tokens};
+
+/// A browser cannot send `Authorization` with a WebSocket: it offers its token as a subprotocol.
+const TOKEN_PROTOCOL: &str = "bearer.";
+
+/// What the gate knows.
+#[derive(Debug)]
+pub struct Gate {
+    hosts: Hosts,
+    tokens: Tokens,
+    required: bool,
+    /// Argon2 is heavy on purpose: one at a time, so that wrong tokens cannot take the machine.
+    work: Semaphore,
+}
+
+impl Gate {
+    /// A gate for an address.
+    pub fn new(bind: SocketAddr, hosts: &[String], tokens: Tokens, required: bool) -> Gate {
+        Gate { hosts: Hosts::new(bind, hosts), tokens, required, work: Semaphore::new(1) }
+    }
+
+    /// Who asks.
+    async fn identify(&self, app: &Arc<App>, headers: &HeaderMap) -> Result<Identity, Problem> {
+        let Some(token) = shown(headers)? else {
+            if self.required {
+                return Err(Problem::new(Kind::TokenRequired, "no token is shown")
+                    .hint("send Authorization: Bearer TOKEN; `kort token new NAME --role viewer|pilot|admin` makes one"));
+            }
+            return Ok(Identity { name: "local".into(), role: Role::Admin });
+        };
+        if let Some(identity) = self.tokens.remembered(&token) {
+            return Ok(identity);
+        }
+        let _one_at_a_time = self.work.acquire().await;
+        let theirs = Arc::clone(app);
+        let found = tokio::task::spawn_blocking(move || theirs.gate().tokens.verify(&token)).await.ok().flatten();
+        found.ok_or_else(|| {
+            Problem::new(Kind::TokenRequired, "the token is not known, or was revoked")
+                .hint("`kort token new NAME --role viewer|pilot|admin` makes another")
+        })
+    }
+}
+
+/// The token of a request, if one is shown.
+fn shown(headers: &HeaderMap) -> Result<Option<String>, Problem> {
+    let unreadable = || {
+        Problem::new(Kind::MalformedHeader, "header Authorization is not readable").hint("Authorization: Bearer TOKEN")
+    };
+    if let Some(value) = headers.get(header::AUTHORIZATION) {
+        let text = value.to_str().map_err(|_| unreadable())?;
+        let (scheme, token) = text.trim().split_once(' ').ok_or_else(unreadable)?;
+        return if scheme.eq_ignore_ascii_case("bearer") { Ok(Some(token.trim().to_owned())) } else { Err(unreadable()) };
+    }
+    let offered = headers.get(header::SEC_WEBSOCKET_PROTOCOL).and_then(|value| value.to_str().ok());
+    Ok(offered.and_then(|list| list.split(',').find_map(|p| p.trim().strip_prefix(TOKEN_PROTOCOL)).map(str::to_owned)))
+}
+
+/// The console's page and the descriptions hold no data: anybody may read them.
+pub fn is_open(path: &str) -> bool {
+    matches!(path, "/" | "/healthz" | "/readyz" | "/openapi.json" | "/docs") || path.starts_with("/docs/")
+}
+
+/// The least role that may do this; none where anybody may.
+fn needed(method: &Method, path: &str) -> Option<Role> {
+    match *method {
+        _ if is_open(path) => None,
+        Method::GET | Method::HEAD | Method::OPTIONS => Some(Role::Viewer),
+        _ => Some(Role::Pilot),
+    }
+}
+
+/// Lets a request through, with its [`Identity`], or says why not.
+pub async fn check(State(app): State<Arc<App>>, mut request: Request, next: Next) -> Result<Response, Problem> {
+    let gate = app.gate();
+    gate.hosts.check(request.uri(), request.headers())?;
+    let path = request.uri().path();
+    if request.extensions().get::<Reserved>().is_some() && !(path == "/v1/stop" || path.ends_with("/disarm")) {
+        return Err(Problem::new(Kind::Overloaded, "every connection is taken; this one is kept for stop and disarm")
+            .hint("close connections that are not used, and try again"));
+    }
+    if let Some(role) = needed(request.method(), path) {
+        let identity = gate.identify(&app, request.headers()).await?;
+        if identity.role < role {
+            return Err(Problem::new(
+                Kind::RoleTooLow,
+                format!("token {:?} has the role {}; this needs {}", identity.name, identity.role.name(), role.name()),
+            )
+            .hint("`kort token new NAME --role …` makes a token of another role"));
+        }
+        request.extensions_mut().insert(identity);
+    }
+    Ok(next.run(request).await)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_changes_something_needs_a_pilot_and_the_page_nobody() {
+        assert_eq!(needed(&Method::POST, "/v1/stop"), Some(Role::Pilot));
+        assert_eq!(needed(&Method::DELETE, "/v1/recordings"), Some(Role::Pilot));
+        assert_eq!(needed(&Method::GET, "/metrics"), Some(Role::Viewer));
+        assert_eq!(needed(&Method::GET, "/v1/events"), Some(Role::Viewer));
+        assert_eq!(needed(&Method::GET, "/"), None);
+        assert_eq!(needed(&Method::GET, "/docs/index.css"), None);
+        assert_eq!(needed(&Method::GET, "/documents"), Some(Role::Viewer));
+    }
+
+    #[test]
+    fn a_token_is_read_from_header_or_subprotocol() {
+        let with = |name: &'static str, value: &str| {
+            let mut headers = HeaderMap::new();
+            headers.insert(name, value.parse().unwrap());
+            shown(&headers)
+        };
+        assert_eq!(with("authorization", "Bearer a.b").unwrap(), Some("a.b".into()));
+        assert_eq!(with("sec-websocket-protocol", "kort, bearer.a.b").unwrap(), Some("a.b".into()));
+        assert!(with("authorization", "Basic abc").is_err());
+        assert_eq!(shown(&HeaderMap::new()).unwrap(), None);
+    }
+}

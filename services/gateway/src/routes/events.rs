@@ -1,0 +1,98 @@
+//! The event log.
+
+use std::sync::Arc;
+
+use axum::extract::State;
+use kort_proto::events::Event;
+use serde::{Deserialize, Serialize};
+use utoipa::{IntoParams, ToSchema};
+use utoipa_axum::{router::OpenApiRouter, routes};
+
+use crate::App;
+use crate::extract::Query;
+use crate::problem::{Kind, Problem};
+use crate::view::BeforeView;
+
+/// Events in one answer when the query names no limit, and at most.
+const LIMIT_DEFAULT: usize = 200;
+const LIMIT_MAX: usize = 5000;
+
+pub fn routes() -> OpenApiRouter<Arc<App>> {
+    OpenApiRouter::new().routes(routes!(list))
+}
+
+/// Which events.
+#[derive(Deserialize, IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+struct Since {
+    /// Only later ones: the `id` of an event, or a time in RFC 3339.
+    #[param(example = "2026-01-01T12:00:00Z")]
+    since: Option<String>,
+    /// At most so many, the newest.
+    #[param(minimum = 1, maximum = 5000, default = 200)]
+    limit: Option<usize>,
+}
+
+/// Something that happened.
+#[derive(Serialize, ToSchema)]
+struct EventView {
+    /// Grows from event to event.
+    id: u64,
+    /// Wall time, RFC 3339.
+    time: String,
+    /// What happened.
+    #[schema(value_type = String, example = "armed")]
+    kind: kort_proto::events::EventKind,
+    /// The thruster; null where it concerns all.
+    thruster: Option<String>,
+    /// Who did it: holder and token, or a process.
+    who: String,
+    /// What exactly, in words.
+    detail: String,
+    /// Code of the fault, where it is about one.
+    fault: Option<u32>,
+    /// What the thruster did just before a stop that nobody asked for.
+    before: Option<BeforeView>,
+}
+
+impl From<Event> for EventView {
+    fn from(event: Event) -> EventView {
+        let Event { id, time, kind, thruster, who, detail, fault, before, .. } = event;
+        let before =
+            before.map(|b| BeforeView { thrust_n: b.thrust_n, shaft_speed_rad_s: b.shaft_speed_rad_s });
+        EventView { id, time, kind, thruster, who, detail, fault, before }
+    }
+}
+
+/// Who armed, took over, commanded and switched, what tripped and what restarted; oldest first.
+#[utoipa::path(get, path = "/v1/events", tag = "thrusters", params(Since),
+    responses(
+        (status = 200, description = "The events", body = [EventView]),
+        (status = 400, description = "`malformed-query`", body = Problem, content_type = "application/problem+json"),
+        (status = 422, description = "`out-of-range`: since, limit", body = Problem, content_type = "application/problem+json")))]
+async fn list(
+    State(app): State<Arc<App>>,
+    Query(Since { since, limit }): Query<Since>,
+) -> Result<axum::Json<Vec<EventView>>, Problem> {
+    let limit = limit.unwrap_or(LIMIT_DEFAULT);
+    if !(1..=LIMIT_MAX).contains(&limit) {
+        return Err(Problem::new(Kind::OutOfRange, format!("limit = {limit} is outside 1 to {LIMIT_MAX}")));
+    }
+    let after = since.as_deref().map_or(Ok(0), after)?;
+    Ok(axum::Json(app.events().since(after, limit).into_iter().map(EventView::from).collect()))
+}
+
+/// The id after which events are wanted: ids are microseconds of wall time.
+fn after(since: &str) -> Result<u64, Problem> {
+    if let Ok(id) = since.parse() {
+        return Ok(id);
+    }
+    let time = humantime::parse_rfc3339_weak(since)
+        .ok()
+        .and_then(|time| time.duration_since(std::time::SystemTime::UNIX_EPOCH).ok());
+    time.map(|time| time.as_micros() as u64).ok_or_else(|| {
+        Problem::new(Kind::OutOfRange, format!("since = {since:?} is neither the id of an event nor a time"))
+            .hint("2026-01-01T12:00:00Z, or the id of the last event that is known")
+    })
+}

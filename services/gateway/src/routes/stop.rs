@@ -1,0 +1,65 @@
+//! Stopping everything.
+
+use std::sync::Arc;
+
+use axum::extract::{Extension, State};
+use kort_proto::events::EventKind;
+use serde::Serialize;
+use utoipa::ToSchema;
+use utoipa_axum::{router::OpenApiRouter, routes};
+
+use crate::App;
+use crate::problem::{Kind, Problem};
+use crate::token::Identity;
+
+pub fn routes() -> OpenApiRouter<Arc<App>> {
+    OpenApiRouter::new().routes(routes!(stop))
+}
+
+/// Every thruster was stopped.
+#[derive(Serialize, ToSchema)]
+struct Stopped {
+    /// Thrusters whose servo confirmed that it is at zero torque, disarmed.
+    #[schema(example = json!(["t1"]))]
+    stopped: Vec<String>,
+}
+
+/// Brings every thruster to zero torque and disarms it, whoever holds a lease. The answer is the servos' own word.
+#[utoipa::path(post, path = "/v1/stop", tag = "command",
+    responses(
+        (status = 200, description = "Every servo confirmed", body = Stopped),
+        (status = 503, description = "`not-ready`: a servo did not confirm; it names which", body = Problem, content_type = "application/problem+json")))]
+async fn stop(
+    State(app): State<Arc<App>>,
+    Extension(who): Extension<Identity>,
+) -> Result<axum::Json<Stopped>, Problem> {
+    stop_all(&app, &who.name).await.map(|stopped| axum::Json(Stopped { stopped }))
+}
+
+/// Disarms all at once; the names of those that confirmed, or who did not.
+pub async fn stop_all(app: &Arc<App>, who: &str) -> Result<Vec<String>, Problem> {
+    app.events().tell(EventKind::Stopped, None, who, format!("{who} stopped every thruster"));
+    let asked: Vec<_> = app
+        .thrusters()
+        .iter()
+        .map(|thruster| {
+            let (thruster, who) = (Arc::clone(thruster), who.to_owned());
+            (thruster.id.clone(), tokio::spawn(async move { thruster.disarm(&who).await }))
+        })
+        .collect();
+    let (mut stopped, mut silent) = (Vec::new(), Vec::new());
+    for (id, asked) in asked {
+        match asked.await {
+            Ok(Ok(())) => stopped.push(id),
+            _ => silent.push(id),
+        }
+    }
+    if silent.is_empty() {
+        return Ok(stopped);
+    }
+    Err(Problem::new(
+        Kind::NotReady,
+        format!("no servo confirmed the stop of {}; confirmed: {}", silent.join(", "), stopped.join(", ")),
+    )
+    .hint("its command time-out stops the drive; cut the supply if the shaft still turns"))
+}

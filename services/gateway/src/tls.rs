@@ -1,0 +1,147 @@
+//! TLS by rustls: certificate and key from files, read again when they change, or made on request.
+
+use std::fs;
+use std::io::Write;
+use std::os::unix::fs::OpenOptionsExt;
+use std::path::Path;
+use std::sync::{Arc, Mutex};
+use std::time::SystemTime;
+
+use thiserror::Error;
+use tokio_rustls::rustls::crypto::ring;
+use tokio_rustls::rustls::pki_types::pem::PemObject;
+use tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer};
+use tokio_rustls::rustls::ServerConfig;
+
+use crate::settings::Tls;
+use crate::thruster::lock;
+
+/// Why there is no TLS.
+#[derive(Debug, Error)]
+#[error("gateway.tls, {file}: {why}\nhint: certificate and key are PEM files; self_signed = true makes both where neither is there")]
+pub struct TlsError {
+    file: String,
+    why: String,
+}
+
+impl TlsError {
+    fn new(file: &Path, why: impl ToString) -> TlsError {
+        TlsError { file: file.display().to_string(), why: why.to_string() }
+    }
+}
+
+/// The certificate in force.
+#[derive(Debug)]
+pub struct Certificate {
+    keys: Tls,
+    now: Mutex<(Stamps, Arc<ServerConfig>)>,
+}
+
+type Stamps = [Option<SystemTime>; 2];
+
+impl Certificate {
+    /// Reads certificate and key, and makes them first if that was asked for. `names` are what a certificate made
+    /// here is good for.
+    ///
+    /// # Errors
+    /// [`TlsError`] names the file.
+    pub fn open(keys: &Tls, names: Vec<String>) -> Result<Certificate, TlsError> {
+        if keys.self_signed && !keys.certificate.exists() && !keys.key.exists() {
+            make(keys, names)?;
+        }
+        let now = Mutex::new((stamps(keys), Arc::new(load(keys)?)));
+        Ok(Certificate { keys: keys.clone(), now })
+    }
+
+    /// The configuration for the next connection.
+    pub fn config(&self) -> Arc<ServerConfig> {
+        lock(&self.now).1.clone()
+    }
+
+    /// Takes over files that changed; broken ones are told, and the certificate before stays.
+    pub fn refresh(&self) {
+        let stamps = stamps(&self.keys);
+        if lock(&self.now).0 == stamps {
+            return;
+        }
+        match load(&self.keys) {
+            Ok(config) => {
+                tracing::info!("the certificate was read anew");
+                *lock(&self.now) = (stamps, Arc::new(config));
+            }
+            Err(error) => {
+                tracing::warn!("{error}; the certificate before stays in force");
+                lock(&self.now).0 = stamps;
+            }
+        }
+    }
+}
+
+fn stamps(keys: &Tls) -> Stamps {
+    [&keys.certificate, &keys.key].map(|file| fs::metadata(file).and_then(|about| about.modified()).ok())
+}
+
+fn load(keys: &Tls) -> Result<ServerConfig, TlsError> {
+    let chain = CertificateDer::pem_file_iter(&keys.certificate)
+        .and_then(Iterator::collect::<Result<Vec<_>, _>>)
+        .map_err(|error| TlsError::new(&keys.certificate, error))?;
+    if chain.is_empty() {
+        return Err(TlsError::new(&keys.certificate, "holds no certificate"));
+    }
+    let key = PrivateKeyDer::from_pem_file(&keys.key).map_err(|error| TlsError::new(&keys.key, error))?;
+    let mut config = ServerConfig::builder_with_provider(Arc::new(ring::default_provider()))
+        .with_safe_default_protocol_versions()
+        .and_then(|builder| builder.with_no_client_auth().with_single_cert(chain, key))
+        .map_err(|error| TlsError::new(&keys.certificate, error))?;
+    config.alpn_protocols = vec![b"http/1.1".to_vec()];
+    Ok(config)
+}
+
+fn make(keys: &Tls, names: Vec<String>) -> Result<(), TlsError> {
+    let names: Vec<String> = names.iter().map(|name| name.trim_matches(['[', ']']).to_owned()).collect();
+    let made = rcgen::generate_simple_self_signed(names).map_err(|error| TlsError::new(&keys.certificate, error))?;
+    for (file, text, mode) in
+        [(&keys.certificate, made.cert.pem(), 0o644), (&keys.key, made.signing_key.serialize_pem(), 0o600)]
+    {
+        let write = || {
+            if let Some(folder) = file.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+                fs::create_dir_all(folder)?;
+            }
+            let mut out = fs::OpenOptions::new().create_new(true).write(true).mode(mode).open(file)?;
+            out.write_all(text.as_bytes())
+        };
+        write().map_err(|error| TlsError::new(file, error))?;
+    }
+    tracing::info!("made a self-signed certificate: {}", keys.certificate.display());
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_certificate_is_made_once_and_read_anew_when_it_changes() {
+        let folder = tempfile::tempdir().unwrap();
+        let keys = Tls {
+            certificate: folder.path().join("tls/cert.pem"),
+            key: folder.path().join("tls/key.pem"),
+            self_signed: true,
+        };
+        let names = || vec!["localhost".to_owned(), "[::1]".to_owned()];
+        let certificate = Certificate::open(&keys, names()).unwrap();
+        let first = fs::read(&keys.certificate).unwrap();
+        Certificate::open(&keys, names()).unwrap();
+        assert_eq!(fs::read(&keys.certificate).unwrap(), first, "made once");
+        let before = certificate.config();
+        fs::write(&keys.certificate, "broken").unwrap();
+        certificate.refresh();
+        assert!(Arc::ptr_eq(&before, &certificate.config()), "a broken file leaves what was");
+        for file in [&keys.certificate, &keys.key] {
+            fs::remove_file(file).unwrap();
+        }
+        make(&keys, names()).unwrap();
+        certificate.refresh();
+        assert!(!Arc::ptr_eq(&before, &certificate.config()));
+    }
+}

@@ -1,0 +1,260 @@
+//! Tokens: who may read, command and administer. The file holds argon2 hashes only; a token is shown once, when
+//! it is made.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::Write;
+use std::os::unix::fs::OpenOptionsExt;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::time::SystemTime;
+
+use argon2::password_hash::{PasswordHash, PasswordHasher, PasswordVerifier, SaltString};
+use argon2::{Algorithm, Argon2, Params, Version};
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use subtle::ConstantTimeEq;
+use thiserror::Error;
+
+use crate::thruster::lock;
+
+/// What a token allows; each holds what the one before it does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Role {
+    /// Reads.
+    Viewer,
+    /// Commands.
+    Pilot,
+    /// Changes configuration, and recordings of others.
+    Admin,
+}
+
+impl Role {
+    /// Every role, the least first.
+    pub const ALL: [Role; 3] = [Role::Viewer, Role::Pilot, Role::Admin];
+
+    /// Its word.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Role::Viewer => "viewer",
+            Role::Pilot => "pilot",
+            Role::Admin => "admin",
+        }
+    }
+}
+
+/// Who asks.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Identity {
+    /// Name of the token; `local` where none is asked for.
+    pub name: String,
+    /// What it allows.
+    pub role: Role,
+}
+
+/// Why the file of tokens cannot be used.
+#[derive(Debug, Error)]
+#[error("{}: {why}\nhint: {hint}", file.display())]
+pub struct TokenError {
+    file: PathBuf,
+    why: String,
+    hint: &'static str,
+}
+
+/// The file as written.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Book {
+    #[serde(default)]
+    tokens: BTreeMap<String, Entry>,
+}
+
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Entry {
+    role: Role,
+    hash: String,
+}
+
+/// The argon2id parameters that OWASP names for little memory: 19 MiB, two passes.
+fn argon2() -> Argon2<'static> {
+    let params = Params::new(19_456, 2, 1, None).unwrap_or_default();
+    Argon2::new(Algorithm::Argon2id, Version::V0x13, params)
+}
+
+impl Book {
+    fn read(file: &Path) -> Result<Book, TokenError> {
+        let fail = |why: String| TokenError {
+            file: file.to_owned(),
+            why,
+            hint: "`kort token new NAME --role pilot` writes this file; it must belong to the user of the service",
+        };
+        let text = match fs::read_to_string(file) {
+            Ok(text) => text,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Book::default()),
+            Err(error) => return Err(fail(error.to_string())),
+        };
+        toml::from_str(&text).map_err(|error| fail(error.to_string().trim_end().to_owned()))
+    }
+}
+
+/// Makes a token and stores its hash; returns what the bearer must show.
+///
+/// # Errors
+/// The name is not allowed or taken, or the file cannot be written.
+pub fn make(file: &Path, name: &str, role: Role) -> Result<String, TokenError> {
+    let fail = |why: String, hint: &'static str| TokenError { file: file.to_owned(), why, hint };
+    let allowed = (1..=32).contains(&name.len())
+        && name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'-' || b == b'_');
+    if !allowed {
+        return Err(fail(
+            format!("token name {name:?}; allowed are 1 to 32 letters, digits, `-` or `_`"),
+            "the name stands in the event log: bridge, bench-2, grafana",
+        ));
+    }
+    let mut book = Book::read(file)?;
+    if book.tokens.contains_key(name) {
+        return Err(fail(
+            format!("there is a token named {name:?} already"),
+            "choose another name, or delete its section from this file to revoke it",
+        ));
+    }
+    let secret: String = rand::random::<[u8; 32]>().iter().map(|byte| format!("{byte:02x}")).collect();
+    let unable = |what: String| fail(what, "see that the random source and memory of this machine are usable");
+    let salt = SaltString::encode_b64(&rand::random::<[u8; 16]>()).map_err(|e| unable(e.to_string()))?;
+    let hash = argon2().hash_password(secret.as_bytes(), &salt).map_err(|e| unable(e.to_string()))?;
+    book.tokens.insert(name.to_owned(), Entry { role, hash: hash.to_string() });
+    write(file, &book).map_err(|error| {
+        fail(error.to_string(), "gateway.tokens in kort.toml names the file; its folder must be writable")
+    })?;
+    Ok(format!("{name}.{secret}"))
+}
+
+/// Whole or not at all, and for this user's eyes only.
+fn write(file: &Path, book: &Book) -> std::io::Result<()> {
+    if let Some(folder) = file.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+        fs::create_dir_all(folder)?;
+    }
+    let draft = file.with_extension("draft");
+    let _ = fs::remove_file(&draft);
+    let mut out = fs::OpenOptions::new().create_new(true).write(true).mode(0o600).open(&draft)?;
+    out.write_all(b"# Tokens of the gateway: argon2 hashes. Delete a section to revoke its token.\n")?;
+    out.write_all(toml::to_string(book).map_err(std::io::Error::other)?.as_bytes())?;
+    out.sync_all()?;
+    fs::rename(draft, file)
+}
+
+/// Checks tokens against the file, which is read anew when it changed.
+#[derive(Debug)]
+pub struct Tokens {
+    file: PathBuf,
+    known: Mutex<Known>,
+}
+
+#[derive(Debug, Default)]
+struct Known {
+    stamp: Option<(SystemTime, u64)>,
+    book: Book,
+    /// SHA-256 of tokens that argon2 has accepted: it need not be asked for each request.
+    accepted: Vec<([u8; 32], Identity)>,
+}
+
+impl Tokens {
+    /// The tokens of a file.
+    ///
+    /// # Errors
+    /// It is there and cannot be read.
+    pub fn open(file: &Path) -> Result<Tokens, TokenError> {
+        let known = Known { stamp: stamp(file), book: Book::read(file)?, accepted: Vec::new() };
+        Ok(Tokens { file: file.to_owned(), known: Mutex::new(known) })
+    }
+
+    /// How many tokens there are.
+    pub fn count(&self) -> usize {
+        self.refresh();
+        lock(&self.known).book.tokens.len()
+    }
+
+    /// Reads the file again if it changed; one that cannot be read any more revokes all.
+    fn refresh(&self) {
+        let now = stamp(&self.file);
+        let mut known = lock(&self.known);
+        if known.stamp != now {
+            let book = Book::read(&self.file).unwrap_or_else(|error| {
+                tracing::error!("{error}");
+                Book::default()
+            });
+            *known = Known { stamp: now, book, accepted: Vec::new() };
+        }
+    }
+
+    /// Whose token is this, if it was accepted before? Fast, and in the same time whatever is shown.
+    pub fn remembered(&self, token: &str) -> Option<Identity> {
+        self.refresh();
+        let digest: [u8; 32] = Sha256::digest(token.as_bytes()).into();
+        let known = lock(&self.known);
+        let mut found = None;
+        for (accepted, identity) in &known.accepted {
+            if bool::from(accepted.ct_eq(&digest)) {
+                found = Some(identity.clone());
+            }
+        }
+        found
+    }
+
+    /// Whose token is this? Takes tens of milliseconds, the same for a name that is not known.
+    pub fn verify(&self, token: &str) -> Option<Identity> {
+        let (name, secret) = token.split_once('.')?;
+        let entry = lock(&self.known).book.tokens.get(name).cloned();
+        // A hash of nothing that anybody knows: the work is the same.
+        const NOBODY: &str = "$argon2id$v=19$m=19456,t=2,p=1$bm9ib2R5bm9ib2R5$qqq6ZbDQ6HfmTqQF1vJTUVg9BFRbnpBv2q1wIqnWVJc";
+        let hash = entry.as_ref().map_or(NOBODY, |entry| entry.hash.as_str());
+        let matches = PasswordHash::new(hash)
+            .is_ok_and(|hash| argon2().verify_password(secret.as_bytes(), &hash).is_ok());
+        let identity = Identity { name: name.to_owned(), role: entry?.role };
+        if !matches {
+            return None;
+        }
+        let digest: [u8; 32] = Sha256::digest(token.as_bytes()).into();
+        lock(&self.known).accepted.push((digest, identity.clone()));
+        Some(identity)
+    }
+}
+
+fn stamp(file: &Path) -> Option<(SystemTime, u64)> {
+    let about = fs::metadata(file).ok()?;
+    Some((about.modified().ok()?, about.len()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_token_is_known_by_its_secret_and_only_its_hash_is_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("state/tokens.toml");
+        let token = make(&file, "bridge", Role::Pilot).unwrap();
+        let kept = fs::read_to_string(&file).unwrap();
+        assert!(!kept.contains(token.split_once('.').unwrap().1) && kept.contains("$argon2id$"), "{kept}");
+        let tokens = Tokens::open(&file).unwrap();
+        assert_eq!(tokens.remembered(&token), None);
+        let bridge = Some(Identity { name: "bridge".into(), role: Role::Pilot });
+        assert_eq!(tokens.verify(&token), bridge);
+        assert_eq!(tokens.remembered(&token), bridge);
+        for wrong in ["bridge.", "bridge", "", "nobody.abc", &format!("{token}0"), &token.replace("bridge", "bench")] {
+            assert_eq!(tokens.verify(wrong), None, "{wrong}");
+            assert_eq!(tokens.remembered(wrong), None, "{wrong}");
+        }
+        assert!(make(&file, "bridge", Role::Admin).unwrap_err().to_string().contains("already"));
+        assert!(make(&file, "a b", Role::Admin).unwrap_err().to_string().contains("hint:"));
+        fs::write(&file, "").unwrap();
+        assert_eq!(tokens.remembered(&token), None, "revoked without a restart");
+    }
+
+    #[test]
+    fn roles_are_in_order() {
+        assert!(Role::ALL.windows(2).all(|w| w[0] < w[1]));
+    }
+}

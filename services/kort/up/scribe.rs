@@ -1,0 +1,69 @@
+//! Writes what the supervisor has to say to disk, on a thread of its own: a slow disk must not keep it from
+//! watching.
+
+use std::path::PathBuf;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use kort_proto::events::{Event, EventLog};
+use kort_proto::transport::Watched;
+use tracing::warn;
+
+enum Entry {
+    Event(Box<Event>),
+    Watched(Box<Watched>),
+}
+
+/// The supervisor's pen.
+pub struct Scribe {
+    outbox: Sender<Entry>,
+    thread: JoinHandle<()>,
+}
+
+impl Scribe {
+    /// Starts writing to the event log and to the file beside the shared memory.
+    pub fn start(log: EventLog, watched: PathBuf) -> std::io::Result<Self> {
+        let (outbox, inbox) = channel();
+        let thread = std::thread::Builder::new()
+            .name("scribe".into())
+            .spawn(move || write(&log, &watched, &inbox))?;
+        Ok(Self { outbox, thread })
+    }
+
+    /// Notes an event.
+    pub fn event(&self, event: Event) {
+        let _ = self.outbox.send(Entry::Event(Box::new(event)));
+    }
+
+    /// Notes how things stand.
+    pub fn watched(&self, watched: Watched) {
+        let _ = self.outbox.send(Entry::Watched(Box::new(watched)));
+    }
+
+    /// Waits a moment for what was noted to be on disk.
+    pub fn finish(self) {
+        drop(self.outbox);
+        let end = Instant::now() + Duration::from_secs(1);
+        while !self.thread.is_finished() && Instant::now() < end {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+}
+
+fn write(log: &EventLog, watched: &std::path::Path, inbox: &Receiver<Entry>) {
+    let mut complained = false;
+    for entry in inbox {
+        let written = match entry {
+            Entry::Event(event) => log.append(&event),
+            Entry::Watched(state) => state.write(watched),
+        };
+        match written {
+            Ok(()) => complained = false,
+            Err(error) if !std::mem::replace(&mut complained, true) => {
+                warn!("what happened cannot be written down: {error}\nhint: gateway.events needs space");
+            }
+            Err(_) => (),
+        }
+    }
+}

@@ -1,0 +1,150 @@
+//! What the supervisor hears of one thruster through shared memory: that its processes beat, and how it stands.
+
+use std::time::{Duration, Instant};
+
+use kort_proto::faults::Fault;
+use kort_proto::messages::{Request, RequestKind, Trip};
+use kort_proto::transport::{Deployment, Stood, SupervisorPorts, monotonic_ns};
+
+use super::role::Heritage;
+
+/// Ports that cannot be opened are tried again this often.
+const REOPEN_EVERY: Duration = Duration::from_millis(100);
+/// Thrust that counts as none, share of the largest.
+const THRUST_SMALL: f64 = 0.03;
+/// Shaft speed that counts as none, share of the largest.
+const SPEED_SMALL: f64 = 0.08;
+
+/// One thruster under watch.
+pub struct Watch {
+    id: String,
+    ports: Option<SupervisorPorts>,
+    tried: Option<Instant>,
+    /// How it stood when it was last heard.
+    pub stood: Stood,
+    tripped: Trip,
+    thrust_max_n: f64,
+    speed_max_rad_s: f64,
+    heard: Option<Instant>,
+}
+
+/// Who beat since the last look.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Beats {
+    /// The servo sent telemetry.
+    pub servo: bool,
+    /// The controller sent its state.
+    pub controller: bool,
+    /// The gateway sent its setpoint.
+    pub gateway: bool,
+}
+
+impl Watch {
+    /// Starts from how the thruster stood when it was last heard, perhaps under another supervisor.
+    pub fn new(id: &str, stood: Stood) -> Self {
+        Self {
+            id: id.to_owned(),
+            ports: None,
+            tried: None,
+            stood,
+            tripped: Trip::default(),
+            thrust_max_n: f64::NAN,
+            speed_max_rad_s: f64::NAN,
+            heard: None,
+        }
+    }
+
+    /// The thruster.
+    pub fn id(&self) -> &str {
+        &self.id
+    }
+
+    /// Reads what came since the last look.
+    pub fn look(&mut self, deployment: &Deployment) -> Beats {
+        let generation = deployment.generation();
+        if self.ports.as_ref().is_some_and(|ports| Some(ports.generation) != generation) {
+            self.ports = None;
+        }
+        if self.ports.is_none() && self.tried.is_none_or(|at| at.elapsed() >= REOPEN_EVERY) {
+            self.tried = Some(Instant::now());
+            self.ports = SupervisorPorts::open(deployment, &self.id).ok();
+        }
+        let Some(ports) = &self.ports else { return Beats::default() };
+        let mut beats = Beats::default();
+        while let Some(telemetry) = ports.telemetry.next() {
+            beats.servo = true;
+            self.heard = Some(Instant::now());
+            let there = |value: f64, last: Option<f64>| Some(value).filter(|v| v.is_finite()).or(last);
+            self.stood.armed = telemetry.armed != 0;
+            self.stood.servo_faults = telemetry.faults;
+            self.stood.thrust_n = there(telemetry.signals.thrust_n, self.stood.thrust_n);
+            self.stood.shaft_speed_rad_s =
+                there(telemetry.signals.shaft_speed_rad_s, self.stood.shaft_speed_rad_s);
+            self.tripped = telemetry.tripped;
+        }
+        if let Some(state) = ports.state.latest() {
+            beats.controller = true;
+            self.stood.controller_faults = state.faults;
+            self.thrust_max_n = state.thrust_max_n;
+            self.speed_max_rad_s = state.speed_max_rad_s;
+        }
+        beats.gateway = ports.setpoint.latest().is_some();
+        beats
+    }
+
+    /// What the successor of a process takes over: a servo that ended while armed is a stop nobody asked for.
+    pub fn heritage(&self, role: &str) -> Heritage {
+        let now = Trip {
+            at_ns: monotonic_ns(),
+            thrust_n: self.stood.thrust_n.unwrap_or(f64::NAN),
+            shaft_speed_rad_s: self.stood.shaft_speed_rad_s.unwrap_or(f64::NAN),
+            drive: f64::NAN,
+        };
+        match role {
+            "servo" if self.stood.armed => {
+                Heritage { latched: self.stood.servo_faults | Fault::ServoRestarted.bit(), tripped: now }
+            }
+            "servo" => Heritage { latched: self.stood.servo_faults, tripped: self.tripped },
+            "controller" => Heritage { latched: self.stood.controller_faults, tripped: Trip::default() },
+            _ => Heritage::default(),
+        }
+    }
+
+    /// The servo has ended: its successor starts disarmed.
+    pub fn servo_ended(&mut self) {
+        if self.stood.armed {
+            self.stood.servo_faults |= Fault::ServoRestarted.bit();
+        }
+        self.stood.armed = false;
+    }
+
+    /// Asks servo or controller for something.
+    pub fn ask(&mut self, kind: RequestKind) {
+        if let Some(ports) = &mut self.ports {
+            let _ = ports.request.send(Request { kind: kind as u32, ..Request::default() });
+        }
+    }
+
+    /// Is the servo heard?
+    pub fn speaks(&self) -> bool {
+        self.heard.is_some_and(|at| at.elapsed() < Duration::from_millis(300))
+    }
+
+    /// Is there practically no thrust any more? Shaft speed decides where thrust is not measured.
+    pub fn at_rest(&self) -> bool {
+        let small = |value: Option<f64>, most: f64, share: f64, floor: f64| {
+            value.is_none_or(|value| value.abs() <= if most.is_finite() { share * most } else { floor })
+        };
+        small(self.stood.thrust_n, self.thrust_max_n, THRUST_SMALL, 2.0)
+            && small(self.stood.shaft_speed_rad_s, self.speed_max_rad_s, SPEED_SMALL, 5.0)
+    }
+
+    /// Thrust and shaft speed in words.
+    pub fn words(&self) -> String {
+        let text = |value: Option<f64>, unit: &str| match value {
+            Some(value) => format!("{value:.1} {unit}"),
+            None => format!("{unit} not measured"),
+        };
+        format!("{}, {}", text(self.stood.thrust_n, "N"), text(self.stood.shaft_speed_rad_s, "rad/s"))
+    }
+}
