@@ -23,3 +23,7 @@ soak *SCENARIOS:
 # the blind proof on fresh seeds, written to docs/proof.md
 prove *ARGS:
     cargo run --release -- prove --markdown docs/proof.md {{ARGS}}
+
+# the fault campaign: each process killed 1000 times, and the rest of docs/operations.md's table
+faults KILLS="1000":
+    KORT_FAULT_KILLS={{KILLS}} cargo test --test faults -- --nocapture

@@ -66,6 +66,7 @@ fn unchunk(mut rest: &[u8]) -> Vec<u8> {
     whole
 }
 
+const ARM: &str = "/v1/thrusters/t1/arm";
 const JSON: (&str, &str) = ("Content-Type", "application/json");
 
 fn put_json(port: u16, method: &str, path: &str, lease: &str, body: &str) -> Answer {
@@ -185,7 +186,7 @@ fn a_setpoint_that_is_not_allowed_never_reaches_the_drive() {
 
     let disarmed = put_json(port, "PUT", path, &id, r#"{"thrust_n": 25.0}"#);
     assert_problem(&disarmed, 409, "not-armed", "disarmed");
-    stack.expect("POST", "/arm", None);
+    assert_eq!(put_json(port, "POST", ARM, &id, "").status, 200);
     let beyond = format!(r#"{{"thrust_n": {}}}"#, range + 0.1);
     let cases = [
         (r#"{"thrust_n": NaN}"#, 400, "malformed-json"),
@@ -252,7 +253,7 @@ fn one_commander_at_a_time_and_an_ended_lease_ends_the_thrust() {
         "arming against the lease",
     );
 
-    stack.expect("POST", "/arm", None);
+    assert_eq!(put_json(port, "POST", ARM, id, "").status, 200);
     let start = Instant::now();
     while start.elapsed() < Duration::from_millis(2500) {
         let answer = put_json(port, "PUT", path, id, r#"{"thrust_n": 60}"#);
@@ -324,8 +325,13 @@ fn the_stream_shows_the_state_at_the_asked_rate_and_takes_setpoints() {
         assert_eq!(problem["type"], format!("urn:kort:problem:{slug}"), "{message}: {problem}");
     }
 
+    socket.send(Message::text(r#"{"stop": true}"#)).unwrap();
+    let stopped =
+        wait("the stop's answer", || Some(next(&mut socket)).filter(|answer| answer["stopped"].is_array()));
+    assert_eq!(stopped["stopped"], json!(["t1"]));
     let lease = stack.expect("POST", "/lease", Some(json!({"holder": "stream", "ttl_ms": 20000})));
-    stack.expect("POST", "/arm", None);
+    let id = lease["lease_id"].as_str().unwrap();
+    assert_eq!(put_json(stack.site.port, "POST", ARM, id, "").status, 200);
     socket
         .send(Message::text(
             json!({"setpoint": {"speed_rad_s": 30.0}, "lease_id": lease["lease_id"]}).to_string(),
@@ -337,6 +343,87 @@ fn the_stream_shows_the_state_at_the_asked_rate_and_takes_setpoints() {
         let speed = state["measured"]["shaft_speed_rad_s"].as_f64()?;
         (state["setpoint"] == json!({"speed_rad_s": 30.0}) && (speed - 30.0).abs() < 6.0).then_some(())
     });
+}
+
+#[test]
+fn who_breaks_the_protocol_is_closed_with_a_reason_and_who_loses_the_lease_is_told() {
+    let stack = Stack::start();
+    let url = format!("ws://127.0.0.1:{}/v1/thrusters/t1/stream?hz=20", stack.site.port);
+    let code = |message: Message| -> u16 {
+        let (mut socket, _) = tungstenite::connect(&url).unwrap();
+        socket.send(message).unwrap();
+        loop {
+            match socket.read() {
+                Ok(Message::Close(frame)) => return frame.map_or(0, |frame| frame.code.into()),
+                Ok(_) => (),
+                Err(_) => return 0,
+            }
+        }
+    };
+    assert_eq!(code(Message::binary(vec![1, 2, 3])), 1003);
+    let lease = stack.expect("POST", "/lease", Some(json!({"holder": "stream", "ttl_ms": 20000})));
+    let id = lease["lease_id"].as_str().unwrap().to_owned();
+    let port = stack.site.port;
+    assert_eq!(put_json(port, "POST", ARM, &id, "").status, 200);
+    let (mut socket, _) = tungstenite::connect(&url).unwrap();
+    socket.send(Message::text(json!({"setpoint": {"thrust_n": 5.0}, "lease_id": id}).to_string())).unwrap();
+    wait("the setpoint", || (stack.state()?["setpoint"]["thrust_n"] == 5.0).then_some(()));
+    stack.expect("POST", "/lease", Some(json!({"holder": "bridge", "takeover": true})));
+    let told = wait("the word of the takeover", || match socket.read().unwrap() {
+        Message::Text(text) => {
+            serde_json::from_str::<Value>(&text).ok().filter(|answer| answer["title"].is_string())
+        }
+        _ => None,
+    });
+    assert_eq!((&told["type"], &told["holder"]), (&json!("urn:kort:problem:lease-lost"), &json!("bridge")));
+}
+
+/// What a stranger and a later diagnosis need stands in the file, and several recordings run at once.
+#[test]
+fn a_recording_holds_its_context_and_is_deleted_by_name() {
+    let mut stack = Stack::start_at(Site::new().with_t2());
+    let port = stack.site.port;
+    for (thruster, name) in [("t1", "one"), ("t2", "two")] {
+        let body = json!({"thruster": thruster, "name": name, "rate_hz": 200}).to_string();
+        assert_eq!(send(port, "POST", "/v1/recordings", &[JSON], body.as_bytes()).status, 201);
+    }
+    assert_problem(&send(port, "DELETE", "/v1/recordings", &[], b""), 409, "refused", "two run");
+    stack.thrust(40.0, 60_000);
+    std::thread::sleep(Duration::from_millis(1500));
+    let metrics = stack.text("/metrics").unwrap();
+    assert!(metrics.contains("kort_recording_active{thruster=\"t2\"} 1"), "{metrics}");
+    for name in ["one", "two"] {
+        let done = send(port, "DELETE", &format!("/v1/recordings/{name}"), &[], b"");
+        assert_eq!((done.status, &done.json()["state"]), (200, &json!("complete")));
+    }
+    let file = send(port, "GET", "/v1/recordings/one", &[], b"").body;
+    let recording = kort_recording::Recording::decode("one", file.as_slice(), None).unwrap();
+    assert!(
+        recording.losses.is_empty() && recording.notes.iter().all(|n| !n.contains("left out")),
+        "{recording:?}"
+    );
+    let rig = std::fs::read_to_string(concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/config/thrusters/whitcomb-yoerger-1999.toml"
+    ));
+    assert_eq!(recording.about["rig"], rig.unwrap());
+    for key in ["kort_version", "rig_revision", "started", "thruster", "owner"] {
+        assert!(!recording.about[key].is_empty(), "{key}");
+    }
+    let text = String::from_utf8_lossy(&file);
+    assert!(text.contains("kort.state/1") && text.contains("kort.event/1"));
+    // Wall time: the log does not begin in 1970.
+    let path = stack.site.folder.path().join("one.mcap");
+    std::fs::write(&path, &file).unwrap();
+    let fit = common::run(std::process::Command::new(common::KORT).args(["fit", "--json"]).arg(&path));
+    assert!(fit.status.success(), "no --rig is needed: {}", String::from_utf8_lossy(&fit.stderr));
+    let torn = stack.site.folder.path().join("torn.mcap");
+    std::fs::write(&torn, &file[..file.len() * 2 / 3]).unwrap();
+    let fit = common::run(std::process::Command::new(common::KORT).args(["fit", "--json"]).arg(&torn));
+    assert_eq!(fit.status.code(), Some(3), "{}", String::from_utf8_lossy(&fit.stderr));
+    assert!(String::from_utf8_lossy(&fit.stderr).contains("cut off"), "the loss is named");
+    assert_eq!(send(port, "DELETE", "/v1/recordings/one", &[], b"").status, 204);
+    assert_problem(&send(port, "GET", "/v1/recordings/one", &[], b""), 404, "unknown-recording", "deleted");
 }
 
 #[test]

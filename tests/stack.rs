@@ -116,7 +116,11 @@ fn a_stop_that_nobody_asked_for_is_latched_through_every_restart_and_tells_what_
         kill(first, "KILL");
         wait("a successor", || stack.process(role).filter(|pid| *pid != first));
         stack.wait_until_up();
-        assert_eq!(told(&stack.state().unwrap()).map(|f| f["since"].clone()), Some(fault["since"].clone()), "{role}");
+        assert_eq!(
+            told(&stack.state().unwrap()).map(|f| f["since"].clone()),
+            Some(fault["since"].clone()),
+            "{role}"
+        );
     }
     let events = stack.get("/v1/events").unwrap();
     for kind in ["lease_taken", "armed", "commanded", "process_ended", "process_started", "tripped"] {
@@ -303,6 +307,7 @@ fn the_end_of_a_lease_ramps_to_zero_within_half_a_second() {
     stack.thrust(80.0, 3000);
     let mut watch = stack.watch();
     // The lease was renewed by the setpoint at the latest; from then on nobody renews it.
+    watch.until("the whole setpoint", |t| t.signals.thrust_cmd_n == 80.0);
     let falling = watch.until("the ramp", |t| t.armed != 0 && t.signals.thrust_cmd_n < 70.0);
     let zero = watch.until("zero", at_zero);
     let took_ms = (zero.time_ns - falling.time_ns) / 1_000_000;

@@ -64,9 +64,16 @@ const LONG: &[(&str, usize)] = &[
     ("crates/thruster/tests/effects.rs", 500),
     ("crates/truth/src/case.rs", 500),
     ("proto/src/messages.rs", 560),
-    ("services/controller/src/tick.rs", 480),
-    ("services/servo/src/tick.rs", 460),
-    ("tests/gateway.rs", 520),
+    ("proto/src/transport/deployment.rs", 420),
+    ("services/gateway/src/bus.rs", 420),
+    ("services/gateway/src/record.rs", 480),
+    ("services/controller/src/tick.rs", 560),
+    ("services/gateway/src/lib.rs", 500),
+    ("services/gateway/src/thruster.rs", 480),
+    ("services/kort/up.rs", 440),
+    ("services/servo/src/tick.rs", 500),
+    ("tests/stack.rs", 480),
+    ("tests/gateway.rs", 640),
 ];
 
 fn root() -> &'static Path {

@@ -197,7 +197,13 @@ impl Config {
                 "at most the servo's rate",
             )?;
             if let Some(rise_s) = t.controller.setpoint_rise_s {
-                check("controller.setpoint_rise_s", rise_s, 0.0, 60.0, "leave it out for what suits the law")?;
+                check(
+                    "controller.setpoint_rise_s",
+                    rise_s,
+                    0.0,
+                    60.0,
+                    "leave it out for what suits the law",
+                )?;
             }
             let ratio = t.servo.rate_hz / t.controller.rate_hz;
             if (ratio - ratio.round()).abs() > 1e-6 {

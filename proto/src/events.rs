@@ -205,7 +205,8 @@ impl EventLog {
     /// Where the log ends now.
     pub fn end(&self) -> Mark {
         use std::os::unix::fs::MetadataExt;
-        fs::metadata(self.file(0)).map_or(Mark::default(), |about| Mark { inode: about.ino(), bytes: about.len() })
+        fs::metadata(self.file(0))
+            .map_or(Mark::default(), |about| Mark { inode: about.ino(), bytes: about.len() })
     }
 
     /// What was appended after a mark; everything that is kept if the files were rotated meanwhile.
@@ -283,7 +284,8 @@ mod tests {
         for _ in 0..60 {
             log.append(&event(&long)).unwrap();
         }
-        let files = fs::read_dir(folder.path()).unwrap().flatten().filter(|e| e.file_name() != ".lock").count();
+        let files =
+            fs::read_dir(folder.path()).unwrap().flatten().filter(|e| e.file_name() != ".lock").count();
         assert_eq!(files, FILES);
         let kept = log.read().len();
         assert!((20..40).contains(&kept), "{kept}");

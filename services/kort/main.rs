@@ -1,6 +1,7 @@
 //! `kort`: thrust control for marine thrusters, and a laboratory that finds what the model left
 //! out. This file parses and dispatches; every subcommand lives in a folder of its own.
 
+mod check;
 mod token;
 mod up;
 
@@ -69,6 +70,9 @@ enum Command {
     /// The gateway alone: console, REST API, WebSocket, metrics, recordings
     #[command(after_help = "Example: kort gateway --config config/kort.toml")]
     Gateway(Service),
+    /// Read configurations as the services would, and say everything that is wrong
+    #[command(after_help = "Example: kort check config/kort.toml config/thrusters/t200.toml")]
+    Check(check::Check),
     /// Make a token: who may read, command or administer
     #[command(subcommand)]
     Token(token::Token),
@@ -157,6 +161,7 @@ fn dispatch(command: Command) -> Result<ExitCode, ExitCode> {
             let (config, deployment) = service.load()?;
             finish(kort_gateway::run(&config, &deployment))
         }
+        Command::Check(args) => Ok(check::run(&args)),
         Command::Token(command) => token::run(command),
         Command::Lab(command) => Ok(kort_lab::run(command)),
     }

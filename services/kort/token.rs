@@ -48,7 +48,12 @@ pub fn run(command: Token) -> Result<ExitCode, ExitCode> {
         RoleName::Admin => Role::Admin,
     };
     let made = token::make(&settings.tokens, &name, role).map_err(|e| fail(USAGE, &e))?;
-    eprintln!("{} may {} now; this is shown once, its hash is in {}:", name, role.name(), settings.tokens.display());
+    eprintln!(
+        "{} may {} now; this is shown once, its hash is in {}:",
+        name,
+        role.name(),
+        settings.tokens.display()
+    );
     println!("{made}");
     Ok(ExitCode::from(DONE))
 }

@@ -359,7 +359,12 @@ impl Service {
             watch.stood.armed = false;
         }
         self.write_down();
-        self.scribe.event(Event::now(EventKind::ServiceStopped, None, "supervisor", "the service was stopped"));
+        self.scribe.event(Event::now(
+            EventKind::ServiceStopped,
+            None,
+            "supervisor",
+            "the service was stopped",
+        ));
         self.scribe.finish();
         info!("stopped");
     }
@@ -397,9 +402,13 @@ impl Service {
             let (thruster, words) = (watch.id(), watch.words());
             match (watch.speaks(), watch.stood.armed, watch.at_rest()) {
                 (false, ..) => warn!(thruster, "the servo does not answer; its end switches the drive off"),
-                (true, true, _) => warn!(thruster, "the servo does not disarm; its end switches the drive off"),
+                (true, true, _) => {
+                    warn!(thruster, "the servo does not disarm; its end switches the drive off")
+                }
                 (true, false, true) => info!(thruster, "thrust at zero ({words}), disarmed"),
-                (true, false, false) => warn!(thruster, "disarmed, the drive is off, but the shaft still turns: {words}"),
+                (true, false, false) => {
+                    warn!(thruster, "disarmed, the drive is off, but the shaft still turns: {words}")
+                }
             }
         }
     }

@@ -66,6 +66,13 @@ controller = {{ rate_hz = 50, law = "model3_inversion" }}
         self
     }
 
+    /// Adds a line below another one of the configuration.
+    pub fn add(&self, below: &str, line: &str) {
+        let text = std::fs::read_to_string(self.config()).unwrap();
+        assert!(text.contains(below), "{below} is not in {text}");
+        std::fs::write(self.config(), text.replacen(below, &format!("{below}\n{line}"), 1)).unwrap();
+    }
+
     pub fn config(&self) -> PathBuf {
         self.folder.path().join("kort.toml")
     }

@@ -16,6 +16,6 @@ mod recording;
 pub mod units;
 
 pub use error::{Place, Problem, RecordingError};
-pub use formats::{Format, Writer};
+pub use formats::{Format, LiveMcap, Writer};
 pub use map::{ColumnMap, MapError};
 pub use recording::{Column, Gap, Recording};

@@ -1,5 +1,6 @@
 //! A recording in memory.
 
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
@@ -55,6 +56,8 @@ pub struct Recording {
     pub unused: Vec<String>,
     /// What a user should know: gaps, columns without a sample.
     pub notes: Vec<String>,
+    /// What a live recording says of itself: `rig` is the rig's description, with versions and origin of time.
+    pub about: BTreeMap<String, String>,
     /// What was lost or skipped while reading; not empty means exit code 3.
     pub losses: Vec<String>,
 }

@@ -371,7 +371,10 @@ fn nobody_else_may_replace(folder: &Path) -> Result<(), TransportError> {
     if (others_write && !sticky) || (owner != me && owner != 0) {
         return Err(TransportError::Foreign {
             path: folder.to_path_buf(),
-            why: format!("user {owner} or others may replace what is in it (mode {:o})", about.mode() & 0o7777),
+            why: format!(
+                "user {owner} or others may replace what is in it (mode {:o})",
+                about.mode() & 0o7777
+            ),
         });
     }
     Ok(())

@@ -8,5 +8,7 @@ mod watched;
 
 pub use clock::{Ticker, monotonic_ns, ordinary, realtime};
 pub use deployment::{Deployment, Owner, TransportError};
-pub use ports::{ControllerPorts, GatewayPorts, Inbox, Outbox, ServoPorts, SupervisorPorts, Ticks, Waker, create_services};
+pub use ports::{
+    ControllerPorts, GatewayPorts, Inbox, Outbox, ServoPorts, SupervisorPorts, Ticks, Waker, create_services,
+};
 pub use watched::{Restarts, Stood, Watched};

@@ -6,9 +6,9 @@
 
 #[cfg(feature = "process")]
 mod process;
+pub mod slew;
 #[cfg(test)]
 mod tests;
-pub mod slew;
 pub mod tick;
 
 #[cfg(feature = "process")]

@@ -23,8 +23,9 @@ const LEASE_RAMP_NS: u64 = 400_000_000;
 /// Silent controller periods after which a peer counts as lost.
 const GATEWAY_PERIODS: u64 = 3;
 /// A gateway may be silent this long before the setpoint is ramped down: it serves a network, and a hiccup of
-/// it is no reason to stop. With the ramp all is over within 500 ms.
+/// it is no reason to stop. With a shorter ramp all is over within 500 ms of its last word, at 50 Hz too.
 const GATEWAY_SILENCE_NS: u64 = 100_000_000;
+const GATEWAY_RAMP_NS: u64 = 300_000_000;
 const SERVO_PERIODS: u64 = 10;
 /// A reading stands that long for what its sensor would say: the slow ones are read at 20 Hz. After
 /// that the value is not measured, and laws and observers go on without it.
@@ -286,14 +287,15 @@ impl Tick {
         if let Some(ending) = self.ending {
             let since = now_ns.saturating_sub(ending.since_ns);
             let nothing = self.setpoint.is_none_or(|s| s.value == 0.0);
-            if !ending.hold && (nothing || since >= LEASE_RAMP_NS) {
+            let ramp_ns = if ending.cause.is_some() { GATEWAY_RAMP_NS } else { LEASE_RAMP_NS };
+            if !ending.hold && (nothing || since >= ramp_ns) {
                 if let Some(fault) = ending.cause {
                     self.trip(fault);
                 }
                 return (Reference::Off, true);
             }
             self.limits |= Limit::LeaseRamp.bit();
-            share = (1.0 - since as f64 / LEASE_RAMP_NS as f64).max(0.0);
+            share = (1.0 - since as f64 / ramp_ns as f64).max(0.0);
         }
         let Some(setpoint) = self.setpoint else {
             self.slew.reset();

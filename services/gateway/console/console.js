@@ -1,7 +1,7 @@
 "use strict";
 const $ = (id) => document.getElementById(id);
-const RENEW_EVERY_MS = 500, STREAM_HZ = 25, DRAW_EVERY_MS = 50;
-let lease_ttl_ms = 3000, thruster = null, lease = null, socket = null, state = null, heard_ms = 0, paused_s = null, limitsOf = {}, recording = null, dragging = false, taken_ms = 0, drawn_ms = 0;
+const RENEW_EVERY_MS = 500, STREAM_HZ = 25, DRAW_EVERY_MS = 50, STALE_MS = 700, WAIT_MS = 4000;
+let lease_ttl_ms = 3000, thruster = null, lease = null, socket = null, state = null, heard_ms = 0, paused_s = null, limitsOf = {}, recording = null, taken_ms = 0, drawn_ms = 0;
 
 const charts = [
   new StripChart($("plot-thrust"), "thrust", "N", [
@@ -22,6 +22,10 @@ const TILES = [
 const scaled = (value, factor) => (value === null || value === undefined ? null : value * factor);
 const text = (value, digits) => (value === null || value === undefined ? "–" : value.toFixed(digits));
 
+// The token lives as long as the tab: it is asked for where the gateway wants one.
+let token = sessionStorage.getItem("kort-token");
+const isStale = () => !state || performance.now() - heard_ms > STALE_MS || state.age_s === null || state.age_s > STALE_MS / 1000;
+
 function log(message, bad) {
   const item = document.createElement("li");
   item.textContent = `${new Date().toLocaleTimeString()}  ${message}`;
@@ -35,20 +39,27 @@ async function call(method, path, body) {
   const headers = {};
   if (body !== undefined) headers["Content-Type"] = "application/json";
   if (lease) headers["Lease-Id"] = lease;
+  if (token) headers.Authorization = `Bearer ${token}`;
   let answer;
   try {
-    answer = await fetch(path, { method, headers, body: body === undefined ? undefined : JSON.stringify(body) });
+    const signal = AbortSignal.timeout(WAIT_MS);
+    answer = await fetch(path, { method, headers, signal, body: body === undefined ? undefined : JSON.stringify(body) });
   } catch (error) {
     log(`${method} ${path}: the gateway does not answer`, true);
     throw error;
   }
   if (answer.status === 204) return null;
+  if (answer.status === 401) askToken();
   const answered = await answer.json();
   if (!answer.ok) {
     log(`${answered.title}: ${answered.detail}${answered.hint ? ` (hint: ${answered.hint})` : ""}`, true);
     throw new Error(answered.title);
   }
   return answered;
+}
+// Says who one is, where the gateway asks.
+function askToken() {
+  $("login").hidden = false;
 }
 const base = () => `/v1/thrusters/${encodeURIComponent(thruster)}`;
 // A click whose failure is already in the log.
@@ -57,10 +68,16 @@ const click = (id, action) => $(id).addEventListener("click", () => action().cat
 function connect() {
   if (socket) { socket.onclose = null; socket.close(); }
   const scheme = location.protocol === "https:" ? "wss" : "ws";
-  socket = new WebSocket(`${scheme}://${location.host}${base()}/stream?hz=${STREAM_HZ}`);
+  // A browser sends no Authorization with a WebSocket: the token goes as a subprotocol.
+  socket = new WebSocket(`${scheme}://${location.host}${base()}/stream?hz=${STREAM_HZ}`, token ? ["kort", `bearer.${token}`] : ["kort"]);
   socket.onmessage = (message) => {
     const next = JSON.parse(message.data);
-    if (next.status && next.title) { log(`${next.title}: ${next.detail}`, true); return; }
+    if (next.stopped) { stopConfirmed(`the stream: ${next.stopped.join(", ")}`); return; }
+    if (next.status && next.title) {
+      log(`${next.title}: ${next.detail}`, true);
+      if (next.type === "urn:kort:problem:lease-lost") lease = null;
+      return;
+    }
     state = next; heard_ms = performance.now();
     record(state);
   };
@@ -78,8 +95,12 @@ function record(s) {
 }
 
 function show() {
-  const live = state && performance.now() - heard_ms < 1500;
-  chip("link", live ? "live" : "no link", live ? "good" : "bad");
+  const live = !isStale();
+  const age_s = state ? (performance.now() - heard_ms) / 1000 + (state.age_s ?? 0) : null;
+  chip("link", live ? "live" : age_s === null ? "no link" : `values are ${age_s.toFixed(1)} s old`, live ? "good" : "bad");
+  document.body.classList.toggle("stale", !live);
+  $("send").disabled = !live || !lease || !state.armed;
+  $("zero-button").disabled = !live;
   if (state) {
     const end_s = paused_s ?? state.time_s + (live ? Math.min(0.2, (performance.now() - heard_ms) / 1000) : 0);
     if (performance.now() - drawn_ms >= DRAW_EVERY_MS) { // not every frame: renewing the lease comes first
@@ -97,8 +118,8 @@ function showState(s, live) {
   shown = performance.now();
   TILES.forEach(([, , value, digits], i) => { $("tiles").children[i].querySelector("i").textContent = text(value(s), digits); });
   $("time").textContent = `servo time ${s.time_s.toFixed(2)} s`;
-  chip("armed", s.armed ? "armed" : "disarmed", s.armed ? "warn" : "");
-  $("arm").disabled = s.armed || !live; $("disarm").disabled = !live;
+  chip("armed", !live ? `${s.armed ? "armed" : "disarmed"} when last heard` : s.armed ? "armed" : "disarmed", s.armed && live ? "warn" : "");
+  $("arm").disabled = s.armed || !live; $("disarm").disabled = false;
 
   const mine = lease && s.lease;
   // A state that was on its way when the lease was granted does not know of it.
@@ -106,23 +127,31 @@ function showState(s, live) {
   $("lease-text").textContent = !s.lease ? "Nobody has the lease."
     : mine ? "You have the lease." : `“${s.lease.holder}” has the lease.`;
   $("lease-bar").style.width = s.lease ? `${Math.min(100, s.lease.expires_in_ms / lease_ttl_ms * 100)}%` : "0";
-  $("take").disabled = Boolean(s.lease); $("give").disabled = !lease; $("send").disabled = !lease || !s.armed;
+  $("take").textContent = s.lease && !mine ? "Take over" : "Take lease";
+  $("take").disabled = Boolean(mine) || !live; $("give").disabled = !lease;
   $("setpoint-text").textContent = `in force: ${Object.entries(s.setpoint).map(([name, value]) => `${name} = ${value.toFixed(2)}`).join(", ")}`
     + (!lease ? " — take the lease to change it" : !s.armed ? " — arm to change it" : "");
 
   $("fault-chip").hidden = s.faults.length === 0;
   chip("fault-chip", s.faults.length === 1 ? "1 fault" : `${s.faults.length} faults`, "bad");
-  $("faults").replaceChildren(...(s.faults.length ? s.faults.map(faultItem) : [none("No fault is latched.")]));
+  const faults = JSON.stringify(s.faults);
+  if ($("faults").dataset.shown !== faults) { // read aloud when it changes, not ten times a second
+    $("faults").dataset.shown = faults;
+    $("faults").replaceChildren(...(s.faults.length ? s.faults.map(faultItem) : [none("No fault is latched.")]));
+  }
   $("limits").textContent = s.limits.length ? `limit in force: ${s.limits.map((limit) => limit.name ?? limit).join(", ")}` : "No limit is in force.";
   if (document.activeElement !== $("controller") && $("controller").dataset.running !== s.controller) loadController().catch(() => {});
   $("estimator-text").textContent = `observer ${s.observer ?? "–"} · estimator ${s.estimator ?? "–"}${s.estimator_frozen ? ", frozen for want of excitation" : ""}`;
+  charts.forEach((chart) => chart.describe());
   $("parameters").replaceChildren(...s.estimated.parameters.map((p) => cells([p.name, text(p.value, 4), text(p.std_error, 4), p.unit])));
 }
 
 function faultItem(fault) {
   const item = document.createElement("li"), link = document.createElement("a");
   link.href = `/v1/faults/${fault.code}`; link.target = "_blank"; link.textContent = `${fault.code} ${fault.name}`;
-  item.append(link, document.createElement("br"), fault.help);
+  const before = fault.before && fault.before.thrust_n !== null ? `, at ${fault.before.thrust_n.toFixed(1)} N` : "";
+  const when = fault.since ? `${new Date(fault.since).toLocaleString()}${before}: ` : "";
+  item.append(link, document.createElement("br"), when + fault.help);
   return item;
 }
 function none(words) { const item = document.createElement("li"); item.className = "none"; item.textContent = words; return item; }
@@ -135,7 +164,9 @@ function chip(id, words, kind) { $(id).textContent = words; $(id).className = `c
 
 // Command ------------------------------------------------------------------------------------------------
 click("take", async () => {
-  const granted = await call("POST", `${base()}/lease`, { holder: $("holder").value, ttl_ms: lease_ttl_ms });
+  const takeover = Boolean(state && state.lease);
+  if (takeover && !confirm(`Take command from “${state.lease.holder}”? The thruster goes to rest, and they are told.`)) return;
+  const granted = await call("POST", `${base()}/lease`, { holder: $("holder").value, ttl_ms: lease_ttl_ms, takeover });
   lease = granted.lease_id; taken_ms = performance.now(); log(`lease taken as “${$("holder").value}”`);
 });
 click("give", async () => { // forgotten before the answer comes: what is being given up is not renewed
@@ -147,26 +178,44 @@ setInterval(() => { if (lease) call("PUT", `${base()}/lease`).catch(() => { leas
 
 click("arm", async () => { await call("POST", `${base()}/arm`); log("armed"); });
 const disarm = async () => { await call("POST", `${base()}/disarm`); log("disarmed"); };
-click("disarm", disarm); click("stop", disarm);
-document.addEventListener("keydown", (event) => { if (event.key === "Escape") disarm().catch(() => {}); });
+click("disarm", disarm);
+// STOP goes out by every way there is, and says whether a servo confirmed it.
+let stopping = null;
+function stopConfirmed(by) {
+  if (!stopping) return;
+  clearTimeout(stopping); stopping = null;
+  $("stop-text").className = "good"; $("stop-text").textContent = "Stopped: confirmed.";
+  log(`stop confirmed by ${by}`);
+}
+function stopAll() {
+  clearTimeout(stopping);
+  $("stop-text").className = "bad"; $("stop-text").textContent = "Stop sent, not confirmed yet.";
+  stopping = setTimeout(() => {
+    stopping = null;
+    $("stop-text").textContent = "STOP IS NOT CONFIRMED: the gateway or a servo does not answer. Cut the supply if the shaft turns.";
+    log("stop is not confirmed", true);
+  }, 1500);
+  if (socket && socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify({ stop: true }));
+  call("POST", "/v1/stop").then((answer) => stopConfirmed(answer.stopped.join(", "))).catch(() => {});
+}
+$("stop").addEventListener("click", stopAll);
+document.addEventListener("keydown", (event) => { if (event.key === "Escape") stopAll(); });
 click("clear", async () => { await call("POST", `${base()}/clear-faults`); log("faults cleared"); });
 
 const kind = () => document.querySelector("input[name=kind]:checked").value;
 const send = async (value) => {
+  if (isStale()) { log("nothing is sent while the values shown are old", true); return; }
   const applied = await call("PUT", `${base()}/setpoint`, { [kind()]: value });
   $("entry").value = value; $("slider").value = value;
   return applied;
 };
 click("send", async () => { const value = Number($("entry").value); await send(value); log(`setpoint ${kind()} = ${value}`); });
-click("zero-button", async () => { await send(0); log("setpoint zero"); });
+click("zero-button", async () => { $("entry").value = 0; $("slider").value = 0; await send(0); log("setpoint zero"); });
 $("entry").addEventListener("keydown", (event) => { if (event.key === "Enter") $("send").click(); });
-$("slider").addEventListener("input", () => {
-  $("entry").value = $("slider").value;
-  if (!lease || !state || !state.armed || dragging) return;
-  dragging = true; // at most one request at a time while the slider moves; the last value always goes out
-  const value = Number($("slider").value);
-  send(value).catch(() => {}).finally(() => { dragging = false; if (Number($("slider").value) !== value) $("slider").dispatchEvent(new Event("input")); });
-});
+// The slider proposes, Send (or Enter) commands: a key such as End must not mean full thrust by itself.
+$("slider").addEventListener("input", () => { $("entry").value = $("slider").value; });
+$("slider").addEventListener("keydown", (event) => { if (event.key === "Enter") $("send").click(); });
+$("entry").addEventListener("input", () => { $("slider").value = $("entry").value; });
 document.querySelectorAll("input[name=kind]").forEach((radio) => radio.addEventListener("change", showKind));
 function showKind() {
   const bound = limitsOf[kind()] ?? 100;
@@ -199,8 +248,12 @@ async function loadRecordings() {
   $("record").textContent = recording ? "Stop" : "Start";
   $("recording-text").textContent = recording ? `recording ${recording.name}: ${recording.rows} rows` : "";
   $("recordings").replaceChildren(...list.map((item) => cells([item.name, String(item.rows), `${item.duration_s.toFixed(1)} s`,
-    ["csv", "mcap"].map((format) => Object.assign(document.createElement("a"),
-      { href: `/v1/recordings/${encodeURIComponent(item.name)}?format=${format}`, textContent: format, download: `${item.name}.${format}` }))])));
+    ["csv", "mcap"].map((format) => {
+      const link = Object.assign(document.createElement("a"),
+        { href: `/v1/recordings/${encodeURIComponent(item.name)}?format=${format}`, textContent: format, download: `${item.name}.${format}` });
+      link.addEventListener("click", (event) => download(event, link));
+      return link;
+    })])));
 }
 click("record", async () => {
   if (recording) { const done = await call("DELETE", "/v1/recordings"); log(`recording ${done.name} stopped, ${done.rows} rows`); } else {
@@ -212,6 +265,21 @@ click("record", async () => {
 });
 setInterval(() => { if (!document.hidden) loadRecordings().catch(() => {}); }, 2000);
 
+// Event log ------------------------------------------------------------------------------------------------
+let lastEvent = 0;
+async function loadEvents() {
+  const events = await call("GET", `/v1/events?since=${lastEvent}&limit=100`);
+  for (const event of events) {
+    lastEvent = event.id;
+    const item = document.createElement("li");
+    item.textContent = `${new Date(event.time).toLocaleTimeString()}  ${event.thruster ?? "all"}  ${event.detail}`;
+    if (["tripped", "process_ended", "process_hung", "recording_ended"].includes(event.kind)) item.className = "bad";
+    $("events").prepend(item);
+  }
+  while ($("events").children.length > 200) $("events").lastChild.remove();
+}
+setInterval(() => { if (!document.hidden && !isStale()) loadEvents().catch(() => {}); }, 1000);
+
 click("pause", async () => {
   paused_s = paused_s === null && state ? state.time_s : null;
   $("pause").textContent = paused_s === null ? "Pause plots" : "Go on";
@@ -221,6 +289,22 @@ async function choose(id) {
   thruster = id; lease = null; state = null; charts.forEach((chart) => chart.clear());
   limitsOf = (await call("GET", base())).range; showKind();
   connect(); await loadController();
+}
+$("login").addEventListener("submit", (event) => {
+  event.preventDefault();
+  token = $("token").value.trim();
+  sessionStorage.setItem("kort-token", token);
+  location.reload();
+});
+// A link cannot carry the token: with one, the file is fetched and handed over.
+async function download(event, link) {
+  if (!token) return;
+  event.preventDefault();
+  const answer = await fetch(link.href, { headers: { Authorization: `Bearer ${token}` } });
+  if (!answer.ok) { log(`${link.download}: ${answer.status}`, true); return; }
+  const url = URL.createObjectURL(await answer.blob());
+  Object.assign(document.createElement("a"), { href: url, download: link.download }).click();
+  URL.revokeObjectURL(url);
 }
 async function start() {
   $("tiles").replaceChildren(...TILES.map(([name, unit]) => {
@@ -235,4 +319,7 @@ async function start() {
   await choose(list[0].id);
   show();
 }
-start().catch((error) => { log(`cannot start: ${error.message}`, true); setTimeout(() => location.reload(), 3000); });
+start().catch((error) => {
+  log(`cannot start: ${error.message}`, true);
+  if ($("login").hidden) setTimeout(() => location.reload(), 3000);
+});

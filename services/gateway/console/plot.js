@@ -13,6 +13,12 @@ class StripChart {
     if (this.points[0].length > 40000) this.points.forEach((list) => list.splice(0, 10000));
   }
 
+  // What the picture says, in words: for those who do not see it.
+  describe() {
+    const says = this.curves.map((curve, i) => { const value = last(this.points[i]); return `${curve.name} ${value === null ? "not measured" : value.toFixed(1)}`; });
+    this.canvas.setAttribute("aria-label", `${this.title} in ${this.unit}: ${says.join(", ")}`);
+  }
+
   clear() { this.points.forEach((list) => { list.length = 0; }); }
 
   draw(end_s, span_s) {

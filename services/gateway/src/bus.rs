@@ -234,7 +234,8 @@ impl Bridge {
                 EventKind::Tripped => event.fault == Some(fault.code()),
                 kind => kind == EventKind::FaultsCleared,
             };
-            let told = self.link.events.latest(id, of_fault).is_some_and(|event| event.kind == EventKind::Tripped);
+            let told =
+                self.link.events.latest(id, of_fault).is_some_and(|event| event.kind == EventKind::Tripped);
             if known.is_none() && told {
                 continue;
             }
@@ -242,7 +243,9 @@ impl Bridge {
             let detail = format!("{} (code {}): {}", fault.name(), fault.code(), fault.help());
             let event = Event::now(EventKind::Tripped, Some(id), process, detail).fault(fault);
             let before = self.before.or_else(|| {
-                tripped.filter(|trip| trip.at_ns != 0).map(|trip| Before::of(trip.thrust_n, trip.shaft_speed_rad_s))
+                tripped
+                    .filter(|trip| trip.at_ns != 0)
+                    .map(|trip| Before::of(trip.thrust_n, trip.shaft_speed_rad_s))
             });
             self.link.events.note(match before {
                 Some(before) => event.before(before),

@@ -99,7 +99,9 @@ impl Connections {
                     self.evicted.fetch_add(1, Ordering::Relaxed);
                 }
                 // All are at work: what comes now may only stop.
-                None if open.iter().filter(|slot| slot.reserved).count() < self.caps.reserve => reserved = true,
+                None if open.iter().filter(|slot| slot.reserved).count() < self.caps.reserve => {
+                    reserved = true
+                }
                 None => {
                     self.refused.fetch_add(1, Ordering::Relaxed);
                     return None;
@@ -175,7 +177,11 @@ impl<S: AsyncRead + Unpin> AsyncRead for Seated<S> {
 }
 
 impl<S: AsyncWrite + Unpin> AsyncWrite for Seated<S> {
-    fn poll_write(mut self: Pin<&mut Self>, cx: &mut Context<'_>, bytes: &[u8]) -> Poll<std::io::Result<usize>> {
+    fn poll_write(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+        bytes: &[u8],
+    ) -> Poll<std::io::Result<usize>> {
         let came = Pin::new(&mut self.socket).poll_write(cx, bytes);
         self.watch(cx, came)
     }
@@ -195,10 +201,8 @@ impl<S: AsyncWrite + Unpin> AsyncWrite for Seated<S> {
 mod tests {
     use super::*;
 
-    const PEERS: [IpAddr; 2] = [
-        IpAddr::V4(std::net::Ipv4Addr::new(10, 0, 0, 1)),
-        IpAddr::V4(std::net::Ipv4Addr::new(10, 0, 0, 2)),
-    ];
+    const PEERS: [IpAddr; 2] =
+        [IpAddr::V4(std::net::Ipv4Addr::new(10, 0, 0, 1)), IpAddr::V4(std::net::Ipv4Addr::new(10, 0, 0, 2))];
 
     fn table() -> Connections {
         Connections::new(Caps { total: 6, per_peer: 4, reserve: 2 })

@@ -87,7 +87,9 @@ impl Desk {
         self.version += 1;
         let who = lease.who();
         match before {
-            None => self.note(EventKind::LeaseTaken, &who, format!("{who} took command for {} ms", wanted.ttl_ms)),
+            None => {
+                self.note(EventKind::LeaseTaken, &who, format!("{who} took command for {} ms", wanted.ttl_ms))
+            }
             Some(from) => {
                 self.rest();
                 self.note(EventKind::LeaseTakenOver, &who, format!("{who} took command from {from}"));
@@ -174,9 +176,9 @@ impl Desk {
     /// Notes the setpoint if it changed, at most once a second; the last one is noted in the end.
     fn note_setpoint(&mut self, now: Instant) {
         let Some(setpoint) = self.setpoint else { return };
-        let due = self.noted.is_none_or(|(at, known)| {
-            known != setpoint && now.saturating_duration_since(at) >= NOTE_EVERY
-        });
+        let due = self
+            .noted
+            .is_none_or(|(at, known)| known != setpoint && now.saturating_duration_since(at) >= NOTE_EVERY);
         if due {
             self.noted = Some((now, setpoint));
             let who = self.lease.holder().unwrap_or_default();
@@ -247,7 +249,10 @@ mod tests {
         desk.take(&Wanted { takeover: true, ..wants("bridge") }, t0).unwrap();
         assert_eq!(desk.setpoint(), None);
         let last = desk.notes().pop().unwrap();
-        assert_eq!((last.kind, last.detail.as_str()), (EventKind::LeaseTakenOver, "bridge took command from crashed"));
+        assert_eq!(
+            (last.kind, last.detail.as_str()),
+            (EventKind::LeaseTakenOver, "bridge took command from crashed")
+        );
     }
 
     const RANGE: SetpointRange = SetpointRange { thrust_n: 200.0, speed_rad_s: 120.0 };

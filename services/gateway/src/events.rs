@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use kort_proto::events::{Event, EventKind, EventLog, Mark};
 
+use crate::record::Recorder;
 use crate::thruster::lock;
 
 /// Events kept at hand; the files hold more.
@@ -27,13 +28,18 @@ pub struct Events {
 }
 
 impl Events {
-    /// Starts the log's thread.
-    pub fn start(folder: &Path) -> std::io::Result<Arc<Events>> {
+    /// Starts the log's thread; events go to running recordings too.
+    pub fn start(folder: &Path, recorder: Arc<Recorder>) -> std::io::Result<Arc<Events>> {
         let log = EventLog::open(folder)?;
         let (outbox, inbox) = sync_channel(QUEUE);
         let events = Arc::new(Events { outbox, waiting: AtomicU64::new(0), at_hand: Mutex::default() });
+        // What is known comes first: faults that stand there need not be told again.
+        let mark = log.end();
+        events.learn(log.read(), &recorder);
         let theirs = Arc::clone(&events);
-        std::thread::Builder::new().name("events".into()).spawn(move || keep(&log, &inbox, &theirs))?;
+        std::thread::Builder::new()
+            .name("events".into())
+            .spawn(move || keep(&log, mark, &inbox, &theirs, &recorder))?;
         Ok(events)
     }
 
@@ -80,13 +86,14 @@ impl Events {
     }
 
     /// Takes over what is new, in the order of ids.
-    fn learn(&self, events: Vec<Event>) {
+    fn learn(&self, events: Vec<Event>, recorder: &Recorder) {
         let mut at_hand = lock(&self.at_hand);
         for event in events {
             let place = at_hand.partition_point(|known| known.id < event.id);
             if at_hand.get(place).is_some_and(|known| known.id == event.id) {
                 continue;
             }
+            recorder.note(&event);
             at_hand.insert(place, event);
         }
         while at_hand.len() > AT_HAND {
@@ -96,8 +103,7 @@ impl Events {
 }
 
 /// Writes what comes and reads what others wrote, until the gateway ends.
-fn keep(log: &EventLog, inbox: &Receiver<Event>, events: &Events) {
-    let mut mark = Mark::default();
+fn keep(log: &EventLog, mut mark: Mark, inbox: &Receiver<Event>, events: &Events, recorder: &Recorder) {
     let mut complained = false;
     loop {
         let event = match inbox.recv_timeout(LOOK_EVERY) {
@@ -109,16 +115,18 @@ fn keep(log: &EventLog, inbox: &Receiver<Event>, events: &Events) {
             match log.append(&event) {
                 Ok(()) => complained = false,
                 Err(error) if !std::mem::replace(&mut complained, true) => {
-                    tracing::error!("the event log cannot be written: {error}\nhint: gateway.events needs space");
+                    tracing::error!(
+                        "the event log cannot be written: {error}\nhint: gateway.events needs space"
+                    );
                 }
                 Err(_) => (),
             }
-            events.learn(vec![event]);
+            events.learn(vec![event], recorder);
             events.waiting.fetch_sub(1, Ordering::Relaxed);
         }
         let end = log.end();
         if end != mark {
-            events.learn(log.read_after(mark));
+            events.learn(log.read_after(mark), recorder);
             mark = end;
         }
     }

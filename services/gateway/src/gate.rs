@@ -48,7 +48,8 @@ impl Gate {
         }
         let _one_at_a_time = self.work.acquire().await;
         let theirs = Arc::clone(app);
-        let found = tokio::task::spawn_blocking(move || theirs.gate().tokens.verify(&token)).await.ok().flatten();
+        let found =
+            tokio::task::spawn_blocking(move || theirs.gate().tokens.verify(&token)).await.ok().flatten();
         found.ok_or_else(|| {
             Problem::new(Kind::TokenRequired, "the token is not known, or was revoked")
                 .hint("`kort token new NAME --role viewer|pilot|admin` makes another")
@@ -59,15 +60,22 @@ impl Gate {
 /// The token of a request, if one is shown.
 fn shown(headers: &HeaderMap) -> Result<Option<String>, Problem> {
     let unreadable = || {
-        Problem::new(Kind::MalformedHeader, "header Authorization is not readable").hint("Authorization: Bearer TOKEN")
+        Problem::new(Kind::MalformedHeader, "header Authorization is not readable")
+            .hint("Authorization: Bearer TOKEN")
     };
     if let Some(value) = headers.get(header::AUTHORIZATION) {
         let text = value.to_str().map_err(|_| unreadable())?;
         let (scheme, token) = text.trim().split_once(' ').ok_or_else(unreadable)?;
-        return if scheme.eq_ignore_ascii_case("bearer") { Ok(Some(token.trim().to_owned())) } else { Err(unreadable()) };
+        return if scheme.eq_ignore_ascii_case("bearer") {
+            Ok(Some(token.trim().to_owned()))
+        } else {
+            Err(unreadable())
+        };
     }
     let offered = headers.get(header::SEC_WEBSOCKET_PROTOCOL).and_then(|value| value.to_str().ok());
-    Ok(offered.and_then(|list| list.split(',').find_map(|p| p.trim().strip_prefix(TOKEN_PROTOCOL)).map(str::to_owned)))
+    Ok(offered.and_then(|list| {
+        list.split(',').find_map(|p| p.trim().strip_prefix(TOKEN_PROTOCOL)).map(str::to_owned)
+    }))
 }
 
 /// The console's page and the descriptions hold no data: anybody may read them.
@@ -85,20 +93,33 @@ fn needed(method: &Method, path: &str) -> Option<Role> {
 }
 
 /// Lets a request through, with its [`Identity`], or says why not.
-pub async fn check(State(app): State<Arc<App>>, mut request: Request, next: Next) -> Result<Response, Problem> {
+pub async fn check(
+    State(app): State<Arc<App>>,
+    mut request: Request,
+    next: Next,
+) -> Result<Response, Problem> {
     let gate = app.gate();
     gate.hosts.check(request.uri(), request.headers())?;
     let path = request.uri().path();
-    if request.extensions().get::<Reserved>().is_some() && !(path == "/v1/stop" || path.ends_with("/disarm")) {
-        return Err(Problem::new(Kind::Overloaded, "every connection is taken; this one is kept for stop and disarm")
-            .hint("close connections that are not used, and try again"));
+    if request.extensions().get::<Reserved>().is_some() && !(path == "/v1/stop" || path.ends_with("/disarm"))
+    {
+        return Err(Problem::new(
+            Kind::Overloaded,
+            "every connection is taken; this one is kept for stop and disarm",
+        )
+        .hint("close connections that are not used, and try again"));
     }
     if let Some(role) = needed(request.method(), path) {
         let identity = gate.identify(&app, request.headers()).await?;
         if identity.role < role {
             return Err(Problem::new(
                 Kind::RoleTooLow,
-                format!("token {:?} has the role {}; this needs {}", identity.name, identity.role.name(), role.name()),
+                format!(
+                    "token {:?} has the role {}; this needs {}",
+                    identity.name,
+                    identity.role.name(),
+                    role.name()
+                ),
             )
             .hint("`kort token new NAME --role …` makes a token of another role"));
         }

@@ -31,9 +31,12 @@ impl Hosts {
             (None, _) => uri.authority().map(|authority| authority.as_str()),
         };
         let Some(authority) = authority.filter(|authority| self.knows(host(authority))) else {
-            let said = authority.map_or("is missing, double or unreadable".into(), |a| format!("= {a:?} is not known"));
+            let said = authority
+                .map_or("is missing, double or unreadable".into(), |a| format!("= {a:?} is not known"));
             return Err(Problem::new(Kind::ForeignHost, format!("header Host {said}"))
-                .hint("names beyond localhost and the address listened on stand in gateway.hosts of kort.toml")
+                .hint(
+                    "names beyond localhost and the address listened on stand in gateway.hosts of kort.toml",
+                )
                 .allowed(self.0.iter().cloned()));
         };
         let Some(origin) = headers.get(header::ORIGIN) else { return Ok(()) };

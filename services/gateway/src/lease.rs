@@ -128,9 +128,12 @@ impl LeaseDesk {
             (Some(lease), Some(id)) if lease.id == id => Ok(()),
             (_, Some(id)) if self.taken_over(id).is_some() => {
                 let by = self.taken_over(id).unwrap_or_default();
-                Err(Problem::new(Kind::LeaseLost, format!("this lease on {thruster} was taken over by \"{by}\""))
-                    .hint("speak to them; POST …/lease with takeover takes it back")
-                    .holder(by))
+                Err(Problem::new(
+                    Kind::LeaseLost,
+                    format!("this lease on {thruster} was taken over by \"{by}\""),
+                )
+                .hint("speak to them; POST …/lease with takeover takes it back")
+                .holder(by))
             }
             (Some(lease), _) => Err(held(thruster, lease, now)),
             (None, Some(_)) => Err(Problem::new(
@@ -140,11 +143,9 @@ impl LeaseDesk {
             .hint(format!(
                 "POST /v1/thrusters/{thruster}/lease takes a new one; command faster than its ttl_ms"
             ))),
-            (None, None) => {
-                Err(Problem::new(Kind::LeaseRequired, "header Lease-Id is missing").hint(format!(
-                    "POST /v1/thrusters/{thruster}/lease, then send its lease_id as header Lease-Id"
-                )))
-            }
+            (None, None) => Err(Problem::new(Kind::LeaseRequired, "header Lease-Id is missing").hint(
+                format!("POST /v1/thrusters/{thruster}/lease, then send its lease_id as header Lease-Id"),
+            )),
         }
     }
 }
@@ -194,8 +195,12 @@ mod tests {
             desk.take("t1", &Wanted { takeover: true, ..wants("bridge", 500) }, t0 + ms(5)).unwrap();
         assert_eq!(from.as_deref(), Some("crashed"));
         assert!(desk.check("t1", Some(&second.id), t0 + ms(6)).is_ok());
-        let told = serde_json::to_string(&desk.check("t1", Some(&first.id), t0 + ms(6)).unwrap_err()).unwrap();
-        assert!(told.contains("lease-lost") && told.contains("taken over") && told.contains("bridge"), "{told}");
+        let told =
+            serde_json::to_string(&desk.check("t1", Some(&first.id), t0 + ms(6)).unwrap_err()).unwrap();
+        assert!(
+            told.contains("lease-lost") && told.contains("taken over") && told.contains("bridge"),
+            "{told}"
+        );
     }
 
     #[test]

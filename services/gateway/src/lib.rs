@@ -52,13 +52,13 @@ use durations::Durations;
 use events::Events;
 use gate::Gate;
 use problem::{Kind, Problem};
-use record::Recorder;
+use record::{Recorder, Subject};
 use settings::Deployed;
 pub use settings::Settings;
-use tls::Certificate;
-use token::Tokens;
 use tally::Tally;
 use thruster::Thruster;
+use tls::Certificate;
+use token::Tokens;
 
 /// Largest request body, bytes.
 const BODY_BYTES_MAX: usize = 16 * 1024;
@@ -131,6 +131,7 @@ fn bind_hint(error: &std::io::Error) -> &'static str {
 #[derive(Debug)]
 pub(crate) struct App {
     thrusters: Vec<Arc<Thruster>>,
+    rigs: Vec<(String, String)>,
     tallies: Vec<Arc<Tally>>,
     recorder: Arc<Recorder>,
     events: Arc<Events>,
@@ -158,6 +159,14 @@ impl App {
                 .hint("GET /v1/thrusters lists them")
                 .allowed(self.thrusters.iter().map(|thruster| thruster.id.clone()))
         })
+    }
+
+    /// What a recording of this thruster holds.
+    fn subject(&self, id: &str) -> Result<Subject, Problem> {
+        let thruster = Arc::clone(self.thruster(id)?);
+        let at = self.thrusters.iter().position(|other| other.id == id);
+        let rig = at.and_then(|at| self.rigs.get(at)).cloned().unwrap_or_default();
+        Ok(Subject { thruster, rig })
     }
 
     fn tallies(&self) -> &[Arc<Tally>] {
@@ -292,6 +301,20 @@ pub fn check(settings: &Settings) -> Result<(), GatewayError> {
     Ok(())
 }
 
+/// Could a gateway use this configuration? Reads all that it reads, and touches no address.
+///
+/// # Errors
+/// [`GatewayError`] names file, key, value and what is allowed.
+pub fn check_config(config: &Config) -> Result<(), GatewayError> {
+    let settings = Settings::new(config)?;
+    settings::thrusters(config)?;
+    tokens(&settings)?;
+    if let Some(keys) = settings.tls.as_ref().filter(|keys| !keys.self_signed) {
+        Certificate::open(keys, Vec::new())?;
+    }
+    Ok(())
+}
+
 /// The tokens; beyond this machine there must be one.
 fn tokens(settings: &Settings) -> Result<Tokens, GatewayError> {
     let tokens = Tokens::open(&settings.tokens)?;
@@ -336,15 +359,17 @@ async fn serve(
     let certificate = certificate(&settings)?;
     let gate = Gate::new(bind, &settings.hosts, tokens(&settings)?, settings.asks_for_tokens());
     let connections = Arc::new(Connections::new(serve::caps(settings.behind_tls_proxy)));
-    let events = Events::start(&settings.events)
-        .map_err(|error| GatewayError::Events { folder: settings.events.clone(), error })?;
-    let recorder = Recorder::open(&settings.recordings)
+    let recorder = Recorder::open(&settings.recordings, settings.recording)
         .map_err(|error| GatewayError::Recordings { folder: settings.recordings.clone(), error })?;
     let recorder = Arc::new(recorder);
+    let events = Events::start(&settings.events, Arc::clone(&recorder))
+        .map_err(|error| GatewayError::Events { folder: settings.events.clone(), error })?;
+    recorder.tell_to(&events);
     let (stop_streams, stopping) = watch::channel(false);
 
     let mut app = App {
         thrusters: Vec::new(),
+        rigs: thrusters.iter().map(|deployed| deployed.rig.clone()).collect(),
         tallies: Vec::new(),
         recorder: Arc::clone(&recorder),
         events: Arc::clone(&events),
@@ -393,7 +418,8 @@ async fn serve(
         .into_iter()
         .collect::<Result<Vec<_>, _>>()?
         .into_iter();
-    let (Some(mut interrupt), Some(mut terminate), Some(mut hangup)) = (ends.next(), ends.next(), ends.next())
+    let (Some(mut interrupt), Some(mut terminate), Some(mut hangup)) =
+        (ends.next(), ends.next(), ends.next())
     else {
         return Err(std::io::Error::other("signals").into());
     };
@@ -403,7 +429,9 @@ async fn serve(
     let port = serve::Port { router, certificate, connections, stopping };
     let serving = tokio::spawn(serve::run(listener, port));
     tokio::select! { _ = interrupt.recv() => (), _ = terminate.recv() => (), _ = hangup.recv() => () }
-    for thruster in app.thrusters().iter().filter(|thruster| thruster.heard().armed(std::time::Instant::now())) {
+    for thruster in
+        app.thrusters().iter().filter(|thruster| thruster.heard().armed(std::time::Instant::now()))
+    {
         if let Err(problem) = thruster.disarm("the gateway on its way out").await {
             tracing::warn!(thruster = thruster.id, ?problem, "could not disarm on the way out");
         }
@@ -417,7 +445,7 @@ async fn serve(
         }
         tokio::time::sleep(Duration::from_millis(10)).await;
     }
-    let _ = recorder.stop();
+    recorder.stop_all();
     stop_bus.store(true, Ordering::Relaxed);
     let _ = bus.join();
     events.settle();

@@ -21,10 +21,7 @@ impl Usage {
 fn parse(stat: &str, ticks_per_s: f64, page_bytes: f64) -> Option<Usage> {
     let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
     let number = |field: usize| fields.get(field - 3)?.parse::<f64>().ok();
-    Some(Usage {
-        cpu_s: (number(14)? + number(15)?) / ticks_per_s,
-        resident_bytes: number(24)? * page_bytes,
-    })
+    Some(Usage { cpu_s: (number(14)? + number(15)?) / ticks_per_s, resident_bytes: number(24)? * page_bytes })
 }
 
 #[cfg(test)]
@@ -40,7 +37,8 @@ mod tests {
 
     #[test]
     fn a_name_with_brackets_and_blanks_is_no_trap() {
-        let stat = "7 (a b) c) S 1 1 1 0 -1 4194560 1 2 3 4 250 50 0 0 20 0 3 0 99 1000000 25 18446744073709551615";
+        let stat =
+            "7 (a b) c) S 1 1 1 0 -1 4194560 1 2 3 4 250 50 0 0 20 0 3 0 99 1000000 25 18446744073709551615";
         assert_eq!(parse(stat, 100.0, 4096.0), Some(Usage { cpu_s: 3.0, resident_bytes: 102_400.0 }));
     }
 }

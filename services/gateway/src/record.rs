@@ -1,46 +1,58 @@
-//! Recordings of the live signals: each runs in a thread of its own and writes CSV and MCAP at once.
+//! Recordings of the live signals: MCAP, each in a thread of its own, several at once.
 //!
-//! Beside `NAME.csv` and `NAME.mcap` stands `NAME.json` with what is known of the recording. A gateway that
-//! is killed leaves files that read up to the last flush; they are listed as `torn`.
+//! Beside `NAME.mcap` stands `NAME.json` with what is known of the recording. A gateway that is killed leaves a file
+//! that reads up to its last second; it is listed as `torn`. One that the disk refuses ends by itself, `failed`,
+//! with the cause; what was written stays readable.
+
+mod write;
 
 use std::collections::BTreeMap;
-use std::fs::{self, File};
-use std::io::{self, BufWriter};
+use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
-use std::sync::{Arc, Mutex};
+use std::sync::mpsc::{SyncSender, sync_channel};
+use std::sync::{Arc, Mutex, OnceLock, Weak};
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant, SystemTime};
+use std::time::SystemTime;
 
+use axum::body::Bytes;
+use kort_proto::events::{Event, EventKind};
 use kort_proto::messages::Telemetry;
-use kort_proto::signals::{SIGNALS, Signals};
-use kort_recording::{Format, Writer};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use crate::events::Events;
 use crate::problem::{Kind, Problem};
-use crate::thruster::lock;
+use crate::settings::RecordingLimits;
+use crate::thruster::{Thruster, lock};
+use crate::token::{Identity, Role};
+use write::{Item, Job};
 
 /// Rows that may wait for the disk: two seconds at the fastest servo.
 const QUEUE_ROWS: usize = 10_000;
-/// What a kill may cost.
-const FLUSH_EVERY: Duration = Duration::from_millis(250);
-/// Formats a recording is written in: the endings of its files.
-pub const FORMATS: [&str; 2] = ["csv", "mcap"];
+/// Recordings that may run at once.
+const AT_ONCE: usize = 8;
+/// Ending of a recording's file.
+pub const ENDING: &str = "mcap";
 
 /// A recording, running or done.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
 pub struct RecordingInfo {
-    /// Name; the files are `NAME.csv` and `NAME.mcap`.
+    /// Name; the file is `NAME.mcap`. What a full file is followed by is called `NAME-2`, `NAME-3`, ….
     #[schema(example = "t1-20260101T120000Z")]
     pub name: String,
     /// The thruster.
     #[schema(example = "t1")]
     pub thruster: String,
-    /// Is it running, complete, or torn?
+    /// Who started it: name of the token, `local` where none is asked for.
+    #[serde(default)]
+    pub owner: String,
+    /// Is it running, complete, torn or failed?
     pub state: RecordingState,
+    /// Why it ended by itself; null if it runs or was stopped.
+    #[serde(default)]
+    pub cause: Option<String>,
     /// Wall time of the first row, RFC 3339.
     pub started: String,
     /// Largest rate of rows, Hz.
@@ -51,7 +63,7 @@ pub struct RecordingInfo {
     pub duration_s: f64,
     /// Samples of the servo that are missing because the gateway or the disk came too late.
     pub lost_samples: u64,
-    /// Size of each file, bytes.
+    /// Size of the file, bytes, by its ending.
     #[serde(default)]
     pub bytes: BTreeMap<String, u64>,
 }
@@ -62,81 +74,122 @@ pub struct RecordingInfo {
 pub enum RecordingState {
     /// Rows are being written.
     Recording,
-    /// Stopped, whole.
+    /// Ended, whole.
     Complete,
-    /// The gateway was killed while it ran, or the disk refused: readable up to the last flush.
+    /// The gateway was killed while it ran: readable up to its last second.
     Torn,
+    /// The disk refused: readable up to what it took; `cause` says why.
+    Failed,
 }
 
-/// Starts, stops and lists recordings; at most one runs.
+/// What a recording holds beside the samples: the thruster, and what is said of it to a stranger.
+#[derive(Clone, Debug)]
+pub struct Subject {
+    /// The thruster: its state goes along.
+    pub thruster: Arc<Thruster>,
+    /// File and text of its rig description.
+    pub rig: (String, String),
+}
+
+/// Starts, stops, lists and deletes recordings.
 #[derive(Debug)]
 pub struct Recorder {
     folder: PathBuf,
-    active: Mutex<Option<Active>>,
-    rows_before: AtomicU64,
-    lost_before: AtomicU64,
+    limits: RecordingLimits,
+    running: Mutex<Vec<Running>>,
+    /// What became of recordings, where the disk would not take it.
+    unwritten: Mutex<BTreeMap<String, RecordingInfo>>,
+    before: Mutex<BTreeMap<String, Totals>>,
+    events: OnceLock<Weak<Events>>,
+    failures: AtomicU64,
+}
+
+/// Rows and losses of a thruster since the gateway started.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Totals {
+    /// Recordings that run.
+    pub running: u64,
+    /// Rows written.
+    pub rows: u64,
+    /// Samples lost.
+    pub lost: u64,
+    /// Recordings that ended by themselves.
+    pub failed: u64,
 }
 
 #[derive(Debug)]
-struct Active {
-    samples: SyncSender<Sample>,
+struct Running {
+    name: String,
+    thruster: String,
+    items: SyncSender<Item>,
     info: Arc<Mutex<RecordingInfo>>,
-    thread: JoinHandle<io::Result<()>>,
-}
-
-/// One telemetry sample on its way to the disk.
-struct Sample {
-    time_ns: u64,
-    signals: Signals,
+    thread: JoinHandle<()>,
 }
 
 impl Recorder {
     /// Recordings in this folder; those a killed gateway left become `torn`.
-    pub fn open(folder: &Path) -> io::Result<Recorder> {
+    pub fn open(folder: &Path, limits: RecordingLimits) -> io::Result<Recorder> {
         fs::create_dir_all(folder)?;
         let recorder = Recorder {
             folder: folder.to_owned(),
-            active: Mutex::new(None),
-            rows_before: AtomicU64::new(0),
-            lost_before: AtomicU64::new(0),
+            limits,
+            running: Mutex::default(),
+            unwritten: Mutex::default(),
+            before: Mutex::default(),
+            events: OnceLock::new(),
+            failures: AtomicU64::new(0),
         };
         for mut info in recorder.list() {
             if info.state == RecordingState::Recording {
                 info.state = RecordingState::Torn;
-                write_info(folder, &info)?;
+                info.cause = Some("the gateway was killed while it ran".into());
+                recorder.note_info(&info);
             }
         }
         Ok(recorder)
     }
 
+    /// Where it tells what became of recordings.
+    pub fn tell_to(&self, events: &Arc<Events>) {
+        let _ = self.events.set(Arc::downgrade(events));
+    }
+
     /// Starts a recording.
     pub fn start(
-        &self,
-        thruster: &str,
+        self: &Arc<Self>,
+        subject: Subject,
+        who: &Identity,
         name: Option<String>,
         rate_hz: f64,
     ) -> Result<RecordingInfo, Problem> {
         let now = SystemTime::now();
-        let mut active = lock(&self.active);
-        if let Some(running) = active.as_ref().map(|active| lock(&active.info).name.clone()) {
-            return Err(Problem::new(Kind::RecordingActive, format!("recording {running:?} is running"))
-                .hint("DELETE /v1/recordings stops it"));
+        self.reap();
+        let mut running = lock(&self.running);
+        if running.len() >= AT_ONCE {
+            return Err(Problem::new(Kind::RecordingActive, format!("{AT_ONCE} recordings are running"))
+                .hint("DELETE /v1/recordings/{name} stops one"));
         }
+        let thruster = subject.thruster.id.clone();
+        let chosen = name.is_some();
         let name = name.unwrap_or_else(|| {
             let stamp = humantime::format_rfc3339_seconds(now).to_string().replace(['-', ':'], "");
             format!("{thruster}-{stamp}")
         });
-        if self.file(&name, "json").exists() {
+        let taken = self.file(&name, "json").exists() || running.iter().any(|other| other.name == name);
+        if taken || (!chosen && running.iter().any(|other| other.thruster == thruster)) {
+            let hint = "choose another name; a second recording of a thruster needs a name of its own";
             return Err(Problem::new(
                 Kind::RecordingActive,
-                format!("there is a recording {name:?} already"),
+                format!("there is a recording {name:?} already, or one of {thruster} is running"),
             )
-            .hint("choose another name, or leave it out"));
+            .hint(hint));
         }
         let info = RecordingInfo {
-            name,
-            thruster: thruster.to_owned(),
+            name: name.clone(),
+            thruster: thruster.clone(),
+            owner: who.name.clone(),
             state: RecordingState::Recording,
+            cause: None,
             started: humantime::format_rfc3339_millis(now).to_string(),
             rate_hz,
             rows: 0,
@@ -144,97 +197,211 @@ impl Recorder {
             lost_samples: 0,
             bytes: BTreeMap::new(),
         };
-        let writer = Files::create(&self.folder, &info).map_err(|error| self.failed(&info.name, &error))?;
-        let (samples, inbox) = sync_channel(QUEUE_ROWS);
+        let failed = |error: &io::Error| self.failed(&name, error);
         let shared = Arc::new(Mutex::new(info.clone()));
-        let (folder, theirs) = (self.folder.clone(), Arc::clone(&shared));
+        let job = Job::begin(&self.folder, subject, self.limits, Arc::clone(&shared), now)
+            .map_err(|error| failed(&error))?;
+        let (items, inbox) = sync_channel(QUEUE_ROWS);
+        let theirs = Arc::clone(self);
         let thread = std::thread::Builder::new()
             .name("record".into())
-            .spawn(move || {
-                let ended = write_rows(&folder, writer, &theirs, &inbox);
-                let mut info = lock(&theirs);
-                info.state = if ended.is_ok() { RecordingState::Complete } else { RecordingState::Torn };
-                let noted = write_info(&folder, &info);
-                ended.and(noted)
-            })
-            .map_err(|error| self.failed(&info.name, &error))?;
-        *active = Some(Active { samples, info: shared, thread });
+            .spawn(move || job.run(&theirs, &inbox))
+            .map_err(|error| failed(&error))?;
+        running.push(Running { name: name.clone(), thruster, items, info: shared, thread });
+        drop(running);
+        self.tell(
+            EventKind::RecordingStarted,
+            &info,
+            &who.name,
+            format!("{} started recording {name}", who.name),
+        );
         Ok(info)
     }
 
-    /// Stops the running recording.
-    pub fn stop(&self) -> Result<RecordingInfo, Problem> {
-        let Some(Active { samples, info, thread }) = lock(&self.active).take() else {
-            return Err(Problem::new(Kind::NoRecording, "no recording is running")
+    /// Stops a running recording: its owner's, or anybody's for an admin.
+    pub fn stop(&self, name: &str, who: &Identity) -> Result<RecordingInfo, Problem> {
+        self.reap();
+        let at = lock(&self.running).iter().position(|running| running.name == name);
+        let Some(at) = at else {
+            return Err(Problem::new(Kind::NoRecording, format!("no recording {name:?} is running"))
                 .hint("POST /v1/recordings starts one"));
         };
-        drop(samples); // the thread writes what still waits, and ends
-        let ended = thread.join().unwrap_or_else(|_| Err(io::Error::other("its thread panicked")));
-        let info = lock(&info).clone();
-        self.rows_before.fetch_add(info.rows, Ordering::Relaxed);
-        self.lost_before.fetch_add(info.lost_samples, Ordering::Relaxed);
-        ended.map_err(|error| self.failed(&info.name, &error))?;
-        Ok(self.sized(info))
+        let owner = lock(&lock(&self.running)[at].info).owner.clone();
+        may(who, &owner, name)?;
+        let running = lock(&self.running).swap_remove(at);
+        let info = self.settle(running);
+        self.tell(
+            EventKind::RecordingStopped,
+            &info,
+            &who.name,
+            format!("{} stopped recording {}, {} rows", who.name, info.name, info.rows),
+        );
+        match &info.cause {
+            Some(cause) if info.state == RecordingState::Failed => {
+                Err(self.failed(&info.name, &io::Error::other(cause.clone())))
+            }
+            _ => Ok(self.sized(info)),
+        }
+    }
+
+    /// Names of what runs.
+    pub fn names_running(&self) -> Vec<String> {
+        self.reap();
+        lock(&self.running).iter().map(|running| running.name.clone()).collect()
+    }
+
+    /// Stops everything: the gateway ends.
+    pub fn stop_all(&self) {
+        let running = std::mem::take(&mut *lock(&self.running));
+        running.into_iter().for_each(|running| drop(self.settle(running)));
+    }
+
+    /// Deletes a recording that is done.
+    pub fn delete(&self, name: &str, who: &Identity) -> Result<(), Problem> {
+        let info =
+            self.list().into_iter().find(|info| info.name == name).ok_or_else(|| {
+                Problem::new(Kind::UnknownRecording, format!("there is no recording {name:?}"))
+            })?;
+        may(who, &info.owner, name)?;
+        for ending in [ENDING, "csv", "json"] {
+            match fs::remove_file(self.file(name, ending)) {
+                Err(error) if error.kind() != io::ErrorKind::NotFound => {
+                    return Err(self.failed(name, &error));
+                }
+                _ => (),
+            }
+        }
+        lock(&self.unwritten).remove(name);
+        self.tell(
+            EventKind::RecordingDeleted,
+            &info,
+            &who.name,
+            format!("{} deleted recording {name}", who.name),
+        );
+        Ok(())
     }
 
     /// Takes a sample of the bus; never waits for the disk.
     pub fn offer(&self, thruster: &str, telemetry: &Telemetry, lost: u64) {
-        let active = lock(&self.active);
-        let Some(active) = active.as_ref() else { return };
-        let mut info = lock(&active.info);
-        if info.thruster == thruster {
-            let sample = Sample { time_ns: telemetry.time_ns, signals: telemetry.signals };
-            let dropped = u64::from(active.samples.try_send(sample).is_err());
-            info.lost_samples += lost + dropped;
+        for running in lock(&self.running).iter().filter(|running| running.thruster == thruster) {
+            let sample = Item::sample(telemetry);
+            let dropped = u64::from(running.items.try_send(sample).is_err());
+            if lost + dropped > 0 {
+                lock(&running.info).lost_samples += lost + dropped;
+            }
+        }
+    }
+
+    /// An event goes into every recording that it concerns.
+    pub fn note(&self, event: &Event) {
+        for running in lock(&self.running).iter() {
+            if event.thruster.as_deref().is_none_or(|id| id == running.thruster) {
+                let json = serde_json::to_vec(event).unwrap_or_default();
+                let _ = running
+                    .items
+                    .try_send(Item::Event { at_ns: event.monotonic_ns, json: Bytes::from(json) });
+            }
         }
     }
 
     /// Every recording, oldest first.
     pub fn list(&self) -> Vec<RecordingInfo> {
-        let running = self.running();
-        let mut infos: Vec<RecordingInfo> = fs::read_dir(&self.folder)
+        self.reap();
+        let mut known: BTreeMap<String, RecordingInfo> = fs::read_dir(&self.folder)
             .into_iter()
             .flatten()
             .flatten()
             .filter(|entry| entry.path().extension().is_some_and(|extension| extension == "json"))
             .filter_map(|entry| serde_json::from_slice(&fs::read(entry.path()).ok()?).ok())
-            .map(|info: RecordingInfo| {
-                running.clone().filter(|running| running.name == info.name).unwrap_or(info)
-            })
-            .map(|info| self.sized(info))
+            .map(|info: RecordingInfo| (info.name.clone(), info))
             .collect();
+        known.extend(lock(&self.unwritten).clone());
+        for running in lock(&self.running).iter() {
+            let info = lock(&running.info).clone();
+            known.insert(info.name.clone(), info);
+        }
+        let mut infos: Vec<RecordingInfo> = known.into_values().map(|info| self.sized(info)).collect();
         infos.sort_by(|a, b| (&a.started, &a.name).cmp(&(&b.started, &b.name)));
         infos
     }
 
     /// Where a recording's file is, if there is one.
-    pub fn find(&self, name: &str, format: &str) -> Option<PathBuf> {
+    pub fn find(&self, name: &str) -> Option<PathBuf> {
         (is_name(name) && self.file(name, "json").is_file())
-            .then(|| self.file(name, format))
+            .then(|| self.file(name, ENDING))
             .filter(|file| file.is_file())
     }
 
-    /// Is one running; rows written and samples lost since the gateway started.
-    pub fn progress(&self) -> (bool, u64, u64) {
-        let running = self.running();
-        let (rows, lost) = running.as_ref().map_or((0, 0), |info| (info.rows, info.lost_samples));
-        (
-            running.is_some(),
-            self.rows_before.load(Ordering::Relaxed) + rows,
-            self.lost_before.load(Ordering::Relaxed) + lost,
-        )
+    /// How many run, and what was written and lost since the gateway started.
+    pub fn totals(&self, thruster: &str) -> Totals {
+        self.reap();
+        let mut totals = lock(&self.before).get(thruster).copied().unwrap_or_default();
+        for running in lock(&self.running).iter().filter(|running| running.thruster == thruster) {
+            let info = lock(&running.info);
+            totals.running += u64::from(info.state == RecordingState::Recording);
+            totals.rows += info.rows;
+            totals.lost += info.lost_samples;
+        }
+        totals
     }
 
-    fn running(&self) -> Option<RecordingInfo> {
-        lock(&self.active).as_ref().map(|active| lock(&active.info).clone())
+    /// Takes those off the list that ended by themselves.
+    fn reap(&self) {
+        loop {
+            let mut running = lock(&self.running);
+            let Some(at) = running.iter().position(|running| running.thread.is_finished()) else { return };
+            let ended = running.swap_remove(at);
+            drop(running);
+            self.settle(ended);
+        }
+    }
+
+    /// Waits for a recording's end and counts it.
+    fn settle(&self, running: Running) -> RecordingInfo {
+        let Running { thruster, items, info, thread, .. } = running;
+        drop(items); // the thread writes what still waits, and ends
+        let panicked = thread.join().is_err();
+        let mut info = lock(&info).clone();
+        if panicked {
+            info.state = RecordingState::Failed;
+            info.cause = Some("its thread ended in a panic".into());
+            self.note_info(&info);
+        }
+        let mut before = lock(&self.before);
+        let totals = before.entry(thruster).or_default();
+        totals.rows += info.rows;
+        totals.lost += info.lost_samples;
+        totals.failed += u64::from(info.state == RecordingState::Failed);
+        info
+    }
+
+    /// Writes `NAME.json`; where the disk refuses, the list tells the truth from memory.
+    fn note_info(&self, info: &RecordingInfo) {
+        match write_info(&self.folder, info) {
+            Ok(()) => drop(lock(&self.unwritten).remove(&info.name)),
+            Err(_) => drop(lock(&self.unwritten).insert(info.name.clone(), info.clone())),
+        }
+    }
+
+    /// A recording ended by itself.
+    fn ended(&self, info: &RecordingInfo) {
+        self.failures.fetch_add(1, Ordering::Relaxed);
+        let cause = info.cause.clone().unwrap_or_default();
+        let words = format!("recording {} ended by itself: {cause}", info.name);
+        tracing::error!("{words}");
+        self.tell(EventKind::RecordingEnded, info, "gateway", words);
+    }
+
+    fn tell(&self, kind: EventKind, info: &RecordingInfo, who: &str, words: String) {
+        if let Some(events) = self.events.get().and_then(Weak::upgrade) {
+            events.tell(kind, Some(&info.thruster), who, words);
+        }
     }
 
     fn sized(&self, mut info: RecordingInfo) -> RecordingInfo {
-        info.bytes = FORMATS
-            .iter()
-            .filter_map(|format| {
-                Some(((*format).to_owned(), fs::metadata(self.file(&info.name, format)).ok()?.len()))
-            })
+        info.bytes = fs::metadata(self.file(&info.name, ENDING))
+            .map(|about| (ENDING.to_owned(), about.len()))
+            .into_iter()
             .collect();
         info
     }
@@ -252,6 +419,18 @@ impl Recorder {
     }
 }
 
+/// What one started is one's own; an admin may touch all.
+fn may(who: &Identity, owner: &str, name: &str) -> Result<(), Problem> {
+    if who.role == Role::Admin || who.name == owner {
+        return Ok(());
+    }
+    Err(Problem::new(
+        Kind::RoleTooLow,
+        format!("recording {name:?} belongs to {owner:?}, not to {:?}", who.name),
+    )
+    .hint("its owner may, and whoever has a token of role admin"))
+}
+
 /// Is this a name of a recording: 1 to 64 letters, digits, `.`, `_` or `-`, the first a letter or digit?
 pub fn is_name(name: &str) -> bool {
     (1..=64).contains(&name.len())
@@ -259,87 +438,11 @@ pub fn is_name(name: &str) -> bool {
         && name.bytes().all(|b| b.is_ascii_alphanumeric() || b"._-".contains(&b))
 }
 
-/// Writes rows until the recorder lets go of the other end.
-fn write_rows(
-    folder: &Path,
-    mut files: Files,
-    info: &Mutex<RecordingInfo>,
-    inbox: &Receiver<Sample>,
-) -> io::Result<()> {
-    let period_ns = (1e9 / lock(info).rate_hz) as u64;
-    let (mut first_ns, mut due_ns) = (None, 0);
-    let mut row = Signals::UNKNOWN;
-    let mut flushed = Instant::now();
-    loop {
-        match inbox.recv_timeout(FLUSH_EVERY) {
-            Ok(sample) => {
-                // A sensor slower than the servo shows a value now and then: none is lost between two rows.
-                for signal in SIGNALS {
-                    let value = (signal.get)(&sample.signals);
-                    if !value.is_nan() {
-                        (signal.set)(&mut row, value);
-                    }
-                }
-                let first_ns = *first_ns.get_or_insert(sample.time_ns);
-                // The servo's period need not divide ours: a row may come a little early, and none is made up
-                // for ticks that were skipped.
-                if sample.time_ns + period_ns / 20 >= due_ns {
-                    due_ns = (due_ns + period_ns).max(sample.time_ns + period_ns / 2);
-                    let time_s = sample.time_ns.saturating_sub(first_ns) as f64 * 1e-9;
-                    files.write(time_s, &row)?;
-                    row = Signals::UNKNOWN;
-                    let mut info = lock(info);
-                    info.rows += 1;
-                    info.duration_s = time_s;
-                }
-            }
-            Err(RecvTimeoutError::Timeout) => (),
-            Err(RecvTimeoutError::Disconnected) => break,
-        }
-        if flushed.elapsed() >= FLUSH_EVERY {
-            flushed = Instant::now();
-            files.flush()?;
-            let now = lock(info).clone();
-            write_info(folder, &now)?;
-        }
-    }
-    files.finish()
-}
-
-/// The files of one recording.
-struct Files(Vec<Writer<BufWriter<File>>>);
-
-impl Files {
-    fn create(folder: &Path, info: &RecordingInfo) -> io::Result<Files> {
-        let columns: Vec<&str> = SIGNALS.iter().map(|signal| signal.name).collect();
-        let create = |ending: &&str| {
-            let path = folder.join(format!("{}.{ending}", info.name));
-            let format = Format::of(&path).map_err(io::Error::other)?;
-            Writer::create(format, &info.thruster, &columns, BufWriter::new(File::create_new(path)?))
-        };
-        let files = FORMATS.iter().map(create).collect::<io::Result<_>>()?;
-        write_info(folder, info)?;
-        Ok(Files(files))
-    }
-
-    fn write(&mut self, time_s: f64, row: &Signals) -> io::Result<()> {
-        let values: Vec<f64> = SIGNALS.iter().map(|signal| (signal.get)(row)).collect();
-        self.0.iter_mut().try_for_each(|file| file.row(time_s, &values))
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.0.iter_mut().try_for_each(Writer::flush)
-    }
-
-    fn finish(self) -> io::Result<()> {
-        self.0.into_iter().try_for_each(Writer::finish)
-    }
-}
-
 /// Writes `NAME.json` at once or not at all.
 fn write_info(folder: &Path, info: &RecordingInfo) -> io::Result<()> {
     let (draft, file) =
         (folder.join(format!(".{}.draft", info.name)), folder.join(format!("{}.json", info.name)));
-    fs::write(&draft, serde_json::to_vec_pretty(info)?)?;
-    fs::rename(draft, file)
+    fs::write(&draft, serde_json::to_vec_pretty(info)?)
+        .and_then(|()| fs::rename(&draft, file))
+        .inspect_err(|_| drop(fs::remove_file(&draft)))
 }

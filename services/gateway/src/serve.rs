@@ -143,7 +143,8 @@ where
                 Err(never) => match never {},
             };
             // A WebSocket is at work for as long as it is open.
-            let idle_after = (!upgrade || response.status() != hyper::StatusCode::SWITCHING_PROTOCOLS).then_some(slot);
+            let idle_after =
+                (!upgrade || response.status() != hyper::StatusCode::SWITCHING_PROTOCOLS).then_some(slot);
             Ok::<_, Infallible>(response.map(|body| Answer { body, idle_after }))
         }
     });

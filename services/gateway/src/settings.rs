@@ -191,8 +191,8 @@ pub fn thrusters(config: &Config) -> Result<Vec<Deployed>, ConfigError> {
         .iter()
         .map(|(id, thruster)| {
             let (file, text) = config.rig_text(id, thruster)?;
-            let rig =
-                Rig::from_toml(&text).map_err(|error| ConfigError { file: file.clone(), message: error.to_string() })?;
+            let rig = Rig::from_toml(&text)
+                .map_err(|error| ConfigError { file: file.clone(), message: error.to_string() })?;
             let heartbeat = Duration::from_nanos(thruster.controller_period_ns());
             let speed_limit = thruster
                 .limits
@@ -207,8 +207,9 @@ pub fn thrusters(config: &Config) -> Result<Vec<Deployed>, ConfigError> {
                         .min(model.map_or(f64::MAX, |model| model.speed_max_rad_s)),
                 ),
             };
-            let servo_silence =
-                Duration::from_nanos((5 * thruster.servo_period_ns()).max(2 * thruster.controller_period_ns()));
+            let servo_silence = Duration::from_nanos(
+                (5 * thruster.servo_period_ns()).max(2 * thruster.controller_period_ns()),
+            );
             Ok(Deployed { id: id.clone(), rig: (file, text), servo_silence, range, heartbeat })
         })
         .collect()

@@ -21,8 +21,8 @@ use crate::lease::{Lease, Wanted};
 use crate::problem::{Kind, Problem};
 use crate::routes::{ControllerRequest, ControllerView, LawParameter};
 use crate::view::{
-    BeforeView, Estimated, FaultView, LeaseView, LimitView, ParameterEstimate, Setpoint, SetpointRange, ThrusterState,
-    Values,
+    BeforeView, Estimated, FaultView, LeaseView, LimitView, ParameterEstimate, Setpoint, SetpointRange,
+    ThrusterState, Values,
 };
 
 /// Servo and controller answer a request within this time, or are taken to be away.

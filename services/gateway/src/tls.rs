@@ -8,17 +8,19 @@ use std::sync::{Arc, Mutex};
 use std::time::SystemTime;
 
 use thiserror::Error;
+use tokio_rustls::rustls::ServerConfig;
 use tokio_rustls::rustls::crypto::ring;
 use tokio_rustls::rustls::pki_types::pem::PemObject;
 use tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer};
-use tokio_rustls::rustls::ServerConfig;
 
 use crate::settings::Tls;
 use crate::thruster::lock;
 
 /// Why there is no TLS.
 #[derive(Debug, Error)]
-#[error("gateway.tls, {file}: {why}\nhint: certificate and key are PEM files; self_signed = true makes both where neither is there")]
+#[error(
+    "gateway.tls, {file}: {why}\nhint: certificate and key are PEM files; self_signed = true makes both where neither is there"
+)]
 pub struct TlsError {
     file: String,
     why: String,
@@ -99,7 +101,8 @@ fn load(keys: &Tls) -> Result<ServerConfig, TlsError> {
 
 fn make(keys: &Tls, names: Vec<String>) -> Result<(), TlsError> {
     let names: Vec<String> = names.iter().map(|name| name.trim_matches(['[', ']']).to_owned()).collect();
-    let made = rcgen::generate_simple_self_signed(names).map_err(|error| TlsError::new(&keys.certificate, error))?;
+    let made =
+        rcgen::generate_simple_self_signed(names).map_err(|error| TlsError::new(&keys.certificate, error))?;
     for (file, text, mode) in
         [(&keys.certificate, made.cert.pem(), 0o644), (&keys.key, made.signing_key.serialize_pem(), 0o600)]
     {

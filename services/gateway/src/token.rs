@@ -121,7 +121,8 @@ pub fn make(file: &Path, name: &str, role: Role) -> Result<String, TokenError> {
         ));
     }
     let secret: String = rand::random::<[u8; 32]>().iter().map(|byte| format!("{byte:02x}")).collect();
-    let unable = |what: String| fail(what, "see that the random source and memory of this machine are usable");
+    let unable =
+        |what: String| fail(what, "see that the random source and memory of this machine are usable");
     let salt = SaltString::encode_b64(&rand::random::<[u8; 16]>()).map_err(|e| unable(e.to_string()))?;
     let hash = argon2().hash_password(secret.as_bytes(), &salt).map_err(|e| unable(e.to_string()))?;
     book.tokens.insert(name.to_owned(), Entry { role, hash: hash.to_string() });
@@ -208,7 +209,8 @@ impl Tokens {
         let (name, secret) = token.split_once('.')?;
         let entry = lock(&self.known).book.tokens.get(name).cloned();
         // A hash of nothing that anybody knows: the work is the same.
-        const NOBODY: &str = "$argon2id$v=19$m=19456,t=2,p=1$bm9ib2R5bm9ib2R5$qqq6ZbDQ6HfmTqQF1vJTUVg9BFRbnpBv2q1wIqnWVJc";
+        const NOBODY: &str =
+            "$argon2id$v=19$m=19456,t=2,p=1$bm9ib2R5bm9ib2R5$qqq6ZbDQ6HfmTqQF1vJTUVg9BFRbnpBv2q1wIqnWVJc";
         let hash = entry.as_ref().map_or(NOBODY, |entry| entry.hash.as_str());
         let matches = PasswordHash::new(hash)
             .is_ok_and(|hash| argon2().verify_password(secret.as_bytes(), &hash).is_ok());
@@ -243,7 +245,9 @@ mod tests {
         let bridge = Some(Identity { name: "bridge".into(), role: Role::Pilot });
         assert_eq!(tokens.verify(&token), bridge);
         assert_eq!(tokens.remembered(&token), bridge);
-        for wrong in ["bridge.", "bridge", "", "nobody.abc", &format!("{token}0"), &token.replace("bridge", "bench")] {
+        for wrong in
+            ["bridge.", "bridge", "", "nobody.abc", &format!("{token}0"), &token.replace("bridge", "bench")]
+        {
             assert_eq!(tokens.verify(wrong), None, "{wrong}");
             assert_eq!(tokens.remembered(wrong), None, "{wrong}");
         }

@@ -25,9 +25,8 @@ impl Scribe {
     /// Starts writing to the event log and to the file beside the shared memory.
     pub fn start(log: EventLog, watched: PathBuf) -> std::io::Result<Self> {
         let (outbox, inbox) = channel();
-        let thread = std::thread::Builder::new()
-            .name("scribe".into())
-            .spawn(move || write(&log, &watched, &inbox))?;
+        let thread =
+            std::thread::Builder::new().name("scribe".into()).spawn(move || write(&log, &watched, &inbox))?;
         Ok(Self { outbox, thread })
     }
 

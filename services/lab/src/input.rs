@@ -10,7 +10,8 @@ use kort_thruster::effects::{self, Descriptor};
 use kort_thruster::models::ModelName;
 use kort_thruster::rig::Rig;
 
-use crate::failure::{Failure, read_rig};
+use crate::failure::Failure;
+use crate::files::rig_text;
 
 /// Arguments that `fit` and `diagnose` share.
 #[derive(Debug, Args)]
@@ -18,9 +19,10 @@ pub struct Input {
     /// Recordings of one rig: CSV (plain or gzip) or MCAP; several are used together
     #[arg(value_name = "REC", required = true)]
     pub recordings: Vec<PathBuf>,
-    /// Rig description: what is stated of the thruster, its drive and its sensors
+    /// Rig description: what is stated of the thruster, its drive and its sensors [default: the one that a
+    /// recording of the service holds]
     #[arg(long, value_name = "RIG")]
-    pub rig: PathBuf,
+    pub rig: Option<PathBuf>,
     /// Model to compare with: model0, model1, model2, model3 or rotational_flow
     #[arg(long, value_name = "NAME", default_value = "model2")]
     pub model: ModelName,
@@ -40,6 +42,8 @@ pub struct Input {
 
 /// Everything read.
 pub struct Loaded {
+    /// Text of the rig description.
+    pub rig_text: String,
     /// The rig.
     pub rig: Rig,
     /// The recordings.
@@ -75,14 +79,21 @@ impl Input {
     /// # Errors
     /// Names file, field, value found and what is allowed.
     pub fn load(&self) -> Result<Loaded, Failure> {
-        let rig = read_rig(&self.rig)?;
         let map = self.columns.as_deref().map(ColumnMap::find).transpose().map_err(Failure::input)?;
-        let mut out = Loaded { rig, series: Vec::new(), notes: Vec::new(), lossy: false };
+        let mut recordings = Vec::new();
         for (i, path) in self.recordings.iter().enumerate() {
             if self.recordings[..i].contains(path) {
                 return Err(Failure::in_file(path, "is given twice\nhint: name every recording once"));
             }
-            let recording = Recording::read(path, map.as_ref()).map_err(Failure::input)?;
+            recordings.push(Recording::read(path, map.as_ref()).map_err(Failure::input)?);
+        }
+        let (rig_text, rig) = self.rig(&recordings)?;
+        let mut out = Loaded { rig_text, rig, series: Vec::new(), notes: Vec::new(), lossy: false };
+        for recording in recordings {
+            // Said aloud too: a caller of --json may look at the exit code only.
+            for loss in &recording.losses {
+                eprintln!("warning: {}: {loss}", recording.name);
+            }
             let named = |text: &String| format!("{}: {text}", recording.name);
             out.lossy |= !recording.losses.is_empty();
             out.notes.extend(recording.losses.iter().chain(&recording.notes).map(named));
@@ -101,6 +112,35 @@ impl Input {
             out.series.push(series);
         }
         Ok(out)
+    }
+
+    /// The rig of `--rig`, else the one that the recordings hold: all of them the same.
+    fn rig(&self, recordings: &[Recording]) -> Result<(String, Rig), Failure> {
+        if let Some(path) = &self.rig {
+            let text = rig_text(path)?;
+            let rig = Rig::from_toml(&text).map_err(|e| Failure::in_file(path, e))?;
+            return Ok((text, rig));
+        }
+        let mut held: Option<(&String, &PathBuf)> = None;
+        for (recording, path) in recordings.iter().zip(&self.recordings) {
+            let Some(text) = recording.about.get("rig") else {
+                return Err(Failure::in_file(path, "holds no rig description\nhint: name it with --rig RIG"));
+            };
+            if let Some((other, first)) = held.filter(|(other, _)| *other != text) {
+                let words = format!(
+                    "holds another rig description ({} bytes) than {} ({} bytes)\nhint: recordings of one rig belong together; --rig RIG says which counts",
+                    text.len(),
+                    first.display(),
+                    other.len()
+                );
+                return Err(Failure::in_file(path, words));
+            }
+            held = Some((text, path));
+        }
+        let (text, path) = held.ok_or_else(|| Failure::failed("no recording is named"))?;
+        let rig =
+            Rig::from_toml(text).map_err(|e| Failure::in_file(path, format!("its rig description: {e}")))?;
+        Ok((text.clone(), rig))
     }
 
     /// Runs work on the asked number of threads.

@@ -160,18 +160,60 @@ impl Settings {
         let rig_supply_v = rig.amplifier.supply_v.filter(|v| v.is_finite()).unwrap_or(10_000.0);
         // Beyond what rig and physics know a limit protects nothing.
         let bounds: [(&str, Option<f64>, f64, f64, &str); 12] = [
-            ("limits.current_a", keys.current_a, 1e-3, rig_current_a, "at most amplifier.current_limit_a of the rig"),
+            (
+                "limits.current_a",
+                keys.current_a,
+                1e-3,
+                rig_current_a,
+                "at most amplifier.current_limit_a of the rig",
+            ),
             ("limits.trip_current_a", keys.trip_current_a, 1e-3, 2.0 * rig_current_a, "1.25 times current_a"),
-            ("limits.continuous_current_a", keys.continuous_current_a, 1e-3, rig_current_a, "the motor's data sheet"),
-            ("limits.thermal_time_constant_s", keys.thermal_time_constant_s, 0.1, 36_000.0, "60 for a small motor"),
+            (
+                "limits.continuous_current_a",
+                keys.continuous_current_a,
+                1e-3,
+                rig_current_a,
+                "the motor's data sheet",
+            ),
+            (
+                "limits.thermal_time_constant_s",
+                keys.thermal_time_constant_s,
+                0.1,
+                36_000.0,
+                "60 for a small motor",
+            ),
             ("limits.speed_rad_s", keys.speed_rad_s, 0.1, 10_000.0, "what propeller and gear bear"),
             ("limits.trip_speed_rad_s", keys.trip_speed_rad_s, 0.1, 20_000.0, "1.15 times speed_rad_s"),
             ("limits.full_drive_s", keys.full_drive_s, 1e-9, 60.0, "0.005 for a stiff drive"),
-            ("limits.supply_low_v", keys.supply_low_v, 0.0, 2.0 * rig_supply_v, "the band around the supply's nominal voltage"),
-            ("limits.supply_high_v", keys.supply_high_v, 0.0, 2.0 * rig_supply_v, "the band around the supply's nominal voltage"),
-            ("limits.temperature_c", keys.temperature_c, -20.0, 250.0, "the winding's class, for example 120"),
+            (
+                "limits.supply_low_v",
+                keys.supply_low_v,
+                0.0,
+                2.0 * rig_supply_v,
+                "the band around the supply's nominal voltage",
+            ),
+            (
+                "limits.supply_high_v",
+                keys.supply_high_v,
+                0.0,
+                2.0 * rig_supply_v,
+                "the band around the supply's nominal voltage",
+            ),
+            (
+                "limits.temperature_c",
+                keys.temperature_c,
+                -20.0,
+                250.0,
+                "the winding's class, for example 120",
+            ),
             ("checks.frozen_s", checks.frozen_s, 0.01, 60.0, "0.5"),
-            ("checks.spike_rad_s", checks.spike_rad_s, 1e-3, 1e5, "leave the key out: it follows from the rig"),
+            (
+                "checks.spike_rad_s",
+                checks.spike_rad_s,
+                1e-3,
+                1e5,
+                "leave the key out: it follows from the rig",
+            ),
         ];
         for (key, value, low, high, hint) in bounds {
             if let Some(value) = value.filter(|v| !(low..=high).contains(v)) {

@@ -189,8 +189,7 @@ impl Servo {
             RequestKind::Arm => {
                 self.armed = true;
                 self.armed_at_ns = now_ns;
-                self.before =
-                    Trip { thrust_n: f64::NAN, shaft_speed_rad_s: f64::NAN, ..Trip::default() };
+                self.before = Trip { thrust_n: f64::NAN, shaft_speed_rad_s: f64::NAN, ..Trip::default() };
                 answer(Outcome::Done, format_args!("armed"))
             }
             RequestKind::Disarm => {

@@ -70,11 +70,20 @@ pub(super) fn decode(
     table.assemble(name, map, losses)
 }
 
+/// Name of the metadata with what is known of a recording.
+const ABOUT: &str = "kort";
+/// Schemas of channels that stand beside the signals.
+const STATE: &str = "kort.state/1";
+const EVENT: &str = "kort.event/1";
+const BESIDE: [&str; 2] = [STATE, EVENT];
+
 /// Messages as rows over (channel, field) columns.
 #[derive(Default)]
 struct Table {
     topics: BTreeMap<u16, String>,
     other_topics: Vec<String>,
+    schemas: BTreeMap<u16, String>,
+    about: BTreeMap<String, String>,
     fields: Vec<(u16, String)>,
     places: BTreeMap<(u16, String), usize>,
     rows: Vec<Row>,
@@ -92,7 +101,15 @@ struct Row {
 impl Table {
     fn take(&mut self, record: Record<'_>) -> Result<(), Problem> {
         match record {
+            Record::Schema { header, .. } => {
+                self.schemas.insert(header.id, header.name);
+            }
+            Record::Metadata(about) if about.name == ABOUT => self.about.extend(about.metadata),
             Record::Channel(channel) => {
+                // What stands beside the signals for people and tools is no signal.
+                if self.schemas.get(&channel.schema_id).is_some_and(|name| BESIDE.contains(&name.as_str())) {
+                    return Ok(());
+                }
                 if channel.message_encoding == "json" {
                     self.topics.insert(channel.id, channel.topic);
                 } else {
@@ -192,6 +209,7 @@ impl Table {
             })?;
         }
         let mut recording = rows.finish(losses)?;
+        recording.about = self.about;
         if !self.other_topics.is_empty() {
             recording.notes.push(format!(
                 "channels without JSON messages are left out: {}",
@@ -216,13 +234,18 @@ impl Table {
     }
 }
 
-/// Size of a chunk before compression, bytes: what a kill without a flush may cost, some 700 rows.
+/// Size of a chunk before compression, bytes.
 const CHUNK_BYTES: u64 = 128 * 1024;
 
-/// Writes rows as JSON messages of one channel.
-pub(super) struct Rows<W: Write + Seek> {
+/// Writes rows as JSON messages of one channel; beside it, on request, states and events.
+///
+/// A chunk is put together in memory and written whole: a file that is cut off at any instant ends with a whole
+/// chunk or in the middle of one, which every MCAP reader takes for a torn file and not for a broken one.
+pub struct Rows<W: Write + Seek> {
     writer: mcap::Writer<W>,
     channel_id: u16,
+    beside: Option<[u16; 2]>,
+    origin_ns: u64,
     columns: Vec<String>,
     sequence: u32,
     message: Vec<u8>,
@@ -235,21 +258,52 @@ impl<W: Write + Seek> Rows<W> {
             .compression(Some(mcap::Compression::Zstd))
             .compression_threads(0)
             .chunk_size(Some(CHUNK_BYTES))
+            .disable_seeking(true)
             .create(output)
             .map_err(io::Error::other)?;
         let schema = schema(columns).to_string();
         let schema_id = writer
             .add_schema("kort.recording/1", "jsonschema", schema.as_bytes())
             .map_err(io::Error::other)?;
-        let topic = if topic.starts_with('/') { topic.to_string() } else { format!("/{topic}") };
+        let topic = topic_of(topic);
         let channel_id =
             writer.add_channel(schema_id, &topic, "json", &BTreeMap::new()).map_err(io::Error::other)?;
         let columns = columns.iter().map(|c| c.to_string()).collect();
-        Ok(Self { writer, channel_id, columns, sequence: 0, message: Vec::new() })
+        Ok(Self { writer, channel_id, beside: None, origin_ns: 0, columns, sequence: 0, message: Vec::new() })
+    }
+
+    /// A live recording: `about` is what a stranger needs to know (the rig's text above all), `origin_ns` the wall
+    /// time of `time_s = 0`, ns since 1970.
+    ///
+    /// # Errors
+    /// The output cannot be written.
+    pub fn live(
+        topic: &str,
+        columns: &[&str],
+        about: BTreeMap<String, String>,
+        origin_ns: u64,
+        output: W,
+    ) -> io::Result<Self> {
+        let mut rows = Self::create(topic, columns, output)?;
+        let about = mcap::records::Metadata { name: ABOUT.into(), metadata: about };
+        rows.writer.write_metadata(&about).map_err(io::Error::other)?;
+        let object = br#"{"type":"object"}"#;
+        let mut channel = |schema: &str, topic: &str| -> io::Result<u16> {
+            let id = rows.writer.add_schema(schema, "jsonschema", object).map_err(io::Error::other)?;
+            rows.writer.add_channel(id, topic, "json", &BTreeMap::new()).map_err(io::Error::other)
+        };
+        let state = channel(STATE, &format!("{}/state", topic_of(topic)))?;
+        let event = channel(EVENT, "/events")?;
+        rows.beside = Some([state, event]);
+        rows.origin_ns = origin_ns;
+        Ok(rows)
     }
 
     /// A column not sampled in this row is left out of the message.
-    pub(super) fn row(&mut self, time_s: f64, values: &[f64]) -> io::Result<()> {
+    ///
+    /// # Errors
+    /// The output cannot be written.
+    pub fn row(&mut self, time_s: f64, values: &[f64]) -> io::Result<()> {
         self.message.clear();
         write!(self.message, "{{\"time_s\":")?;
         serde_json::to_writer(&mut self.message, &time_s)?;
@@ -260,26 +314,62 @@ impl<W: Write + Seek> Rows<W> {
             serde_json::to_writer(&mut self.message, value)?;
         }
         self.message.push(b'}');
-        // A recording that starts before zero keeps its order only in time_s.
-        let log_time = (time_s.max(0.0) * 1e9).round() as u64;
-        let header = MessageHeader {
-            channel_id: self.channel_id,
-            sequence: self.sequence,
-            log_time,
-            publish_time: log_time,
-        };
-        self.sequence = self.sequence.wrapping_add(1);
-        self.writer.write_to_known_channel(&header, &self.message).map_err(io::Error::other)
+        let message = std::mem::take(&mut self.message);
+        let written = self.send(self.channel_id, time_s, &message);
+        self.message = message;
+        written
     }
 
-    pub(super) fn flush(&mut self) -> io::Result<()> {
+    /// The thruster's state, a JSON object: setpoint, estimates with their doubt, law, limits, faults.
+    ///
+    /// # Errors
+    /// The output cannot be written.
+    pub fn state(&mut self, time_s: f64, json: &[u8]) -> io::Result<()> {
+        match self.beside {
+            Some([state, _]) => self.send(state, time_s, json),
+            None => Ok(()),
+        }
+    }
+
+    /// An event, a JSON object.
+    ///
+    /// # Errors
+    /// The output cannot be written.
+    pub fn event(&mut self, time_s: f64, json: &[u8]) -> io::Result<()> {
+        match self.beside {
+            Some([_, event]) => self.send(event, time_s, json),
+            None => Ok(()),
+        }
+    }
+
+    fn send(&mut self, channel_id: u16, time_s: f64, message: &[u8]) -> io::Result<()> {
+        // A recording that starts before zero keeps its order only in time_s.
+        let log_time = self.origin_ns + (time_s.max(0.0) * 1e9).round() as u64;
+        let header = MessageHeader { channel_id, sequence: self.sequence, log_time, publish_time: log_time };
+        self.sequence = self.sequence.wrapping_add(1);
+        self.writer.write_to_known_channel(&header, message).map_err(io::Error::other)
+    }
+
+    /// Ends the chunk and hands it to the system: what a kill may cost is what came after.
+    ///
+    /// # Errors
+    /// The output cannot be written.
+    pub fn flush(&mut self) -> io::Result<()> {
         self.writer.flush().map_err(io::Error::other)
     }
 
-    pub(super) fn finish(mut self) -> io::Result<()> {
+    /// Ends the file.
+    ///
+    /// # Errors
+    /// The output cannot be written.
+    pub fn finish(mut self) -> io::Result<()> {
         self.writer.finish().map_err(io::Error::other)?;
         self.writer.into_inner().flush()
     }
+}
+
+fn topic_of(topic: &str) -> String {
+    if topic.starts_with('/') { topic.to_string() } else { format!("/{topic}") }
 }
 
 /// JSON schema of a message, so that Foxglove lists the signals with unit and meaning.

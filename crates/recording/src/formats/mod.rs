@@ -3,6 +3,8 @@
 mod csv;
 mod mcap;
 
+pub use mcap::Rows as LiveMcap;
+
 use std::io::{self, BufRead, Seek, Write};
 use std::path::Path;
 

@@ -11,7 +11,7 @@ use utoipa_axum::{router::OpenApiRouter, routes};
 
 use crate::App;
 use crate::extract::{Json, LeaseId, Path};
-use crate::lease::{Lease, Wanted, TTL_DEFAULT_MS, TTL_MAX_MS};
+use crate::lease::{Lease, TTL_DEFAULT_MS, TTL_MAX_MS, Wanted};
 use crate::problem::{Kind, Problem};
 use crate::token::Identity;
 

@@ -27,7 +27,7 @@ pub fn routes() -> OpenApiRouter<Arc<App>> {
     OpenApiRouter::new().routes(routes!(metrics))
 }
 
-/// Metrics in Prometheus' text format. Fast signals come as smallest, mean and largest value of the last second.
+/// Metrics in Prometheus' text format. Fast signals are the mean of the last second; beside each stand NAME_min and NAME_max.
 #[utoipa::path(get, path = "/metrics", tag = "health",
     responses(
         (status = 200, description = "Prometheus text format 0.0.4", body = String, content_type = "text/plain"),
@@ -52,16 +52,8 @@ fn gather(app: &App) -> Families {
         signals(&mut families, thruster, tally);
         state(&mut families, thruster, tally);
         loops(&mut families, thruster, tally);
+        recordings(&mut families, &thruster.id, app);
     }
-    let (recording, rows, lost) = app.recorder().progress();
-    families.gauge("recording_active", "Is a recording running?", &[], f64::from(recording));
-    families.counter("recording_rows_total", "Rows recorded since the gateway started.", &[], rows as f64);
-    families.counter(
-        "recording_lost_samples_total",
-        "Samples a recording missed since the gateway started.",
-        &[],
-        lost as f64,
-    );
     service(&mut families, app);
     for (class, count) in app.answers() {
         families.counter(
@@ -72,6 +64,24 @@ fn gather(app: &App) -> Families {
         );
     }
     families
+}
+
+fn recordings(families: &mut Families, id: &str, app: &App) {
+    let (totals, label) = (app.recorder().totals(id), [("thruster", id)]);
+    families.gauge(
+        "recording_active",
+        "Recordings of this thruster that run.",
+        &label,
+        totals.running as f64,
+    );
+    let counters = [
+        ("recording_rows_total", "Rows recorded since the gateway started.", totals.rows),
+        ("recording_lost_samples_total", "Samples recordings missed since the gateway started.", totals.lost),
+        ("recordings_failed_total", "Recordings that the disk ended.", totals.failed),
+    ];
+    for (name, help, value) in counters {
+        families.counter(name, help, &label, value as f64);
+    }
 }
 
 /// What concerns the service as a whole.
@@ -126,8 +136,11 @@ fn signals(families: &mut Families, thruster: &Thruster, tally: &Tally) {
     for (kind, metric, meaning, window) in tally.counts().windows() {
         let alive = if kind == SignalKind::Estimated { controller } else { servo };
         let Some(window) = window.filter(|_| alive) else { continue };
-        for (stat, value) in [("min", window.min), ("mean", window.mean), ("max", window.max)] {
-            families.gauge(metric, meaning, &[("thruster", &thruster.id), ("stat", stat)], value);
+        let label = [("thruster", thruster.id.as_str())];
+        families.gauge(metric, &format!("{meaning} Mean of the last second."), &label, window.mean);
+        for (stat, value) in [("min", window.min), ("max", window.max)] {
+            let words = format!("{meaning} Its {stat} in the last second.");
+            families.gauge(&format!("{metric}_{stat}"), &words, &label, value);
         }
     }
 }
@@ -278,10 +291,10 @@ fn loops(families: &mut Families, thruster: &Thruster, tally: &Tally) {
 
 /// Metric families by name, in the order of names.
 #[derive(Default)]
-struct Families(BTreeMap<&'static str, MetricFamily>);
+struct Families(BTreeMap<String, MetricFamily>);
 
 impl Families {
-    fn gauge(&mut self, name: &'static str, help: &'static str, labels: &[(&str, &str)], value: f64) {
+    fn gauge(&mut self, name: &str, help: &str, labels: &[(&str, &str)], value: f64) {
         if value.is_finite() {
             let mut gauge = Gauge::default();
             gauge.set_value(value);
@@ -289,13 +302,13 @@ impl Families {
         }
     }
 
-    fn counter(&mut self, name: &'static str, help: &'static str, labels: &[(&str, &str)], value: f64) {
+    fn counter(&mut self, name: &str, help: &str, labels: &[(&str, &str)], value: f64) {
         let mut counter = Counter::default();
         counter.set_value(value);
         self.add(name, help, MetricType::COUNTER, labels).set_counter(counter);
     }
 
-    fn lateness(&mut self, name: &'static str, help: &'static str, labels: &[(&str, &str)], timing: &Timing) {
+    fn lateness(&mut self, name: &str, help: &str, labels: &[(&str, &str)], timing: &Timing) {
         let buckets = LATENESS_BOUNDS_NS.iter().map(|bound| *bound as f64 * 1e-9).zip(timing.histogram);
         let count = timing.histogram.iter().sum();
         self.histogram(name, help, labels, buckets, count, timing.lateness_sum_ns as f64 * 1e-9);
@@ -304,8 +317,8 @@ impl Families {
     /// `buckets` are upper bounds with their counts, not cumulative.
     fn histogram(
         &mut self,
-        name: &'static str,
-        help: &'static str,
+        name: &str,
+        help: &str,
         labels: &[(&str, &str)],
         buckets: impl Iterator<Item = (f64, u64)>,
         count: u64,
@@ -326,14 +339,8 @@ impl Families {
         self.add(name, help, MetricType::HISTOGRAM, labels).set_histogram(histogram);
     }
 
-    fn add(
-        &mut self,
-        name: &'static str,
-        help: &'static str,
-        kind: MetricType,
-        labels: &[(&str, &str)],
-    ) -> &mut Metric {
-        let family = self.0.entry(name).or_insert_with(|| {
+    fn add(&mut self, name: &str, help: &str, kind: MetricType, labels: &[(&str, &str)]) -> &mut Metric {
+        let family = self.0.entry(name.to_owned()).or_insert_with(|| {
             let mut family = MetricFamily::default();
             family.set_name(format!("kort_{name}"));
             family.set_help(help.to_owned());

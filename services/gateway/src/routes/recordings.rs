@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use axum::body::Body;
-use axum::extract::State;
+use axum::extract::{Extension, State};
 use axum::http::{StatusCode, header};
 use axum::response::IntoResponse;
 use serde::Deserialize;
@@ -14,14 +14,15 @@ use utoipa_axum::{router::OpenApiRouter, routes};
 use crate::App;
 use crate::extract::{OptionalJson, Path, Query};
 use crate::problem::{Kind, Problem};
-use crate::record::{FORMATS, RecordingInfo, is_name};
+use crate::record::{ENDING, RecordingInfo, is_name};
+use crate::token::Identity;
 
 /// Rows a second when the request names no rate.
 const RATE_DEFAULT_HZ: f64 = 100.0;
 const RATE_MAX_HZ: f64 = 5000.0;
 
 pub fn routes() -> OpenApiRouter<Arc<App>> {
-    OpenApiRouter::new().routes(routes!(list, start, stop)).routes(routes!(fetch))
+    OpenApiRouter::new().routes(routes!(list, start, stop)).routes(routes!(fetch, remove))
 }
 
 /// What to record. Every field may be left out, and so may the whole body.
@@ -69,19 +70,20 @@ async fn list(State(app): State<Arc<App>>) -> Result<axum::Json<Vec<RecordingInf
     blocking(move || recorder.list()).await.map(axum::Json)
 }
 
-/// Starts a recording; at most one runs.
+/// Starts a recording; several may run at once, each under its name.
 #[utoipa::path(post, path = "/v1/recordings", tag = "recordings", request_body = Option<RecordingRequest>,
     responses(
         (status = 201, description = "It runs", body = RecordingInfo),
         (status = 400, description = "`malformed-json`, `malformed-body`", body = Problem, content_type = "application/problem+json"),
         (status = 404, description = "`unknown-thruster`", body = Problem, content_type = "application/problem+json"),
-        (status = 409, description = "`recording-active`: one is running, or has this name", body = Problem, content_type = "application/problem+json"),
+        (status = 409, description = "`recording-active`: one of this name is there, or one of this thruster runs and no name was given", body = Problem, content_type = "application/problem+json"),
         (status = 413, description = "`body-too-large`", body = Problem, content_type = "application/problem+json"),
         (status = 415, description = "`unsupported-media-type`", body = Problem, content_type = "application/problem+json"),
         (status = 422, description = "`invalid-field`, `out-of-range`", body = Problem, content_type = "application/problem+json"),
         (status = 507, description = "`recording-failed`: the disk refuses", body = Problem, content_type = "application/problem+json")))]
 async fn start(
     State(app): State<Arc<App>>,
+    Extension(who): Extension<Identity>,
     OptionalJson(request): OptionalJson<RecordingRequest>,
 ) -> Result<(StatusCode, axum::Json<RecordingInfo>), Problem> {
     let request = request.unwrap_or_default();
@@ -97,24 +99,65 @@ async fn start(
         )
         .hint("the servo's own rate is the most that can be recorded"));
     }
-    let thruster = match request.thruster {
-        Some(id) => app.thruster(&id)?.id.clone(),
-        None => app.thrusters().first().map(|thruster| thruster.id.clone()).unwrap_or_default(),
-    };
+    let first = || app.thrusters().first().map(|thruster| thruster.id.clone()).unwrap_or_default();
+    let subject = app.subject(&request.thruster.unwrap_or_else(first))?;
     let recorder = Arc::clone(app.recorder());
-    let info = blocking(move || recorder.start(&thruster, request.name, rate_hz)).await??;
+    let info = blocking(move || recorder.start(subject, &who, request.name, rate_hz)).await??;
     Ok((StatusCode::CREATED, axum::Json(info)))
 }
 
-/// Stops the running recording.
+/// Stops the running recording; where several run, `DELETE /v1/recordings/{name}` says which.
 #[utoipa::path(delete, path = "/v1/recordings", tag = "recordings",
     responses(
         (status = 200, description = "It is complete", body = RecordingInfo),
-        (status = 409, description = "`no-recording`", body = Problem, content_type = "application/problem+json"),
+        (status = 403, description = "`role-too-low`: it belongs to another", body = Problem, content_type = "application/problem+json"),
+        (status = 409, description = "`no-recording`; `refused`: several run", body = Problem, content_type = "application/problem+json"),
         (status = 507, description = "`recording-failed`: the disk refused", body = Problem, content_type = "application/problem+json")))]
-async fn stop(State(app): State<Arc<App>>) -> Result<axum::Json<RecordingInfo>, Problem> {
+async fn stop(
+    State(app): State<Arc<App>>,
+    Extension(who): Extension<Identity>,
+) -> Result<axum::Json<RecordingInfo>, Problem> {
     let recorder = Arc::clone(app.recorder());
-    blocking(move || recorder.stop()).await?.map(axum::Json)
+    let stopped =
+        blocking(move || match recorder.names_running().as_slice() {
+            [] => Err(Problem::new(Kind::NoRecording, "no recording is running")
+                .hint("POST /v1/recordings starts one")),
+            [name] => recorder.stop(name, &who),
+            several => Err(Problem::new(Kind::Refused, format!("{} recordings are running", several.len()))
+                .hint("DELETE /v1/recordings/{name} stops one")
+                .allowed(several.iter().cloned())),
+        });
+    stopped.await?.map(axum::Json)
+}
+
+/// Stops a recording that runs; deletes one that is done. Its owner may, or an admin.
+#[utoipa::path(delete, path = "/v1/recordings/{name}", tag = "recordings",
+    params(("name" = String, Path, description = "Name of the recording", example = "t1-20260101T120000Z")),
+    responses(
+        (status = 200, description = "It ran, and is complete now", body = RecordingInfo),
+        (status = 204, description = "It was done, and is deleted now"),
+        (status = 400, description = "`malformed-path`", body = Problem, content_type = "application/problem+json"),
+        (status = 403, description = "`role-too-low`: it belongs to another", body = Problem, content_type = "application/problem+json"),
+        (status = 404, description = "`unknown-recording`", body = Problem, content_type = "application/problem+json"),
+        (status = 507, description = "`recording-failed`: the disk refused", body = Problem, content_type = "application/problem+json")))]
+async fn remove(
+    State(app): State<Arc<App>>,
+    Extension(who): Extension<Identity>,
+    Path(name): Path<String>,
+) -> Result<axum::response::Response, Problem> {
+    let recorder = Arc::clone(app.recorder());
+    let done = blocking(move || {
+        let name = name.strip_suffix(".mcap").unwrap_or(&name);
+        if recorder.names_running().iter().any(|running| running == name) {
+            recorder.stop(name, &who).map(Some)
+        } else {
+            recorder.delete(name, &who).map(|()| None)
+        }
+    });
+    Ok(match done.await?? {
+        Some(info) => axum::Json(info).into_response(),
+        None => StatusCode::NO_CONTENT.into_response(),
+    })
 }
 
 /// Fetches a recording's file: `NAME`, `NAME.csv` or `NAME.mcap`. A running one is sent as far as it is written.
@@ -131,30 +174,43 @@ async fn fetch(
     Path(name): Path<String>,
     Query(FormatQuery { format }): Query<FormatQuery>,
 ) -> Result<impl IntoResponse, Problem> {
-    let asked = format.map(|format| match format {
-        FileFormat::Csv => "csv",
-        FileFormat::Mcap => "mcap",
-    });
-    let (stem, ending) = FORMATS
-        .iter()
-        .find_map(|format| Some((name.strip_suffix(&format!(".{format}"))?, Some(*format))))
+    let (stem, ending) = ["csv", ENDING]
+        .into_iter()
+        .find_map(|ending| Some((name.strip_suffix(&format!(".{ending}"))?, Some(ending))))
         .unwrap_or((&name, None));
-    let format = asked.or(ending).unwrap_or("mcap");
-    let path = app.recorder().find(stem, format).or_else(|| app.recorder().find(&name, format)).ok_or_else(
-        || {
+    let csv = match format {
+        Some(format) => matches!(format, FileFormat::Csv),
+        None => ending == Some("csv"),
+    };
+    let found = app.recorder().find(stem).map(|path| (path, stem));
+    let (path, stem) =
+        found.or_else(|| Some((app.recorder().find(&name)?, name.as_str()))).ok_or_else(|| {
             Problem::new(Kind::UnknownRecording, format!("there is no recording {name:?}"))
                 .hint("GET /v1/recordings lists them")
-        },
-    )?;
-    let file = tokio::fs::File::open(&path)
-        .await
-        .map_err(|error| Problem::new(Kind::Internal, format!("{}: {error}", path.display())))?;
-    let kind = if format == "csv" { "text/csv; charset=utf-8" } else { "application/octet-stream" };
-    let save_as = format!("attachment; filename=\"{stem}.{format}\"");
-    Ok((
-        [(header::CONTENT_TYPE, kind.to_owned()), (header::CONTENT_DISPOSITION, save_as)],
-        Body::from_stream(ReaderStream::new(file)),
-    ))
+        })?;
+    let (kind, ending) =
+        if csv { ("text/csv; charset=utf-8", "csv") } else { ("application/octet-stream", ENDING) };
+    let save_as = format!("attachment; filename=\"{stem}.{ending}\"");
+    let body =
+        if csv { Body::from(blocking(move || as_csv(&path)).await??) } else { as_it_is(&path).await? };
+    Ok(([(header::CONTENT_TYPE, kind.to_owned()), (header::CONTENT_DISPOSITION, save_as)], body))
+}
+
+async fn as_it_is(path: &std::path::Path) -> Result<Body, Problem> {
+    let file = tokio::fs::File::open(path).await.map_err(|error| unreadable(path, error))?;
+    Ok(Body::from_stream(ReaderStream::new(file)))
+}
+
+/// Recordings are kept as MCAP; CSV is made of it when it is asked for.
+fn as_csv(path: &std::path::Path) -> Result<Vec<u8>, Problem> {
+    let recording = kort_recording::Recording::read(path, None).map_err(|error| unreadable(path, error))?;
+    let mut text = std::io::Cursor::new(Vec::new());
+    recording.write(kort_recording::Format::Csv, &mut text).map_err(|error| unreadable(path, error))?;
+    Ok(text.into_inner())
+}
+
+fn unreadable(path: &std::path::Path, error: impl std::fmt::Display) -> Problem {
+    Problem::new(Kind::Internal, format!("{}: {error}", path.display()))
 }
 
 async fn blocking<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Result<T, Problem> {

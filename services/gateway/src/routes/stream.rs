@@ -3,10 +3,10 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use axum::extract::{Extension, State};
 use axum::extract::ws::{
     CloseFrame, Message, Utf8Bytes, WebSocket, WebSocketUpgrade, rejection::WebSocketUpgradeRejection,
 };
+use axum::extract::{Extension, State};
 use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
 use tokio::time::MissedTickBehavior;
@@ -213,14 +213,19 @@ impl Session {
         if self.who.role < Role::Pilot {
             return Err(Problem::new(
                 Kind::RoleTooLow,
-                format!("token {:?} has the role {}; commanding needs pilot", self.who.name, self.who.role.name()),
+                format!(
+                    "token {:?} has the role {}; commanding needs pilot",
+                    self.who.name,
+                    self.who.role.name()
+                ),
             ));
         }
         if incoming.stop {
             let stopped = super::stop::stop_all(&self.app, &self.who.name).await?;
             return Ok(Some(text(serde_json::json!({ "stopped": stopped }).to_string().as_bytes())));
         }
-        let missing = |field| Problem::new(Kind::InvalidField, format!("missing field `{field}`")).hint(EXAMPLE);
+        let missing =
+            |field| Problem::new(Kind::InvalidField, format!("missing field `{field}`")).hint(EXAMPLE);
         let setpoint = incoming.setpoint.ok_or_else(|| missing("setpoint"))?;
         let lease = incoming.lease_id.ok_or_else(|| missing("lease_id"))?;
         self.thruster.command(Some(&lease), setpoint)?;

@@ -7,7 +7,6 @@ use kort_diagnose::constants::Constants;
 use kort_identify::identify::{Options, identify};
 
 use crate::failure::{Failure, Outcome, print, print_json, write_text};
-use crate::files::rig_text;
 use crate::fitted_rig::with_fitted;
 use crate::input::Input;
 use crate::{progress, render};
@@ -62,7 +61,7 @@ impl Fit {
         report.notes.splice(0..0, loaded.notes);
         if let Some(path) = &self.output {
             let (text, left_out) =
-                with_fitted(&rig_text(&self.input.rig)?, &report.parameters).map_err(Failure::failed)?;
+                with_fitted(&loaded.rig_text, &report.parameters).map_err(Failure::failed)?;
             write_text(path, &text)?;
             for why in left_out {
                 eprintln!("note: {}: {why}", path.display());

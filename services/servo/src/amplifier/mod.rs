@@ -1,5 +1,6 @@
 //! Drives. One drive, one file, behind one trait; the loop knows no hardware.
 
+mod lying;
 pub mod simulated;
 
 use kort_proto::config::{Config, ConfigError, Thruster};

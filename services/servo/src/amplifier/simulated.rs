@@ -13,6 +13,7 @@ use kort_thruster::plant::{Plant, Tick};
 use kort_thruster::rig::{AmplifierKind, Rig, Sensors};
 use serde::Deserialize;
 
+use super::lying::{Lying, SensorFault};
 use super::{Amplifier, AmplifierFault};
 
 /// Most ticks caught up at once after a stall; a longer one loses simulated time.
@@ -26,11 +27,20 @@ struct Simulation {
     seed: u64,
     ambient_m_s: f64,
     effects: Vec<EffectKeys>,
+    sensor_fault: Option<SensorFault>,
+    sensor_fault_after_s: f64,
 }
 
 impl Default for Simulation {
     fn default() -> Self {
-        Self { model: "model2".into(), seed: 1, ambient_m_s: 0.0, effects: Vec::new() }
+        Self {
+            model: "model2".into(),
+            seed: 1,
+            ambient_m_s: 0.0,
+            effects: Vec::new(),
+            sensor_fault: None,
+            sensor_fault_after_s: 0.0,
+        }
     }
 }
 
@@ -51,6 +61,7 @@ pub struct Simulated {
     ambient_m_s: f64,
     sensors: Sensors,
     measuring: Measuring,
+    lying: Option<Lying>,
 }
 
 impl Simulated {
@@ -74,6 +85,12 @@ impl Simulated {
         if keys.ambient_m_s.is_nan() || keys.ambient_m_s.abs() > 5.0 {
             return Err(fail("ambient_m_s", format!("{} is outside -5 to 5", keys.ambient_m_s)));
         }
+        if !(0.0..=1e6).contains(&keys.sensor_fault_after_s) {
+            return Err(fail(
+                "sensor_fault_after_s",
+                format!("{} is outside 0 to 1e6", keys.sensor_fault_after_s),
+            ));
+        }
         let tick_s = thruster.servo_period_ns() as f64 * 1e-9;
         let parameters = Parameters::stated(rig);
         let scale = kort_scenario::scale(rig, &parameters, full_drive(rig, &parameters), tick_s, 60.0);
@@ -95,6 +112,7 @@ impl Simulated {
             ambient_m_s: keys.ambient_m_s,
             sensors: rig.sensors,
             measuring: Measuring::new(&rig.sensors, scale, if keys.seed == 0 { 0.0 } else { 1.0 }, keys.seed),
+            lying: keys.sensor_fault.map(|fault| Lying::new(fault, keys.sensor_fault_after_s)),
         })
     }
 }
@@ -134,6 +152,9 @@ impl Amplifier for Simulated {
         }
         if self.sensors.ambient_flow_recorded {
             into.ambient_m_s = self.ambient_m_s;
+        }
+        if let Some(lying) = &mut self.lying {
+            lying.distort(self.time_s, into);
         }
         Ok(())
     }

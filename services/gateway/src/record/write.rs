@@ -1,0 +1,280 @@
+//! One recording's thread: rows, states and events to its file, and when it ends by itself.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{self, BufWriter};
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant, SystemTime};
+
+use axum::body::Bytes;
+use kort_proto::messages::Telemetry;
+use kort_proto::signals::{SIGNALS, Signals};
+use kort_recording::LiveMcap;
+
+use super::{ENDING, Recorder, RecordingInfo, RecordingState, Subject, write_info};
+use crate::settings::RecordingLimits;
+use crate::thruster::lock;
+
+/// What a kill may cost.
+const FLUSH_EVERY: Duration = Duration::from_millis(500);
+/// States beside the rows: the signals are in the rows, here is what changes slowly.
+const STATE_EVERY_S: f64 = 0.1;
+/// The law's parameters beside the states.
+const LAW_EVERY_S: f64 = 5.0;
+
+/// Something on its way to the disk.
+#[derive(Debug)]
+pub enum Item {
+    /// A sample of the servo.
+    Sample(Box<(u64, Signals)>),
+    /// An event.
+    Event {
+        /// CLOCK_MONOTONIC, ns.
+        at_ns: u64,
+        /// JSON.
+        json: Bytes,
+    },
+}
+
+impl Item {
+    /// A sample of the servo.
+    pub fn sample(telemetry: &Telemetry) -> Item {
+        Item::Sample(Box::new((telemetry.time_ns, telemetry.signals)))
+    }
+}
+
+type Mcap = LiveMcap<BufWriter<File>>;
+
+/// A recording under way.
+pub struct Job {
+    folder: PathBuf,
+    subject: Subject,
+    limits: RecordingLimits,
+    info: Arc<Mutex<RecordingInfo>>,
+    began: SystemTime,
+    file: Mcap,
+    part: u32,
+    base: String,
+    first_ns: Option<u64>,
+    due_ns: u64,
+    state_s: f64,
+    law_s: f64,
+    row: Signals,
+}
+
+/// Why a recording ends by itself.
+enum End {
+    /// A limit of its own: the file is whole.
+    Limit(String),
+    /// The disk refuses.
+    Disk(io::Error),
+}
+
+impl From<io::Error> for End {
+    fn from(error: io::Error) -> End {
+        End::Disk(error)
+    }
+}
+
+impl Job {
+    /// Creates the file.
+    pub fn begin(
+        folder: &Path,
+        subject: Subject,
+        limits: RecordingLimits,
+        info: Arc<Mutex<RecordingInfo>>,
+        began: SystemTime,
+    ) -> io::Result<Job> {
+        let now = lock(&info).clone();
+        guard_space(folder, &limits).map_err(|end| match end {
+            End::Limit(words) => io::Error::other(words),
+            End::Disk(error) => error,
+        })?;
+        let file = create(folder, &now, &subject, began)?;
+        Ok(Job {
+            folder: folder.to_owned(),
+            subject,
+            limits,
+            base: now.name,
+            info,
+            began,
+            file,
+            part: 1,
+            first_ns: None,
+            due_ns: 0,
+            state_s: f64::NEG_INFINITY,
+            law_s: f64::NEG_INFINITY,
+            row: Signals::UNKNOWN,
+        })
+    }
+
+    /// Writes until the recorder lets go of the other end, a limit is reached or the disk refuses.
+    pub fn run(mut self, recorder: &Recorder, inbox: &Receiver<Item>) {
+        let ended = self.write(recorder, inbox);
+        let finished = self.file.finish();
+        let info = {
+            let mut info = lock(&self.info);
+            (info.state, info.cause) = match (ended, finished) {
+                (Ok(()), Ok(())) => (RecordingState::Complete, None),
+                (Err(End::Limit(why)), Ok(())) => (RecordingState::Complete, Some(why)),
+                (Err(End::Disk(error)), _) | (_, Err(error)) => {
+                    (RecordingState::Failed, Some(error.to_string()))
+                }
+            };
+            info.clone()
+        };
+        recorder.note_info(&info);
+        if info.cause.is_some() {
+            recorder.ended(&info);
+        }
+    }
+
+    fn write(&mut self, recorder: &Recorder, inbox: &Receiver<Item>) -> Result<(), End> {
+        let mut flushed = Instant::now();
+        let period_ns = (1e9 / lock(&self.info).rate_hz) as u64;
+        loop {
+            match inbox.recv_timeout(FLUSH_EVERY) {
+                Ok(Item::Sample(sample)) => self.sample(sample.0, &sample.1, period_ns)?,
+                Ok(Item::Event { at_ns, json }) => self.event(at_ns, &json)?,
+                Err(RecvTimeoutError::Timeout) => (),
+                Err(RecvTimeoutError::Disconnected) => return Ok(()),
+            }
+            if flushed.elapsed() >= FLUSH_EVERY {
+                flushed = Instant::now();
+                self.file.flush()?;
+                recorder.note_info(&lock(&self.info).clone());
+                guard_space(&self.folder, &self.limits)?;
+                self.rotate(recorder)?;
+            }
+        }
+    }
+
+    fn sample(&mut self, time_ns: u64, signals: &Signals, period_ns: u64) -> Result<(), End> {
+        // A sensor slower than the servo shows a value now and then: none is lost between two rows.
+        for signal in SIGNALS {
+            let value = (signal.get)(signals);
+            if !value.is_nan() {
+                (signal.set)(&mut self.row, value);
+            }
+        }
+        let first_ns = *self.first_ns.get_or_insert(time_ns);
+        // The servo's period need not divide ours: a row may come a little early, and none is made up for ticks
+        // that were skipped.
+        if time_ns + period_ns / 20 < self.due_ns {
+            return Ok(());
+        }
+        self.due_ns = (self.due_ns + period_ns).max(time_ns + period_ns / 2);
+        let time_s = time_ns.saturating_sub(first_ns) as f64 * 1e-9;
+        let values: Vec<f64> = SIGNALS.iter().map(|signal| (signal.get)(&self.row)).collect();
+        self.file.row(time_s, &values)?;
+        self.row = Signals::UNKNOWN;
+        self.beside(time_s)?;
+        let mut info = lock(&self.info);
+        info.rows += 1;
+        info.duration_s = time_s;
+        if time_s > self.limits.time_max_s {
+            let most = self.limits.time_max_s;
+            return Err(End::Limit(format!("gateway.recording.time_max_s = {most} is reached")));
+        }
+        Ok(())
+    }
+
+    /// Setpoint, estimates with their doubt, law, limits, faults: what the state shows.
+    fn beside(&mut self, time_s: f64) -> io::Result<()> {
+        if time_s - self.state_s >= STATE_EVERY_S {
+            self.state_s = time_s;
+            self.file.state(time_s, &self.subject.thruster.state_json())?;
+        }
+        if time_s - self.law_s >= LAW_EVERY_S
+            && let Ok(law) = self.subject.thruster.controller()
+        {
+            self.law_s = time_s;
+            self.file.state(time_s, &serde_json::to_vec(&law).unwrap_or_default())?;
+        }
+        Ok(())
+    }
+
+    fn event(&mut self, at_ns: u64, json: &[u8]) -> io::Result<()> {
+        let time_s = self.first_ns.map_or(0.0, |first| at_ns.saturating_sub(first) as f64 * 1e-9);
+        self.file.event(time_s, json)
+    }
+
+    /// A file that grew too large is followed by another.
+    fn rotate(&mut self, recorder: &Recorder) -> Result<(), End> {
+        let now = lock(&self.info).clone();
+        let path = self.folder.join(format!("{}.{ENDING}", now.name));
+        if std::fs::metadata(&path)?.len() < self.limits.file_bytes_max {
+            return Ok(());
+        }
+        if self.part >= self.limits.files_max {
+            let most = self.limits.files_max;
+            return Err(End::Limit(format!("gateway.recording.files_max = {most} is reached")));
+        }
+        self.part += 1;
+        self.began = SystemTime::now();
+        let next = RecordingInfo {
+            name: format!("{}-{}", self.base, self.part),
+            started: humantime::format_rfc3339_millis(self.began).to_string(),
+            rows: 0,
+            duration_s: 0.0,
+            ..now.clone()
+        };
+        let file = create(&self.folder, &next, &self.subject, self.began)?;
+        std::mem::replace(&mut self.file, file).finish()?;
+        recorder.note_info(&RecordingInfo { state: RecordingState::Complete, ..now });
+        *lock(&self.info) = next;
+        (self.first_ns, self.state_s, self.law_s) = (None, f64::NEG_INFINITY, f64::NEG_INFINITY);
+        Ok(())
+    }
+}
+
+fn create(folder: &Path, info: &RecordingInfo, subject: &Subject, began: SystemTime) -> io::Result<Mcap> {
+    let columns: Vec<&str> = SIGNALS.iter().map(|signal| signal.name).collect();
+    let origin_ns = began.duration_since(SystemTime::UNIX_EPOCH).map_or(0, |d| d.as_nanos() as u64);
+    let (rig_file, rig) = &subject.rig;
+    let about = BTreeMap::from(
+        [
+            ("kort_version", env!("CARGO_PKG_VERSION")),
+            ("messages_version", &kort_proto::names::MESSAGES_VERSION.to_string()),
+            ("thruster", &info.thruster),
+            ("recording", &info.name),
+            ("owner", &info.owner),
+            ("started", &info.started),
+            ("rate_hz", &info.rate_hz.to_string()),
+            ("rig", rig),
+            ("rig_file", rig_file),
+            ("rig_revision", &revision(rig)),
+        ]
+        .map(|(name, value)| (name.to_owned(), value.to_owned())),
+    );
+    let path = folder.join(format!("{}.{ENDING}", info.name));
+    let mut file =
+        Mcap::live(&info.thruster, &columns, about, origin_ns, BufWriter::new(File::create_new(path)?))?;
+    file.flush()?;
+    write_info(folder, info)?;
+    Ok(file)
+}
+
+/// A rig description is told apart by its content.
+fn revision(rig: &str) -> String {
+    use sha2::{Digest, Sha256};
+    Sha256::digest(rig.as_bytes()).iter().take(8).map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// A recording leaves some space to others.
+fn guard_space(folder: &Path, limits: &RecordingLimits) -> Result<(), End> {
+    let Ok(disk) = rustix::fs::statvfs(folder) else { return Ok(()) };
+    let free = disk.f_bavail.saturating_mul(disk.f_frsize);
+    if free < limits.free_bytes_min {
+        return Err(End::Disk(io::Error::new(
+            io::ErrorKind::StorageFull,
+            format!(
+                "no space: {free} bytes are free, gateway.recording.free_bytes_min = {}",
+                limits.free_bytes_min
+            ),
+        )));
+    }
+    Ok(())
+}

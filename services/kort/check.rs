@@ -1,0 +1,146 @@
+//! `kort check`: reads configurations as the services would, and says everything that is wrong, at once.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Args;
+use kort_proto::config::{Config, DEFAULT_PATH};
+use serde::Serialize;
+
+use crate::{DONE, USAGE};
+
+/// Which files.
+#[derive(Args)]
+pub struct Check {
+    /// Deployments, rigs, scenarios, controllers and column maps [default: config/kort.toml, else the one built in]
+    #[arg(value_name = "CONFIG")]
+    files: Vec<PathBuf>,
+    /// One JSON document on stdout
+    #[arg(long)]
+    json: bool,
+}
+
+/// Something that is wrong.
+#[derive(Debug, PartialEq, Serialize)]
+struct Problem {
+    file: String,
+    key: Option<String>,
+    found: Option<String>,
+    allowed: String,
+    hint: Option<String>,
+}
+
+#[derive(Serialize)]
+struct Report<'a> {
+    schema: &'static str,
+    problems: &'a [Problem],
+}
+
+/// Checks and prints; exit code 2 if anything is wrong.
+pub fn run(args: &Check) -> ExitCode {
+    let mut problems = Vec::new();
+    if args.files.is_empty() {
+        let default = Path::new(DEFAULT_PATH);
+        deployment(default.is_file().then_some(default), &mut problems);
+    }
+    for file in &args.files {
+        match std::fs::read_to_string(file) {
+            Ok(text) => one(file, &text, &mut problems),
+            Err(error) => {
+                problems.push(problem(&file.display().to_string(), &format!("cannot be read: {error}")))
+            }
+        }
+    }
+    if args.json {
+        let report = Report { schema: "kort.check/1", problems: &problems };
+        println!("{}", serde_json::to_string_pretty(&report).unwrap_or_default());
+    } else {
+        for problem in &problems {
+            println!("{problem}");
+        }
+        if problems.is_empty() {
+            println!("nothing is wrong");
+        }
+    }
+    ExitCode::from(if problems.is_empty() { DONE } else { USAGE })
+}
+
+fn one(file: &Path, text: &str, problems: &mut Vec<Problem>) {
+    let name = file.display().to_string();
+    let table: toml::Table = match text.parse() {
+        Ok(table) => table,
+        Err(error) => return problems.push(problem(&name, &error.to_string())),
+    };
+    if ["thrusters", "gateway", "transport"].iter().any(|key| table.contains_key(*key)) {
+        deployment(Some(file), problems);
+    } else if let Err(words) = kort_lab::check::Kind::of(&table).check(text, file) {
+        problems.push(problem(&name, &words));
+    }
+}
+
+/// Everything that servo, controller and gateway would refuse.
+fn deployment(file: Option<&Path>, problems: &mut Vec<Problem>) {
+    let name = file.map_or_else(|| "built-in configuration".to_owned(), |file| file.display().to_string());
+    let config = match Config::load(file) {
+        Ok(config) => config,
+        Err(error) => return problems.push(problem(&name, &error.to_string())),
+    };
+    let mut said = Vec::new();
+    for id in config.thrusters.keys() {
+        said.extend(kort_servo::check(&config, id).err().map(|e| e.to_string()));
+        said.extend(kort_controller::check(&config, id).err().map(|e| e.to_string()));
+    }
+    said.extend(kort_gateway::check_config(&config).err().map(|e| e.to_string()));
+    said.dedup();
+    for words in said {
+        let found = problem(&name, &words);
+        if !problems.contains(&found) {
+            problems.push(found);
+        }
+    }
+}
+
+/// Takes a message apart: `file: `key` = value is …\nhint: …`.
+fn problem(file: &str, message: &str) -> Problem {
+    let (what, hint) = match message.split_once("hint:") {
+        Some((what, hint)) => (what.trim(), Some(hint.trim().to_owned())),
+        None => (message.trim(), None),
+    };
+    let (file, what) = match what.split_once(": ") {
+        Some((named, rest)) if named.ends_with(".toml") => (named, rest),
+        _ => (file, what),
+    };
+    let key = what.split('`').nth(1).map(str::to_owned);
+    let found = what.split_once(" = ").and_then(|(_, rest)| {
+        rest.split(" is ").next()?.split([';', ':', '\n']).next().map(|found| found.trim().to_owned())
+    });
+    Problem { file: file.to_owned(), key, found, allowed: what.to_owned(), hint }
+}
+
+impl std::fmt::Display for Problem {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}: {}", self.file, self.allowed)?;
+        match &self.hint {
+            Some(hint) => write!(f, "\nhint: {hint}"),
+            None => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_message_is_taken_apart() {
+        let found = problem(
+            "kort.toml",
+            "my.toml: `thrusters.t1.limits.current_a` = 1000000 is outside 0.001 to 9\nhint: at most 9",
+        );
+        assert_eq!(found.file, "my.toml");
+        assert_eq!(found.key.as_deref(), Some("thrusters.t1.limits.current_a"));
+        assert_eq!(found.found.as_deref(), Some("1000000"));
+        assert!(found.allowed.contains("0.001 to 9"));
+        assert_eq!(found.hint.as_deref(), Some("at most 9"));
+    }
+}

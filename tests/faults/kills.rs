@@ -1,0 +1,121 @@
+//! Processes killed and stopped at random instants, and messages of another version.
+
+use std::time::{Duration, Instant};
+
+use kort_proto::faults::Fault;
+use kort_proto::transport::monotonic_ns;
+
+use rustix::process::{Pid, Signal, kill_process};
+
+use crate::common::{PERIOD_NS, Site, Stack, at_zero, run, wait};
+use crate::table::Table;
+
+const LEASE_MS: u64 = 60_000;
+/// The bounds of docs/operations.md; a sample of the servo comes every 2 ms.
+const CONTROLLER: Duration = Duration::from_nanos(5 * PERIOD_NS);
+const GATEWAY: Duration = Duration::from_millis(500);
+/// At once, or after many quick ends 2 s later.
+const SUCCESSOR: Duration = Duration::from_millis(3000);
+/// A process is silent for 2 s, is ended, and its successor starts.
+const REPLACED: Duration = Duration::from_millis(3500);
+
+/// At this instant: starting a program that kills takes longer than some of the bounds.
+fn kill(process: u32, signal: Signal) {
+    let pid = i32::try_from(process).ok().and_then(Pid::from_raw).expect("a process");
+    kill_process(pid, signal).expect("it is there");
+}
+
+fn kills() -> usize {
+    std::env::var("KORT_FAULT_KILLS").ok().and_then(|n| n.parse().ok()).unwrap_or(12)
+}
+
+/// A number that looks random and is the same in every run.
+fn scatter(n: usize, below: u64) -> u64 {
+    (n as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(31) % below
+}
+
+/// Kill -9 under way, at instants spread over a controller period and more.
+pub fn killed(table: &mut Table) {
+    let mut stack = Stack::start();
+    for (role, bound) in [("servo", SUCCESSOR), ("controller", CONTROLLER), ("gateway", GATEWAY)] {
+        let mut measured = Vec::new();
+        for n in 0..kills() {
+            stack.thrust(30.0, LEASE_MS);
+            std::thread::sleep(Duration::from_micros(scatter(n, 60_000)));
+            let mut watch = stack.watch();
+            let session = watch.next().header.session;
+            let victim = stack.process_of(role);
+            let killed_ns = monotonic_ns();
+            kill(victim, Signal::KILL);
+            let zero = match role {
+                "servo" => watch.until("a successor", |t| t.header.session != session),
+                _ => watch.until("zero", at_zero),
+            };
+            assert!(at_zero(&zero), "{role}: {zero:?}");
+            measured.push(Duration::from_nanos(zero.time_ns.saturating_sub(killed_ns)));
+            wait("the fault to be shown", || {
+                let faults = stack.state()?["faults"].as_array()?.len();
+                (faults > 0).then_some(())
+            });
+            wait("a successor", || stack.process(role).filter(|pid| *pid != victim));
+            stack.wait_until_up();
+        }
+        let what = match role {
+            "servo" => "successor at zero, fault latched",
+            "controller" => "zero torque, fault latched",
+            _ => "ramped to zero, fault latched",
+        };
+        table.row(format!("{role} killed (-9)"), what, bound, &measured);
+    }
+}
+
+/// A stopped process is ended and replaced; the thrust ends long before.
+pub fn stopped(table: &mut Table) {
+    let mut stack = Stack::start();
+    std::thread::sleep(Duration::from_secs(6)); // a start is given that long to be heard
+    for (role, bound) in [("controller", CONTROLLER), ("gateway", GATEWAY), ("servo", SUCCESSOR)] {
+        stack.thrust(30.0, LEASE_MS);
+        let mut watch = stack.watch();
+        let session = watch.next().header.session;
+        let victim = stack.process_of(role);
+        let (stopped, stopped_ns) = (Instant::now(), monotonic_ns());
+        kill(victim, Signal::STOP);
+        if role != "servo" {
+            let zero = watch.until("zero", at_zero);
+            let took = Duration::from_nanos(zero.time_ns.saturating_sub(stopped_ns));
+            table.row(format!("{role} stopped (SIGSTOP)"), "zero, fault latched", bound, &[took]);
+        }
+        wait("a successor", || stack.process(role).filter(|pid| *pid != victim));
+        table.row(format!("{role} stopped (SIGSTOP)"), "ended and replaced", REPLACED, &[stopped.elapsed()]);
+        if role == "servo" {
+            let fresh = watch.until("a successor", |t| t.header.session != session);
+            assert!(at_zero(&fresh) && fresh.faults & Fault::ServoRestarted.bit() != 0, "{fresh:?}");
+        }
+        stack.wait_until_up();
+        std::thread::sleep(Duration::from_secs(6));
+    }
+}
+
+/// A peer of another version finds no service of its name: it is refused, and nothing of the others changes.
+pub fn foreign_version(table: &mut Table) {
+    let mut stack = Stack::start();
+    stack.thrust(30.0, LEASE_MS);
+    let began = Instant::now();
+    let deployment = stack.site.deployment();
+    let generation = deployment.generation().expect("a generation");
+    let name = kort_proto::names::Stream::Command.service("t1", generation);
+    let version = kort_proto::names::MESSAGES_VERSION;
+    assert!(name.starts_with(&format!("kort/{version}/")), "the name carries the version: {name}");
+    // A second deployment cannot get in the way either: the lock is held.
+    let second = run(&mut stack.site.command("servo"));
+    assert_eq!(second.status.code(), Some(1));
+    let t = stack.watch().next();
+    assert!(t.armed == 1 && t.faults == 0, "{t:?}");
+    table.row(
+        "a rival servo, another message version",
+        "refused",
+        Duration::from_secs(15),
+        &[began.elapsed()],
+    );
+    drop(Site::new());
+}
