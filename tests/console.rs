@@ -194,10 +194,14 @@ fn an_operator_takes_command_thrusts_records_and_stops() {
     page.click("switch");
     page.until("state.controller === 'static_map'");
     page.eval("document.getElementById('slider').value = 40; document.getElementById('slider').dispatchEvent(new Event('input'))");
+    std::thread::sleep(Duration::from_millis(300));
+    assert_eq!(page.eval("state.setpoint.thrust_n"), json!(60.0), "the slider proposes, it does not command");
+    page.click("send");
     page.until("state.setpoint.thrust_n === 40");
     page.picture(concat!(env!("CARGO_MANIFEST_DIR"), "/target/console.png"));
 
     page.click("stop");
+    page.until(&text_is("stop-text", "Stopped: confirmed"));
     page.until("!state.armed && document.getElementById('armed').textContent === 'disarmed'");
     page.click("record");
     page.until("document.querySelectorAll('#recordings a').length === 2");
@@ -207,6 +211,8 @@ fn an_operator_takes_command_thrusts_records_and_stops() {
     page.until(&text_is("log", "outside its allowed range"));
     page.click("give");
     page.until(&text_is("lease-text", "Nobody has the lease"));
+    page.until(&text_is("events", "stopped every thruster"));
+    page.until("document.getElementById('plot-thrust').getAttribute('aria-label').includes('thrust in N: ')");
 
     // A refused request is told in the console's log; the browser notes it as an error of its own.
     page.errors.retain(|error| !error.contains("status of 422"));
@@ -215,4 +221,23 @@ fn an_operator_takes_command_thrusts_records_and_stops() {
         url.starts_with(&home) || url.starts_with(&home.replace("http", "ws")) || url.starts_with("data:")
     };
     assert!(page.asked.len() > 5 && page.asked.iter().all(ours), "{:?}", page.asked);
+}
+
+/// What is old is not shown as now, nothing is commanded by it, and a stop that nobody confirms says so.
+#[test]
+fn a_frozen_gateway_is_seen_within_a_second() {
+    let mut stack = Stack::start();
+    let Some(mut page) = Browser::open(&format!("http://127.0.0.1:{}/", stack.site.port)) else { return };
+    page.until("document.readyState === 'complete' && typeof state !== 'undefined'");
+    page.until(&text_is("link", "live"));
+    stack.thrust(40.0, 60_000);
+    page.until("state.armed");
+    let gateway = stack.process_of("gateway");
+    common::kill(gateway, "STOP");
+    page.until("document.body.classList.contains('stale')");
+    page.until(&text_is("link", "s old"));
+    assert_eq!(page.eval("document.getElementById('send').disabled"), json!(true));
+    assert_eq!(page.eval("document.getElementById('stop').disabled"), json!(false));
+    page.eval("document.getElementById('stop').click()");
+    page.until(&text_is("stop-text", "NOT CONFIRMED"));
 }
