@@ -42,9 +42,7 @@ impl Kind {
         match self {
             Kind::Rig => Rig::from_toml(text).map(drop).map_err(|e| e.to_string()),
             Kind::Soak => kort_soak::Scenario::from_toml(text).map(drop),
-            Kind::Scenario => {
-                kort_thruster::scenario::Scenario::from_toml(text).map(drop).map_err(|e| e.to_string())
-            }
+            Kind::Scenario => kort_scenario::Scenario::from_toml(text).map(drop).map_err(|e| e.to_string()),
             Kind::Columns => {
                 let name = path.file_stem().unwrap_or_default().to_string_lossy();
                 ColumnMap::from_toml(&name, text).map(drop).map_err(|e| e.to_string())
