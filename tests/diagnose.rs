@@ -6,7 +6,6 @@ mod lab;
 
 use std::sync::OnceLock;
 
-use kort_truth::{CaseKind, Selection};
 use lab::{STAND, Table, clean, dry_rig, effect, json, kort, path, random_levels, simulate, stderr, swirl};
 use serde_json::Value;
 
@@ -19,14 +18,6 @@ fn diagnose(recordings: &[&str], rig: &str, more: &[&str]) -> Value {
     let report = json(&kort(&args));
     lab::check_diagnosis(&report);
     report
-}
-
-/// Diagnoses a case of the truth simulation.
-fn blind(kind: CaseKind, seed: u64, selection: &Selection) -> Value {
-    let case = kort_truth::case(kind, seed, selection);
-    let recording = lab::write(&format!("blind-{seed}.csv"), &case.recording_csv);
-    let rig = lab::write(&format!("blind-{seed}.toml"), &case.rig_toml);
-    diagnose(&[&recording], &rig, &[])
 }
 
 /// The effects found, best first.
@@ -184,25 +175,6 @@ fn what_one_excitation_cannot_part_is_ambiguous_and_the_next_one_runs() {
     assert!(Table::read(&out).rows.len() > 1000);
 }
 
-/// Bubbles at the blades change by the second; a model of density alone, or of inflow, would bend to them.
-#[test]
-fn bubbles_that_come_and_go_are_told_from_an_unsteady_inflow() {
-    let selection =
-        Selection { effect: Some("air_ingestion".into()), strength: Some(0.03), ..Selection::default() };
-    let report = blind(CaseKind::Single, 877, &selection);
-    assert_eq!(report["verdict"], "explained", "{}", report["summary"]);
-    assert_eq!(found(&report), ["air_ingestion"]);
-}
-
-/// Noise learned from a fit that has the lag but not the friction forgives just the friction.
-/// A lightly damped stand rings in step with the fit only if the fit starts near its frequency.
-/// The supply's noise, tried as a driver of what is left, is no flow across the axis.
-/// Where the winding takes most of the supply a limit lies far above the back-EMF; a supply that sags
-/// into it gives the same current.
-/// Limits bind at the top of a recording only: a fit that starts where they do not bind has nowhere to go.
-/// The first command comes while the shaft still stands; a current that is taken to flow at once would look
-/// like friction at low speed.
-/// Ventilation sets in with a memory of its own; what is left of it must not bring its relatives in before it.
 #[test]
 fn the_static_models_leave_out_the_axial_flow_and_what_it_hides() {
     for model in &["model0", "model1"] {

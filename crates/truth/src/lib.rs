@@ -1,28 +1,43 @@
-//! A truth simulation for the blind proof. Shares no equation code with the models that kort fits;
-//! only `kort prove` and tests may use it.
+//! A truth for the blind proof. It shares no equation code with the models that kort fits; only
+//! `kort prove` and tests may use it.
 //!
-//! [`case`] builds a recording, the rig file stated for it, and the sealed answer. The thruster is
-//! either one blade section at 0.7 r or several along the blade ([`thruster`]), integrated by Heun's
-//! method at 0.2 ms ([`dynamics`]), seen through a sensor chain of its own ([`chain`], [`stand`]).
-//! Each hidden effect has one strength, set so that it moves its best channel by a wanted share of
-//! full scale ([`calibrate`]).
+//! [`case`] builds recordings, the rig file stated for them, and the sealed answer:
 //!
-//! Seeds 1 to 999 are for tuning; reports use seeds from [`REPORTING_SEED`] on.
+//! 1. a machine is drawn ([`machines`]): a thruster of some size, or a dry shaft;
+//! 2. an excitation ([`excitation`]), perhaps inside a closed loop ([`controller`]);
+//! 3. what is hidden: effects, each from a family of forms ([`families`]), or terms of a random
+//!    grammar that no catalogue holds ([`grammar`]);
+//! 4. each is given a size as a share of full scale ([`sizing`]);
+//! 5. the machine runs ([`run`]) with noise of several kinds ([`noises`]) and is logged ([`log`]);
+//! 6. the rig is stated, wrong by a few percent to a factor of two, with honest tolerances ([`statement`]).
+//!
+//! The same kind, seed and selection give the same bytes.
 
-pub mod calibrate;
+mod answer;
+pub mod blades;
 mod case;
-pub mod chain;
-pub mod dynamics;
-pub mod effects;
-pub mod hidden;
-pub mod noise;
-pub mod programme;
+mod confounded;
+pub mod controller;
+pub mod dice;
+pub mod excitation;
+pub mod families;
+pub mod grammar;
+pub mod log;
+pub mod machine;
+pub mod machines;
+mod memory;
+pub mod noises;
+pub mod physics;
+mod plan;
 mod refit;
-pub mod rig;
-pub mod stand;
-pub mod thruster;
+pub mod run;
+pub mod sensors;
+pub mod sizing;
+pub mod statement;
 
-pub use case::{Answer, Case, CaseKind, HiddenEffect, Selection, case};
+pub use answer::{Answer, CaseKind, HiddenEffect, Nuisance};
+pub use case::{Case, case};
+pub use plan::{MachineKind, Selection};
 
-/// First seed of reported runs; tuning never looks at these.
+/// Seeds below this are for tuning; what is reported uses seeds from here on.
 pub const REPORTING_SEED: u64 = 1_000_000;

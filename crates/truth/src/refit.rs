@@ -4,7 +4,7 @@
 /// deviation `precision` (per relative change, zero for none) around `values`.
 pub fn gauss_newton_step(
     values: Vec<f64>,
-    residual: &mut dyn FnMut(&[f64]) -> Vec<f64>,
+    residual: &dyn Fn(&[f64]) -> Vec<f64>,
     precision: &[f64],
 ) -> Vec<f64> {
     let base = residual(&values);
@@ -98,7 +98,7 @@ mod tests {
 
     #[test]
     fn a_step_solves_a_linear_problem() {
-        let solved = gauss_newton_step(vec![1.0, 2.0], &mut |v| vec![v[0] - 3.0, v[1] - 5.0], &[0.0, 0.0]);
+        let solved = gauss_newton_step(vec![1.0, 2.0], &|v| vec![v[0] - 3.0, v[1] - 5.0], &[0.0, 0.0]);
         assert!((solved[0] - 3.0).abs() < 1e-6 && (solved[1] - 5.0).abs() < 1e-6, "{solved:?}");
     }
 }

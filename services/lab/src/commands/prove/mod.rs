@@ -1,43 +1,69 @@
-//! `kort prove`: the blind proof of `kort diagnose`.
-//!
-//! Cases come from the truth simulation; `diagnose` sees the recording and the rig file alone; only
-//! then are the answers opened and counted.
+//! `kort prove`: the proof of `kort diagnose`, on cases of a truth simulation and on recordings that
+//! others measured. The engine is `kort_proof`; here files are read, seeds entered into the ledger,
+//! and results written.
 
-mod cases;
+mod calibrate;
+mod diagnosis;
+mod ledger;
+mod measured;
 mod page;
-mod score;
-mod tally;
+mod stamp;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use clap::Args;
-use kort_truth::{CaseKind, REPORTING_SEED};
+use clap::{Args, ValueEnum};
+use kort_proof::blind;
+use kort_proof::tally::Proof;
+use kort_truth::{CaseKind, MachineKind, Selection, families};
 use rayon::prelude::*;
 
 use crate::failure::{Failure, Outcome, print, print_json, write_text};
 use crate::progress;
 
 const EXAMPLE: &str = "\
-Example: kort prove --quick --html proof.html
-         kort prove --markdown docs/proof.md          (340 cases; the reported run)
-         kort prove --write-cases /tmp/cases --cases 20   (cases to look at; nothing is diagnosed)
+Example: kort prove --quick --html proof.html                  (seeds nobody has looked at; enters them into the ledger)
+         kort prove --markdown docs/proof.md                   (360 cases; the reported run)
+         kort prove --tuning --seed 1 --cases 40 --kind pair   (seeds below 1000000: never reported)
+         kort prove --tuning --seed 1 --family cavitation,ventilation --kind single --cases 12
+         kort prove --tuning --seed 1 --write-cases /tmp/cases --cases 20   (cases to look at; nothing is diagnosed)
+         kort prove --measured DIR --concealed --markdown docs/measured-recordings.md
+         kort prove --tuning --seed 1 --calibrate records.jsonl --folds 5 --fold-by effect
 
-Seeds 1 to 999 were used for tuning; a proof that counts uses others (the default).";
+A reported proof fails (exit code 1) on seeds that were used before: docs/proof-ledger.toml holds them.
+DIR has a folder for each set, with recordings, rig.toml and a key, answers.toml (docs/measured-recordings.md).";
 
-/// Prove `diagnose` blind: hide physics, diagnose the recordings alone, open the answers
+/// Prove `diagnose`: hide physics, diagnose the recordings alone, open the answers
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLE)]
 pub struct Prove {
-    /// Cases in all, split as in the full proof (150 single, 100 clean, 30 pair, 30 confounded, 30 outside)
-    #[arg(long, value_name = "N", conflicts_with = "quick", value_parser = clap::value_parser!(u32).range(5..=1_000_000))]
+    /// Cases in all, split as in the full proof (150 single, 100 clean, 30 pair, 20 several, 30 confounded, 30 outside)
+    #[arg(long, value_name = "N", conflicts_with = "quick", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     cases: Option<u32>,
     /// A twentieth of the full proof
     #[arg(long)]
     quick: bool,
-    /// First seed of the cases
-    #[arg(long, value_name = "N", default_value_t = REPORTING_SEED)]
-    seed: u64,
+    /// First seed of the cases [default: the first million that the ledger does not hold]
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// The seeds are for tuning (below 1000000): nothing is entered into the ledger, nothing is to be reported
+    #[arg(long)]
+    tuning: bool,
+    /// Kinds of cases; may be given several times
+    #[arg(long, value_name = "KIND", value_enum, value_delimiter = ',')]
+    kind: Vec<Kind>,
+    /// Effects that may be hidden, by their catalogue ids
+    #[arg(long, value_name = "ID", value_delimiter = ',', value_parser = family)]
+    family: Vec<String>,
+    /// Effects that may not be hidden
+    #[arg(long, value_name = "ID", value_delimiter = ',', value_parser = family)]
+    families_left_out: Vec<String>,
+    /// Kinds of noise that may not be drawn
+    #[arg(long, value_name = "NOISE", value_delimiter = ',', value_parser = noise)]
+    noise_left_out: Vec<String>,
+    /// Machines
+    #[arg(long, value_name = "MACHINE", value_enum)]
+    machine: Option<Machine>,
     /// Threads to use [default: one a core]; the verdicts are the same whatever their number
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     jobs: Option<u16>,
@@ -45,38 +71,110 @@ pub struct Prove {
     #[arg(long)]
     json: bool,
     /// Write the proof as one self-contained page
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", conflicts_with = "measured")]
     html: Option<PathBuf>,
-    /// Write the proof as a Markdown page
+    /// Write the proof as a Markdown page; with --measured, the part of it between its marks
     #[arg(long, value_name = "FILE")]
     markdown: Option<PathBuf>,
     /// Write the cases (recording.csv, rig.toml, answer.json) and diagnose nothing
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["json", "html", "markdown"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["json", "html", "markdown", "measured", "calibrate"])]
     write_cases: Option<PathBuf>,
+    /// Write what was stated and what became of it, a JSON line a finding, for fitting constants
+    #[arg(long, value_name = "FILE", conflicts_with = "measured")]
+    calibrate: Option<PathBuf>,
+    /// Folds of the records
+    #[arg(long, value_name = "N", default_value_t = 5, requires = "calibrate", value_parser = clap::value_parser!(u16).range(1..=100))]
+    folds: u16,
+    /// What parts the records into folds
+    #[arg(long, value_name = "WHAT", value_enum, default_value = "effect", requires = "calibrate")]
+    fold_by: FoldBy,
+    /// Diagnose recordings that others measured, and hold the reports against their keys
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["cases", "quick", "seed", "kind", "family", "families_left_out", "machine"])]
+    measured: Option<PathBuf>,
+    /// Sets to take of it, by their folders
+    #[arg(long, value_name = "NAME", value_delimiter = ',', requires = "measured")]
+    set: Vec<String>,
+    /// Also hide exact changes in them (delay, lag, bias, dead band, …) and see whether they are found
+    #[arg(long, requires = "measured")]
+    concealed: bool,
+    /// Seeds that were used
+    #[arg(long, value_name = "FILE", default_value = "docs/proof-ledger.toml")]
+    ledger: PathBuf,
 }
 
-/// Cases of each kind in the full proof.
-const FULL: [(CaseKind, u32); 5] = [
-    (CaseKind::Single, 150),
-    (CaseKind::Clean, 100),
-    (CaseKind::Pair, 30),
-    (CaseKind::Confounded, 30),
-    (CaseKind::Outside, 30),
-];
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Kind {
+    Single,
+    Clean,
+    Pair,
+    Several,
+    Confounded,
+    Outside,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Machine {
+    /// A thruster
+    Thruster,
+    /// A dry shaft: servo axis, gear motor, belt drive, motor without a load
+    Dry,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum FoldBy {
+    /// The hidden effect
+    Effect,
+    /// The machine
+    Rig,
+    /// The kinds of noise
+    Noise,
+}
+
+fn family(id: &str) -> Result<String, String> {
+    let ids: Vec<&str> = families::ALL.iter().map(|family| family.id).collect();
+    if ids.contains(&id) { Ok(id.to_owned()) } else { Err(format!("allowed: {}", ids.join(", "))) }
+}
+
+fn noise(name: &str) -> Result<String, String> {
+    let names: Vec<&str> = kort_truth::noises::ALL.iter().map(|kind| kind.name).collect();
+    if names.contains(&name) { Ok(name.to_owned()) } else { Err(format!("allowed: {}", names.join(", "))) }
+}
 
 impl Prove {
     /// Does it.
     ///
     /// # Errors
-    /// An output file that cannot be written.
+    /// Seeds that may not be used, a folder that cannot be read, an output file that cannot be written.
     pub fn run(self) -> Result<Outcome, Failure> {
         let threads = self.jobs.map_or(0, usize::from);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(Failure::failed)?;
-        let plan = self.plan();
+        for path in [&self.html, &self.markdown, &self.calibrate].into_iter().flatten() {
+            crate::failure::check_writable(path)?;
+        }
+        if let Some(folder) = &self.measured {
+            return pool.install(|| measured::run(folder, &self));
+        }
+        let ledger = ledger::open(&self.ledger)?;
+        let seed = self.seed.unwrap_or(if self.tuning { 1 } else { ledger.seeds.free() });
+        let kinds: Vec<CaseKind> = self.kind.iter().map(|kind| CaseKind::from(*kind)).collect();
+        let wanted = if self.quick { Some(18) } else { self.cases };
+        let plan = blind::plan(wanted, seed, &kinds);
+        let seeds = blind::seeds(&plan);
+        ledger.seeds.allow(&seeds, self.tuning).map_err(Failure::failed)?;
+        let stamp = stamp::stamp();
+        if !self.tuning {
+            ledger.enter(
+                &seeds,
+                &stamp,
+                if self.write_cases.is_some() { "cases written" } else { "blind proof" },
+            )?;
+        }
+        let selection = self.selection();
         if let Some(folder) = &self.write_cases {
             let bar = progress::bar(plan.len() as u64, "cases written");
-            let write =
-                |&(kind, seed): &(CaseKind, u64)| cases::write(folder, kind, seed).inspect(|()| bar.inc(1));
+            let write = |&(kind, seed): &(CaseKind, u64)| {
+                write_case(folder, kind, seed, &selection).inspect(|()| bar.inc(1))
+            };
             pool.install(|| plan.par_iter().try_for_each(write))?;
             drop(bar);
             eprintln!("wrote {} cases under {}", plan.len(), folder.display());
@@ -84,74 +182,73 @@ impl Prove {
         }
         let started = Instant::now();
         let bar = progress::bar(plan.len() as u64, "cases diagnosed");
-        let mut results: Vec<score::Scored> = Vec::with_capacity(plan.len());
-        let scored = |&(kind, seed): &(CaseKind, u64)| {
-            let (answer, report) = cases::diagnose_blind(kind, seed);
+        let mut results = Vec::with_capacity(plan.len());
+        let prove = |&(kind, seed): &(CaseKind, u64)| {
+            let result = blind::prove_one(kind, seed, &selection, &diagnosis::Ours);
             bar.inc(1);
-            score::open(&answer, &report)
+            result
         };
-        pool.install(|| plan.par_iter().map(scored).collect_into_vec(&mut results));
+        pool.install(|| plan.par_iter().map(prove).collect_into_vec(&mut results));
         drop(bar);
         eprintln!("{} cases diagnosed in {:.0} s", plan.len(), started.elapsed().as_secs_f64());
+        if let Some(path) = &self.calibrate {
+            calibrate::write(path, &results, self.fold_by, usize::from(self.folds))?;
+        }
+        let scored = results.into_iter().map(|(scored, ..)| scored).collect();
+        self.show(&Proof::new(seed, self.tuning, stamp, scored))
+    }
 
-        let proof = tally::Proof::new(self.seed, results);
+    fn show(&self, proof: &Proof) -> Result<Outcome, Failure> {
         if let Some(path) = &self.html {
-            write_text(path, &page::html(&proof))?;
+            write_text(path, &page::html(proof))?;
             eprintln!("wrote {}", path.display());
         }
         if let Some(path) = &self.markdown {
-            write_text(path, &page::markdown(&proof))?;
+            write_text(path, &page::markdown(proof))?;
             eprintln!("wrote {}", path.display());
         }
         if self.json {
             print_json(&proof.json())?
         } else {
-            print(&page::text(&proof))
+            print(&page::text(proof))
         }
         Ok(Outcome::Done)
     }
 
-    /// Kind and seed of every case.
-    fn plan(&self) -> Vec<(CaseKind, u64)> {
-        let full: u32 = FULL.iter().map(|(_, count)| count).sum();
-        let wanted = if self.quick { full / 20 } else { self.cases.unwrap_or(full) };
-        let share =
-            |count: u32| (f64::from(count) * f64::from(wanted) / f64::from(full)).round().max(1.0) as u64;
-        FULL.iter()
-            .flat_map(|&(kind, count)| (0..share(count)).map(move |index| (kind, self.seed + index)))
-            .collect()
+    fn selection(&self) -> Selection {
+        Selection {
+            machine: self.machine.map(|machine| match machine {
+                Machine::Thruster => MachineKind::Thruster,
+                Machine::Dry => MachineKind::Dry,
+            }),
+            families: self.family.clone(),
+            without: self.families_left_out.clone(),
+            without_noise: self.noise_left_out.clone(),
+            ..Selection::default()
+        }
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use clap::Parser;
-
-    #[derive(Parser)]
-    struct Cli {
-        #[command(flatten)]
-        prove: Prove,
-    }
-
-    fn plan(words: &[&str]) -> Vec<(CaseKind, u64)> {
-        Cli::parse_from(std::iter::once(&"prove").chain(words)).prove.plan()
-    }
-
-    #[test]
-    fn the_full_proof_has_the_promised_sizes_and_no_tuning_seed() {
-        let plan = plan(&[]);
-        for (kind, count) in FULL {
-            assert_eq!(plan.iter().filter(|(k, _)| *k == kind).count(), count as usize);
+impl From<Kind> for CaseKind {
+    fn from(kind: Kind) -> Self {
+        match kind {
+            Kind::Single => CaseKind::Single,
+            Kind::Clean => CaseKind::Clean,
+            Kind::Pair => CaseKind::Pair,
+            Kind::Several => CaseKind::Several,
+            Kind::Confounded => CaseKind::Confounded,
+            Kind::Outside => CaseKind::Outside,
         }
-        assert!(plan.iter().all(|(_, seed)| *seed >= REPORTING_SEED));
     }
+}
 
-    #[test]
-    fn a_small_proof_keeps_every_kind() {
-        assert!(
-            CaseKind::ALL.into_iter().all(|kind| plan(&["--cases", "5"]).iter().any(|(k, _)| *k == kind))
-        );
-        assert_eq!(plan(&["--quick"]).len(), 8 + 5 + 2 + 2 + 2);
-    }
+/// Writes one case to a folder of its own.
+fn write_case(folder: &Path, kind: CaseKind, seed: u64, selection: &Selection) -> Result<(), Failure> {
+    let case = kort_truth::case(kind, seed, selection);
+    let place = folder.join(format!("{}-{seed}", kind.name()));
+    std::fs::create_dir_all(&place).map_err(|error| Failure::unwritten(&place, error))?;
+    let answer = serde_json::to_string_pretty(&case.answer).map_err(Failure::failed)?;
+    write_text(&place.join("recording.csv"), &case.recording_csv)?;
+    write_text(&place.join("rig.toml"), &case.rig_toml)?;
+    write_text(&place.join("answer.json"), &answer)
 }

@@ -5,50 +5,126 @@ use std::fmt::Write;
 
 use maud::html;
 
-use super::tally::{Bar, Measure, Proof};
-use crate::render::{Chart, Mark, Page, Series, heat_map, note, number, table};
+use kort_proof::measure::{Bar, Measure};
+use kort_proof::measured::Measured;
+use kort_proof::measured::table::cells;
+use kort_proof::tally::Proof;
+
+use crate::render::{Chart, Mark, Page, Series, heat_map, note, table};
 
 const WHAT: &str = "Every case is simulated by a truth of its own (other equations, other integrator, own sensor \
-chain; some with 8 to 12 blade sections), hides what its answer says, and is diagnosed from the recording and the \
-rig file alone. The answers are opened afterwards.";
+chain; forms, machines, noise and what lies outside the catalogue are drawn), hides what its answer says, and is \
+diagnosed from the recording and the rig file alone. The answers are opened afterwards.";
 
-fn percent(measure: &Measure, value: f64) -> String {
-    match measure.name {
-        "seconds_per_case" => format!("{value:.1} s"),
-        "calibration_error" => format!("{value:.3}"),
-        _ => format!("{:.1} %", 100.0 * value),
-    }
-}
-
+/// A measure as cells: words, value, count, 95 % interval, bar, whether it is met.
 fn row(measure: &Measure) -> Vec<String> {
-    let (side, bar) = match measure.bar {
-        Bar::AtLeast(bar) => ("at least", bar),
-        Bar::AtMost(bar) => ("at most", bar),
+    let [what, value, count, interval] = cells(measure).try_into().unwrap_or_default();
+    let bar = |side: &str, bar: f64| match measure.name {
+        "seconds_per_case" => format!("{side} {bar:.0} s"),
+        "calibration_error" => format!("{side} {bar:.2}"),
+        _ => format!("{side} {:.0} %", 100.0 * bar),
     };
-    vec![
-        measure.what.to_owned(),
-        measure.value.map_or_else(|| "-".to_owned(), |value| percent(measure, value)),
-        format!("{} of {}", number(measure.numerator), measure.denominator),
-        format!("{side} {}", percent(measure, bar)),
-        match measure.met() {
-            Some(true) => "met".to_owned(),
-            Some(false) => "short".to_owned(),
-            None => "-".to_owned(),
-        },
-    ]
+    let bar = match measure.bar {
+        Some(Bar::AtLeast(value)) => bar("at least", value),
+        Some(Bar::AtMost(value)) => bar("at most", value),
+        None => String::new(),
+    };
+    let met = match measure.met() {
+        Some(true) => "met",
+        Some(false) => "short",
+        None => "-",
+    };
+    vec![what, value, count, interval, bar, met.to_owned()]
 }
 
-const HEAD: [&str; 5] = ["measure", "value", "count", "bar", ""];
+const HEAD: [&str; 6] = ["measure", "value", "count", "95 %", "bar", ""];
+
+/// A table of measures as text.
+fn measures_text(measures: &[Measure]) -> String {
+    let mut out = String::new();
+    for measure in measures {
+        let cells = row(measure);
+        let _ = writeln!(
+            out,
+            "{:<84} {:>8}  {:<14} {:<12} {:<15} {}",
+            cells[0], cells[1], cells[2], cells[3], cells[4], cells[5]
+        );
+    }
+    out
+}
+
+fn head(proof: &Proof) -> String {
+    let tuning = if proof.tuning { ", for tuning: not to be reported" } else { "" };
+    format!(
+        "{} cases, seeds from {}{tuning}; commit {}, diagnosis constants {}",
+        proof.cases.len(),
+        proof.seed,
+        proof.stamp.commit,
+        proof.stamp.constants
+    )
+}
+
+/// Measured recordings as plain text.
+pub fn measured_text(measured: &Measured) -> String {
+    let mut out = format!(
+        "Measured recordings: {}; commit {}, diagnosis constants {}\n\n{}\n",
+        measured.sets.len(),
+        measured.stamp.commit,
+        measured.stamp.constants,
+        measures_text(&measured.measures)
+    );
+    for set in &measured.sets {
+        let findings: Vec<String> = set.findings.iter().map(|(id, p)| format!("{id} {p:.2}")).collect();
+        let _ = writeln!(out, "{}/{}: {} [{}]", set.set, set.recording, set.verdict, findings.join(", "));
+        for (word, list) in [
+            ("missed", &set.missed),
+            ("sure and wrong", &set.sure_and_wrong),
+            ("called present though absent", &set.absent_claimed),
+        ] {
+            if !list.is_empty() {
+                let _ = writeln!(out, "    {word}: {}", list.join(", "));
+            }
+        }
+        if let Some(refused) = &set.refused {
+            let _ = writeln!(out, "    refused: {}", refused.lines().next().unwrap_or_default());
+        }
+        for size in &set.sizes {
+            let _ = writeln!(
+                out,
+                "    {} {}: {:.4}, key {} to {}{}",
+                size.effect,
+                size.name,
+                size.ours,
+                size.key[0],
+                size.key[1],
+                if size.holds { "" } else { " (off)" }
+            );
+        }
+    }
+    for one in &measured.concealed {
+        let findings: Vec<String> = one.findings.iter().map(|(id, p)| format!("{id} {p:.2}")).collect();
+        let found = match (one.already_there, one.found, one.listed) {
+            (true, ..) => "held already",
+            (_, true, _) => "found",
+            (_, _, true) => "listed",
+            _ => "not found",
+        };
+        let _ = writeln!(
+            out,
+            "{}/{}: {}: {found}: {} [{}]",
+            one.set,
+            one.recording,
+            one.what,
+            one.verdict,
+            findings.join(", ")
+        );
+    }
+    out
+}
 
 /// Plain text.
 pub fn text(proof: &Proof) -> String {
-    let mut out =
-        format!("Blind proof of diagnose: {} cases, seeds from {}\n\n", proof.cases.len(), proof.seed);
-    for measure in &proof.measures {
-        let cells = row(measure);
-        let _ =
-            writeln!(out, "{:<84} {:>8}  {:<14} {:<18} {}", cells[0], cells[1], cells[2], cells[3], cells[4]);
-    }
+    let mut out = format!("Blind proof of diagnose: {}\n\n{}", head(proof), measures_text(&proof.measures));
     let _ = writeln!(out, "\nWhat was hidden, and what was named first instead:");
     for (hidden, named) in proof.confusion() {
         for (name, count) in named.iter().filter(|(name, _)| wrong(&hidden, name)) {
@@ -61,9 +137,10 @@ pub fn text(proof: &Proof) -> String {
 /// A Markdown page for the documentation.
 pub fn markdown(proof: &Proof) -> String {
     let mut out = format!(
-        "# Blind proof of `kort diagnose`\n\nWritten by `kort prove --seed {} --cases {} --markdown docs/proof.md`; do not edit.\n\n{WHAT}\n\n",
+        "# Blind proof of `kort diagnose`\n\nWritten by `kort prove --seed {} --cases {} --markdown docs/proof.md`; do not edit. {}.\n\n{WHAT}\n\n",
         proof.seed,
-        proof.cases.len()
+        proof.cases.len(),
+        head(proof)
     );
     let _ = writeln!(out, "| {} |\n|{}", HEAD.join(" | "), " --- |".repeat(HEAD.len()));
     for measure in &proof.measures {
@@ -84,10 +161,7 @@ pub fn markdown(proof: &Proof) -> String {
 
 /// One page with the confusion matrix and the calibration plot.
 pub fn html(proof: &Proof) -> String {
-    let mut page = Page::new(
-        "Blind proof of kort diagnose",
-        format!("{} cases, seeds from {}", proof.cases.len(), proof.seed),
-    );
+    let mut page = Page::new("Blind proof of kort diagnose", head(proof));
     let short = proof.measures.iter().filter(|m| m.met() == Some(false)).count();
     let tone = if short == 0 { "good" } else { "warn" };
     page.add(html! { p class="lead" { (WHAT) } });
