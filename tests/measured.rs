@@ -66,3 +66,37 @@ fn a_log_of_commands_alone_says_what_it_lacks_and_that_the_supply_sags() {
         assert!(said.contains("supply_v sags as the 8 commands together rise"), "{said}");
     }
 }
+
+/// Four licensed sets with their keys, on a clean clone.
+#[test]
+fn measured_sets_are_held_against_their_keys() {
+    let output = kort(&["prove", "--measured", "tests/recordings/measured", "--json"]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let proof: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(proof["schema"], "kort.prove/1");
+    let sets = proof["sets"].as_array().unwrap();
+    let names: Vec<&str> = sets.iter().map(|set| set["set"].as_str().unwrap()).collect();
+    assert_eq!(names, ["bam-xl330", "laas-cogging", "sar-prop-step", "tud-prop-windtunnel"]);
+    for set in sets {
+        for list in ["present", "found", "missed", "sure_and_wrong", "not_in_catalogue"] {
+            assert!(set[list].is_array(), "{}: {list}", set["set"]);
+        }
+        // Found, listed and missed are all that is present, once.
+        let count = |list: &str| set[list].as_array().unwrap().len();
+        assert_eq!(count("present"), count("found") + count("listed") + count("missed"), "{set}");
+    }
+    for measure in ["named", "sure_and_wrong", "sizes_within_20_pct", "median_excess_error_removed"] {
+        assert!(proof["measures"][measure]["denominator"].is_number(), "{measure}");
+    }
+    // Dry friction of a free motor, of the size that its origin's data give.
+    let motor = &sets[1];
+    assert!(motor["found"].as_array().unwrap().contains(&"coulomb_friction".into()), "{motor}");
+}
+
+#[test]
+fn a_set_that_is_not_there_is_named_with_those_that_are() {
+    let output = kort(&["prove", "--measured", "tests/recordings/measured", "--set", "servo"]);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(said.contains("hint: one of bam-xl330"), "{said}");
+}
