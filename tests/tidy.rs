@@ -269,7 +269,7 @@ fn every_effect_model_law_observer_and_estimator_is_registered() {
     let ids: BTreeSet<&str> = effects::ALL.iter().map(|e| e.id).collect();
     assert_eq!(ids.len(), effects::ALL.len(), "two effects of one name");
     for (folder, helpers) in [
-        ("crates/thruster/src/effects", &["knots", "memory"][..]),
+        ("crates/thruster/src/effects", &["knots", "memory", "needs", "spec"][..]),
         ("crates/thruster/src/models", &["linear", "steady"]),
         ("crates/control/src/laws", &["aim", "lead", "speed_loop"]),
         ("crates/control/src/observers", &["belief", "load_torque"]),

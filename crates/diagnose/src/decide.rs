@@ -27,8 +27,8 @@ pub struct Decision {
     pub term: Option<&'static str>,
 }
 
-/// A name below this probability is not stated as one.
-const STATED: f64 = 0.05;
+/// A rival stands near a name from this share of its probability on: odds of five to one part them.
+const NEAR: f64 = 0.2;
 /// From this probability on a name is believed.
 const BELIEVED: f64 = 0.7;
 /// A remainder below this share of what was to be explained is of no practical size.
@@ -102,7 +102,7 @@ fn rivals(explanations: &[Explanation], best: &Set, member: &str) -> Vec<&'stati
         if let [new] = new[..]
             && rest.iter().all(|id| other.set.contains(id))
             && !is_term(new)
-            && presence(explanations, new, 1.0) >= STATED
+            && presence(explanations, new, 1.0) >= NEAR * presence(explanations, member, 1.0)
             && !out.contains(&new)
         {
             out.push(new);

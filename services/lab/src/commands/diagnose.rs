@@ -5,7 +5,11 @@ use std::path::PathBuf;
 use clap::Args;
 use kort_diagnose::diagnose::{Options, diagnose};
 
+use kort_diagnose::report::{ParameterReport, Report};
+use kort_thruster::rig::{FoundEffect, Quantity, Rig};
+
 use crate::failure::{Failure, Outcome, print, print_json, write_text};
+use crate::files::rig_text;
 use crate::input::Input;
 use crate::{progress, render};
 
@@ -23,6 +27,10 @@ How to read the report: docs/reading-a-report.md";
 pub struct Diagnose {
     #[command(flatten)]
     input: Input,
+    /// Write the rig description with what was found as its [[effects]], which fit, diagnose, simulate and
+    /// soak then use: names of probability 0.7 and more that have no rival
+    #[arg(short, long, value_name = "RIG2")]
+    output: Option<PathBuf>,
     /// Print one JSON document (kort.diagnosis/2)
     #[arg(long)]
     json: bool,
@@ -50,6 +58,15 @@ impl Diagnose {
             write_text(path, &render::diagnosis::page(&diagnosis, &loaded.rig))?;
             eprintln!("wrote {}", path.display());
         }
+        if let Some(path) = &self.output {
+            let found = believed(&diagnosis.report);
+            let text =
+                Rig::with_effects_toml(&rig_text(&self.input.rig)?, &found).map_err(Failure::failed)?;
+            write_text(path, &text)?;
+            let names: Vec<&str> = found.iter().map(|f| f.effect).collect();
+            let names = if names.is_empty() { "nothing".to_string() } else { names.join(", ") };
+            eprintln!("wrote {} with {names}", path.display());
+        }
         if self.json {
             print_json(&diagnosis.report)?;
         } else {
@@ -57,4 +74,24 @@ impl Diagnose {
         }
         Ok(Outcome::with_loss(loaded.lossy))
     }
+}
+
+/// Least probability with which a name belongs to the rig from now on.
+const BELIEVED: f64 = 0.7;
+
+/// Findings that a rig can take over, with twice the standard error as tolerance.
+fn believed(report: &Report) -> Vec<FoundEffect<'_>> {
+    let of = |p: &'_ ParameterReport| Quantity {
+        value: p.value,
+        tol: Some((2.0 * p.std_error / p.value).abs()).filter(|t| t.is_finite() && *t > 0.0),
+    };
+    report
+        .findings
+        .iter()
+        .filter(|f| f.probability >= BELIEVED && f.confounded_with.is_empty())
+        .map(|f| FoundEffect {
+            effect: &f.effect,
+            parameters: f.parameters.iter().map(|p| (p.name.as_str(), of(p))).collect(),
+        })
+        .collect()
 }
