@@ -9,7 +9,6 @@ use kort_diagnose::report::{ParameterReport, Report};
 use kort_thruster::rig::{FoundEffect, Quantity, Rig};
 
 use crate::failure::{Failure, Outcome, print, print_json, write_text};
-use crate::files::rig_text;
 use crate::input::Input;
 use crate::{progress, render};
 
@@ -60,8 +59,7 @@ impl Diagnose {
         }
         if let Some(path) = &self.output {
             let found = believed(&diagnosis.report);
-            let text =
-                Rig::with_effects_toml(&rig_text(&self.input.rig)?, &found).map_err(Failure::failed)?;
+            let text = Rig::with_effects_toml(&loaded.rig_text, &found).map_err(Failure::failed)?;
             write_text(path, &text)?;
             let names: Vec<&str> = found.iter().map(|f| f.effect).collect();
             let names = if names.is_empty() { "nothing".to_string() } else { names.join(", ") };
