@@ -44,12 +44,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 /// Screening looks at each channel's delay alone.
 fn parameters(_: &Scale) -> Vec<Spec> {
     let delay = |name| Spec::strength(name, "s", 0.01, 0.0, LONGEST_S).sigma(0.03);
-    vec![
-        delay("thrust_delay_s"),
-        delay("speed_delay_s"),
-        delay("flow_delay_s"),
-        delay("angle_delay_s"),
-    ]
+    vec![delay("thrust_delay_s"), delay("speed_delay_s"), delay("flow_delay_s"), delay("angle_delay_s")]
 }
 
 fn needs(_: &Rig, available: &Available) -> Result<(), &'static str> {

@@ -13,7 +13,12 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
                command's unit",
     signature: "middle commands are off by a share that vanishes at full command, the same way up and down and in both \
                 directions (no hysteresis)",
-    confused_with: &["voltage_limit_backemf", "command_dead_band", "torque_constant_saturation", "windage_drag"],
+    confused_with: &[
+        "voltage_limit_backemf",
+        "command_dead_band",
+        "torque_constant_saturation",
+        "windage_drag",
+    ],
     separated_by: "a staircase with the motor current or the supply logged",
     reference: "odd polynomial of second and third degree; measured on a speed controller: 4.3 to 2.4 % of full scale by the \
                 second",

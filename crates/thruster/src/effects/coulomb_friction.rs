@@ -14,7 +14,13 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
                vs [rad/s]",
     signature: "an offset in the shaft's torque balance that changes sign with the direction; stick-slip near zero; \
                 thrust over speed squared is unchanged; the loss in thrust per torque falls as 1/Om^2",
-    confused_with: &["viscous_friction", "torque_channel_bias", "command_dead_band", "direction_dependent_friction", "gear_load_friction"],
+    confused_with: &[
+        "viscous_friction",
+        "torque_channel_bias",
+        "command_dead_band",
+        "direction_dependent_friction",
+        "gear_load_friction",
+    ],
     separated_by: "a slow ramp through zero in both directions; a coast-down",
     reference: "Armstrong-Helouvry, Dupont, Canudas de Wit 1994 (Automatica 30:1083)",
     commonness: 4.0,
@@ -34,7 +40,8 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 
 fn parameters(scale: &Scale) -> Vec<Spec> {
     vec![
-        Spec::strength("coulomb_torque_n_m", "N m", 0.02 * scale.torque_n_m, 0.0, scale.torque_n_m).sigma(0.1 * scale.torque_n_m),
+        Spec::strength("coulomb_torque_n_m", "N m", 0.02 * scale.torque_n_m, 0.0, scale.torque_n_m)
+            .sigma(0.1 * scale.torque_n_m),
         Spec::shape("stribeck_rise", "1", 0.3, 0.0, 2.0).prior(0.0, 0.5),
         Spec::shape(
             "stribeck_speed_rad_s",
@@ -42,7 +49,8 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
             0.04 * scale.shaft_speed_rad_s,
             0.002 * scale.shaft_speed_rad_s,
             0.3 * scale.shaft_speed_rad_s,
-        ).sigma(0.08 * scale.shaft_speed_rad_s),
+        )
+        .sigma(0.08 * scale.shaft_speed_rad_s),
     ]
 }
 

@@ -49,7 +49,8 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
     vec![
         Spec::strength("thrust_loss", "1", 0.1, 0.0, 1.0).sigma(0.4),
         Spec::shape("cross_flow_m_s", "m/s", 0.25 * full, 0.02 * full, 2.0 * full).sigma(0.4 * full),
-        Spec::shape("cross_flow_per_signal_m_s", "m/s", 0.25 * full, -2.0 * full, 2.0 * full).prior(0.0, 0.4 * full),
+        Spec::shape("cross_flow_per_signal_m_s", "m/s", 0.25 * full, -2.0 * full, 2.0 * full)
+            .prior(0.0, 0.4 * full),
     ]
 }
 

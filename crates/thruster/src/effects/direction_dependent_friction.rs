@@ -13,7 +13,12 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
                or tc-; tc [N m], kf [N m s]",
     signature: "an offset in the shaft's torque balance that changes sign with the direction, and is larger one way; the \
                 difference may grow with speed, a bias does not; thrust over speed squared is unchanged",
-    confused_with: &["coulomb_friction", "torque_channel_bias", "viscous_friction", "forward_reverse_asymmetry"],
+    confused_with: &[
+        "coulomb_friction",
+        "torque_channel_bias",
+        "viscous_friction",
+        "forward_reverse_asymmetry",
+    ],
     separated_by: "a staircase in both directions; on one-sided data it is coulomb_friction with a torque_channel_bias",
     reference: "Armstrong-Helouvry, Dupont, Canudas de Wit 1994 (Automatica 30:1083), friction by direction; in real \
                 drives 10 to 45 % between the ways",

@@ -29,7 +29,10 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 
 fn parameters(scale: &Scale) -> Vec<Spec> {
     let stated = scale.inertia_kg_m2;
-    vec![Spec::strength("entrained_inertia_kg_m2", "kg m^2", 0.15 * stated, 0.0, 5.0 * stated).sigma(0.5 * stated)]
+    vec![
+        Spec::strength("entrained_inertia_kg_m2", "kg m^2", 0.15 * stated, 0.0, 5.0 * stated)
+            .sigma(0.5 * stated),
+    ]
 }
 
 fn needs(rig: &Rig, available: &Available) -> Result<(), &'static str> {

@@ -29,7 +29,13 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     },
     needs: free_shaft,
     build: both!(|values, context| {
-        Box::new(Coupling::new(values[0], values[1], values[2], context.parameters.get(P::InertiaKgM2), context))
+        Box::new(Coupling::new(
+            values[0],
+            values[1],
+            values[2],
+            context.parameters.get(P::InertiaKgM2),
+            context,
+        ))
     }),
 };
 
@@ -40,8 +46,14 @@ fn compliance(scale: &Scale, hz: f64) -> f64 {
 
 fn parameters(scale: &Scale) -> Vec<Spec> {
     vec![
-        Spec::strength("compliance_rad_nm", "rad/(N m)", compliance(scale, 12.0), 0.0, compliance(scale, 0.3))
-            .sigma(compliance(scale, 5.0)),
+        Spec::strength(
+            "compliance_rad_nm",
+            "rad/(N m)",
+            compliance(scale, 12.0),
+            0.0,
+            compliance(scale, 0.3),
+        )
+        .sigma(compliance(scale, 5.0)),
         Spec::shape("load_inertia_share", "1", 0.5, 0.03, 0.97).sigma(0.25),
         Spec::shape("damping_ratio", "1", 0.1, 0.01, 1.0).sigma(0.15),
     ]

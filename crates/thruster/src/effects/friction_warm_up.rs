@@ -28,7 +28,10 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: |scale| {
         let (torque, viscous) = (0.04 * scale.torque_n_m, 0.04 * scale.torque_n_m / scale.shaft_speed_rad_s);
-        [0.1, 0.5, 2.0].iter().map(|k| vec![torque, viscous, (k * scale.duration_s).clamp(2.0, 900.0)]).collect()
+        [0.1, 0.5, 2.0]
+            .iter()
+            .map(|k| vec![torque, viscous, (k * scale.duration_s).clamp(2.0, 900.0)])
+            .collect()
     },
     needs: free_shaft,
     build: both!(|values, _| {

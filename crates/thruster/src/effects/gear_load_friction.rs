@@ -13,7 +13,12 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
                load's, positive where it drives ahead [N m]: what pulls against the motor loads the teeth twice; mu [1]",
     signature: "dry friction that grows with the load and vanishes with it: a heavy arm is held without current, and falls \
                 more slowly than it should when the drive is released; thrust over speed squared is unchanged",
-    confused_with: &["coulomb_friction", "torque_constant_saturation", "windage_drag", "direction_dependent_friction"],
+    confused_with: &[
+        "coulomb_friction",
+        "torque_constant_saturation",
+        "windage_drag",
+        "direction_dependent_friction",
+    ],
     separated_by: "another load at the same speed; the load left to swing with the drive released",
     reference: "Duclusaud, Passault, Padois, Ly 2024 (arXiv 2410.08650), friction by load; mu 0.05 to 0.3",
     commonness: 1.0,

@@ -67,8 +67,7 @@ impl<T: Real> Effect<T> for PositionDependentFriction<T> {
     fn balance(&self, at: &Local<T>, _: &[T], balance: &mut Balance<T>, _: &mut [T]) {
         let (sin, cos) = at.shaft_angle_rad.sin_cos();
         let (sin_2, cos_2) = (sin * 2.0 * cos, T::ONE - sin * 2.0 * sin);
-        let wave =
-            self.once[0] * sin + self.once[1] * cos + self.twice[0] * sin_2 + self.twice[1] * cos_2;
+        let wave = self.once[0] * sin + self.once[1] * cos + self.twice[0] * sin_2 + self.twice[1] * cos_2;
         let size = self.mean_n_m * (wave + 1.0).max(T::ZERO);
         balance.rub(size, size);
     }

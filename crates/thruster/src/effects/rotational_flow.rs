@@ -33,7 +33,8 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     build: both!(|values, context| {
         let p = context.parameters;
         let flux_kg_m = p.get(P::DensityKgM3) * p.area_m2();
-        let law = Swirl { share: values[0], mass_kg: values[1] * p.duct_mass_kg(), flux_kg_m, ..Swirl::new(p) };
+        let law =
+            Swirl { share: values[0], mass_kg: values[1] * p.duct_mass_kg(), flux_kg_m, ..Swirl::new(p) };
         Box::new(RotationalFlow { law, tick_s: context.tick_s })
     }),
 };
@@ -66,7 +67,6 @@ impl<T: Real> Effect<T> for RotationalFlow<T> {
 
     /// The swirl's lag is never shorter than a tick, which the integrator could not follow.
     fn balance(&self, at: &Local<T>, own: &[T], balance: &mut Balance<T>, rates: &mut [T]) {
-        rates[0] =
-            self.law.acceleration(balance.blade_torque_n_m, at.axial_m_s, own[0], self.tick_s);
+        rates[0] = self.law.acceleration(balance.blade_torque_n_m, at.axial_m_s, own[0], self.tick_s);
     }
 }

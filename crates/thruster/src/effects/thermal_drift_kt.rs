@@ -11,7 +11,13 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     what: "the motor warms with its copper loss and the torque constant falls, slowly, and recovers at rest",
     equation: "kt = kt0 (1 - c w), tt w' = im^2 - w; c = aT R Rt [1/A^2], tt = Ct Rt [s]",
     signature: "thrust per ampere decays over minutes under load and recovers after a rest; thrust over speed squared is unchanged",
-    confused_with: &["torque_constant_saturation", "tank_recirculation", "viscous_friction", "supply_sag", "friction_warm_up"],
+    confused_with: &[
+        "torque_constant_saturation",
+        "tank_recirculation",
+        "viscous_friction",
+        "supply_sag",
+        "friction_warm_up",
+    ],
     separated_by: "a long hold with rests; recirculation changes thrust over speed squared, warming oil acts the other way",
     reference: "Krishnan 2001, Electric Motor Drives; one thermal mass",
     commonness: 0.7,
@@ -34,7 +40,8 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
     let full = 1.0 / scale.current_a.powi(2);
     vec![
         Spec::strength("kt_loss_per_a2", "1/A^2", 0.05 * full, 0.0, full).sigma(0.1 * full),
-        Spec::shape("warming_time_s", "s", (0.3 * scale.duration_s).clamp(5.0, 600.0), 3.0, 3000.0).sigma((0.3 * scale.duration_s).clamp(5.0, 600.0)),
+        Spec::shape("warming_time_s", "s", (0.3 * scale.duration_s).clamp(5.0, 600.0), 3.0, 3000.0)
+            .sigma((0.3 * scale.duration_s).clamp(5.0, 600.0)),
     ]
 }
 

@@ -37,9 +37,12 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 fn parameters(scale: &Scale) -> Vec<Spec> {
     let (torque, current) = (scale.torque_n_m, scale.current_a);
     vec![
-        Spec::strength("shaft_torque_bias_n_m", "N m", 0.02 * torque, -0.5 * torque, 0.5 * torque).sigma(0.05 * torque),
-        Spec::strength("current_offset_a", "A", 0.02 * current, -0.5 * current, 0.5 * current).sigma(0.05 * current),
-        Spec::strength("transducer_offset_n_m", "N m", 0.02 * torque, -0.5 * torque, 0.5 * torque).sigma(0.05 * torque),
+        Spec::strength("shaft_torque_bias_n_m", "N m", 0.02 * torque, -0.5 * torque, 0.5 * torque)
+            .sigma(0.05 * torque),
+        Spec::strength("current_offset_a", "A", 0.02 * current, -0.5 * current, 0.5 * current)
+            .sigma(0.05 * current),
+        Spec::strength("transducer_offset_n_m", "N m", 0.02 * torque, -0.5 * torque, 0.5 * torque)
+            .sigma(0.05 * torque),
     ]
 }
 

@@ -30,7 +30,10 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 };
 
 fn parameters(_: &Scale) -> Vec<Spec> {
-    vec![Spec::strength("wagner_share", "1", 0.5, 0.0, 1.9).sigma(0.7), Spec::shape("chord_radii", "1", 0.5, 0.05, 5.0).sigma(0.4)]
+    vec![
+        Spec::strength("wagner_share", "1", 0.5, 0.0, 1.9).sigma(0.7),
+        Spec::shape("chord_radii", "1", 0.5, 0.05, 5.0).sigma(0.4),
+    ]
 }
 
 fn build<T: Real>(values: &[T], context: &Context<T>) -> Box<dyn Effect<T>> {
