@@ -43,7 +43,7 @@ impl Lying {
             SensorFault::Frozen => {
                 (*angle_rad, *speed_rad_s) = *self.last.get_or_insert((*angle_rad, *speed_rad_s));
             }
-            SensorFault::Spikes if self.ticks % 20 == 0 => *speed_rad_s += 500.0,
+            SensorFault::Spikes if self.ticks.is_multiple_of(20) => *speed_rad_s += 500.0,
             SensorFault::Spikes => (),
             SensorFault::Reversed => (*angle_rad, *speed_rad_s) = (-*angle_rad, -*speed_rad_s),
             SensorFault::NotANumber => (*angle_rad, *speed_rad_s) = (f64::NAN, f64::NAN),
