@@ -103,7 +103,8 @@ fn a_log_is_replayed_and_adaptation_is_held_to_the_truth() {
         words.split("[[reference]]").next().expect("head").replace("duration_s = 12", "duration_s = 30");
     let head = head
         .replace("settle_s = 1\n", "settle_s = 15\nagainst_true_parameters = true\n")
-        .replace("velocity_servo\"", "adaptive_model2_inversion\"");
+        .replace("velocity_servo\"", "adaptive_model2_inversion\"")
+        .replace(", \"model2_inversion\"]", ", \"velocity_servo\"]");
     let change = "[[truth.change]]\nat_s = 2\nfactors = { lift_max = 0.7 }\n";
     let write = |text: String| std::fs::write(&good, text).expect("scenario");
     let path = good.to_str().expect("utf-8");
