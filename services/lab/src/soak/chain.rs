@@ -84,11 +84,16 @@ impl Chain for ProductionChain {
         self.now_ns += self.period_ns;
         self.sequence += 1;
         let now = self.now_ns;
+        // A speed drive guards its own current and tells none: the servo's guard is given none that flows.
+        let mut guarded = *measured;
+        if self.rig.amplifier.kind == AmplifierKind::Speed && guarded.current_a.is_nan() {
+            guarded.current_a = 0.0;
+        }
         let drive = self.servo.tick(&Inputs {
             now_ns: now,
             ticks: 1,
             command: self.command.take().as_ref(),
-            measured,
+            measured: &guarded,
             amplifier_well: true,
         });
         self.operate(alive, thrust_n);
