@@ -8,7 +8,7 @@ use kort_proto::messages::SetpointKind;
 
 /// Time from zero to the largest setpoint when the deployment names none, s.
 ///
-/// Set so that a step of 100 N on the bollard stand overshoots by less than a tenth.
+/// Chosen by how fast each law follows; the overshoot of a step has not been measured for every one.
 pub fn rise_s(law: LawKind) -> f64 {
     match law {
         // Current follows thrust by a map: the shaft alone is the dynamics.
