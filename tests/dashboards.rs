@@ -64,7 +64,11 @@ fn prometheus(folder: &Path, gateway: u16, soak: u16) -> (Ends, u16) {
     let config = shipped
         .replace("127.0.0.1:8080", &format!("127.0.0.1:{gateway}"))
         .replace("127.0.0.1:9464", &format!("127.0.0.1:{soak}"));
-    assert_eq!(config.matches("127.0.0.1").count(), 2, "both targets stand in the shipped configuration");
+    assert_eq!(
+        config.matches("targets: [\"127.0.0.1").count(),
+        2,
+        "both targets stand in the shipped configuration"
+    );
     std::fs::write(folder.join("prometheus.yml"), config).unwrap();
     std::fs::copy(repository().join("docker/prometheus/alerts.yml"), folder.join("alerts.yml")).unwrap();
     let port = free_port();
