@@ -70,7 +70,10 @@ pub fn decide(explanations: &[Explanation], circumstances: Circumstances) -> Dec
         }
     }
     let believed = |n: &Named| n.probability >= BELIEVED && n.rivals.is_empty();
-    let verdict = if circumstances.broke_down || circumstances.thin && !named.iter().any(believed) {
+    let verdict = if circumstances.broke_down
+        // Steady data cannot part physics from parameters; that something changed in mid-run they show.
+        || circumstances.thin && term.is_none() && !named.iter().any(believed)
+    {
         Verdict::InsufficientData
     } else if named.is_empty() {
         if term.is_some() || circumstances.more_than_noise {
