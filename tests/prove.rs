@@ -4,7 +4,7 @@
 #[path = "common/lab.rs"]
 mod lab;
 
-use lab::{folder, json, kort, stderr};
+use lab::{folder, kort, stderr};
 
 const KINDS: [&str; 6] = ["single", "clean", "pair", "several", "confounded", "outside"];
 
@@ -37,7 +37,10 @@ fn a_written_case_can_be_diagnosed() {
     let case = cases.join("single-2");
     let [recording, rig] =
         ["recording.csv", "rig.toml"].map(|file| case.join(file).to_str().unwrap().to_owned());
-    let report = json(&kort(&["diagnose", &recording, "--rig", &rig, "--json"]));
+    let output = kort(&["diagnose", &recording, "--rig", &rig, "--json"]);
+    // 3: done, though rows of a sensor that misbehaves were left out.
+    assert!(matches!(output.status.code(), Some(0 | 3)), "{}", stderr(&output));
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     assert!(report["verdict"].is_string(), "{report}");
 }
 
