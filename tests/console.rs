@@ -151,97 +151,103 @@ fn text_is(id: &str, words: &str) -> String {
 
 #[test]
 fn an_operator_takes_command_thrusts_records_and_stops() {
-    let stack = Stack::start();
-    let home = format!("http://127.0.0.1:{}/", stack.site.port);
-    let Some(mut page) = Browser::open(&home) else { return };
-    page.until("document.readyState === 'complete' && typeof state !== 'undefined'");
-    page.until(&text_is("link", "live"));
-    page.until(&text_is("armed", "disarmed"));
-    page.until(&text_is("faults", "No fault"));
-    assert_eq!(
-        page.eval("document.getElementById('send').disabled"),
-        json!(true),
-        "no command without lease"
-    );
+    common::in_real_time(|| {
+        let stack = Stack::start();
+        let home = format!("http://127.0.0.1:{}/", stack.site.port);
+        let Some(mut page) = Browser::open(&home) else { return };
+        page.until("document.readyState === 'complete' && typeof state !== 'undefined'");
+        page.until(&text_is("link", "live"));
+        page.until(&text_is("armed", "disarmed"));
+        page.until(&text_is("faults", "No fault"));
+        assert_eq!(
+            page.eval("document.getElementById('send').disabled"),
+            json!(true),
+            "no command without lease"
+        );
 
-    // A browser on an overloaded machine may stand still for seconds; the life of the lease is not what is tested.
-    page.eval("lease_ttl_ms = 60000; document.getElementById('holder').value = 'bridge'");
-    page.click("take");
-    page.until(&text_is("lease-text", "You have the lease"));
-    assert_eq!(stack.state().unwrap()["lease"]["holder"], "bridge");
-    page.click("record");
-    page.until(&text_is("record", "Stop"));
-    page.click("arm");
-    page.until("document.getElementById('armed').textContent === 'armed'");
-    page.eval("document.getElementById('entry').value = 60");
-    page.click("send");
-    page.until("Math.abs(state.measured.thrust_n - 60) < 12");
-    page.until("Math.abs(parseFloat(document.querySelector('#tiles .tile i').textContent) - 60) < 12");
-    std::thread::sleep(Duration::from_millis(2000));
-    wait("the page to renew its lease", || {
-        let lease = stack.state()?["lease"].clone();
-        (lease["holder"] == "bridge" && lease["expires_in_ms"].as_u64()? > 58_500).then_some(())
-    });
+        // A browser on an overloaded machine may stand still for seconds; the life of the lease is not what is tested.
+        page.eval("lease_ttl_ms = 60000; document.getElementById('holder').value = 'bridge'");
+        page.click("take");
+        page.until(&text_is("lease-text", "You have the lease"));
+        assert_eq!(stack.state().unwrap()["lease"]["holder"], "bridge");
+        page.click("record");
+        page.until(&text_is("record", "Stop"));
+        page.click("arm");
+        page.until("document.getElementById('armed').textContent === 'armed'");
+        page.eval("document.getElementById('entry').value = 60");
+        page.click("send");
+        page.until("Math.abs(state.measured.thrust_n - 60) < 12");
+        page.until("Math.abs(parseFloat(document.querySelector('#tiles .tile i').textContent) - 60) < 12");
+        std::thread::sleep(Duration::from_millis(2000));
+        wait("the page to renew its lease", || {
+            let lease = stack.state()?["lease"].clone();
+            (lease["holder"] == "bridge" && lease["expires_in_ms"].as_u64()? > 58_500).then_some(())
+        });
 
-    for chart in ["thrust", "speed", "current", "flow"] {
-        let colours = page.eval(&format!(
+        for chart in ["thrust", "speed", "current", "flow"] {
+            let colours = page.eval(&format!(
             "(() => {{ const c = document.getElementById('plot-{chart}'); const d = c.getContext('2d').getImageData(0, 60, c.width, c.height - 90).data; \
              const seen = new Set(); for (let i = 0; i < d.length; i += 4) if (d[i + 3]) seen.add(`${{d[i]}},${{d[i + 1]}},${{d[i + 2]}}`); return seen.size; }})()"
         ));
-        assert!(colours.as_u64().unwrap() > 3, "the plot of {chart} shows curves: {colours} colours");
-    }
-    page.eval("document.getElementById('controller').value = 'static_map'");
-    page.click("switch");
-    page.until("state.controller === 'static_map'");
-    page.eval("document.getElementById('slider').value = 40; document.getElementById('slider').dispatchEvent(new Event('input'))");
-    std::thread::sleep(Duration::from_millis(300));
-    assert_eq!(
-        page.eval("state.setpoint.thrust_n").as_f64(),
-        Some(60.0),
-        "the slider proposes, it does not command"
-    );
-    page.click("send");
-    page.until("state.setpoint.thrust_n === 40");
-    page.picture(concat!(env!("CARGO_MANIFEST_DIR"), "/target/console.png"));
+            assert!(colours.as_u64().unwrap() > 3, "the plot of {chart} shows curves: {colours} colours");
+        }
+        page.eval("document.getElementById('controller').value = 'static_map'");
+        page.click("switch");
+        page.until("state.controller === 'static_map'");
+        page.eval("document.getElementById('slider').value = 40; document.getElementById('slider').dispatchEvent(new Event('input'))");
+        std::thread::sleep(Duration::from_millis(300));
+        assert_eq!(
+            page.eval("state.setpoint.thrust_n").as_f64(),
+            Some(60.0),
+            "the slider proposes, it does not command"
+        );
+        page.click("send");
+        page.until("state.setpoint.thrust_n === 40");
+        page.picture(concat!(env!("CARGO_MANIFEST_DIR"), "/target/console.png"));
 
-    page.click("stop");
-    page.until(&text_is("stop-text", "Stopped: confirmed"));
-    page.until("!state.armed && document.getElementById('armed').textContent === 'disarmed'");
-    page.click("record");
-    page.until("document.querySelectorAll('#recordings a').length === 2");
-    page.eval("document.getElementById('entry').value = 1e6");
-    page.click("arm");
-    page.click("send");
-    page.until(&text_is("log", "outside its allowed range"));
-    page.click("give");
-    page.until(&text_is("lease-text", "Nobody has the lease"));
-    page.until(&text_is("events", "stopped every thruster"));
-    page.until("document.getElementById('plot-thrust').getAttribute('aria-label').includes('thrust in N: ')");
+        page.click("stop");
+        page.until(&text_is("stop-text", "Stopped: confirmed"));
+        page.until("!state.armed && document.getElementById('armed').textContent === 'disarmed'");
+        page.click("record");
+        page.until("document.querySelectorAll('#recordings a').length === 2");
+        page.eval("document.getElementById('entry').value = 1e6");
+        page.click("arm");
+        page.click("send");
+        page.until(&text_is("log", "outside its allowed range"));
+        page.click("give");
+        page.until(&text_is("lease-text", "Nobody has the lease"));
+        page.until(&text_is("events", "stopped every thruster"));
+        page.until(
+            "document.getElementById('plot-thrust').getAttribute('aria-label').includes('thrust in N: ')",
+        );
 
-    // A refused request is told in the console's log; the browser notes it as an error of its own.
-    page.errors.retain(|error| !error.contains("status of 422"));
-    assert_eq!(page.errors, Vec::<String>::new());
-    let ours = |url: &String| {
-        url.starts_with(&home) || url.starts_with(&home.replace("http", "ws")) || url.starts_with("data:")
-    };
-    assert!(page.asked.len() > 5 && page.asked.iter().all(ours), "{:?}", page.asked);
+        // A refused request is told in the console's log; the browser notes it as an error of its own.
+        page.errors.retain(|error| !error.contains("status of 422"));
+        assert_eq!(page.errors, Vec::<String>::new());
+        let ours = |url: &String| {
+            url.starts_with(&home) || url.starts_with(&home.replace("http", "ws")) || url.starts_with("data:")
+        };
+        assert!(page.asked.len() > 5 && page.asked.iter().all(ours), "{:?}", page.asked);
+    });
 }
 
 /// What is old is not shown as now, nothing is commanded by it, and a stop that nobody confirms says so.
 #[test]
 fn a_frozen_gateway_is_seen_within_a_second() {
-    let mut stack = Stack::start();
-    let Some(mut page) = Browser::open(&format!("http://127.0.0.1:{}/", stack.site.port)) else { return };
-    page.until("document.readyState === 'complete' && typeof state !== 'undefined'");
-    page.until(&text_is("link", "live"));
-    stack.thrust(40.0, 60_000);
-    page.until("state.armed");
-    let gateway = stack.process_of("gateway");
-    common::kill(gateway, "STOP");
-    page.until("document.body.classList.contains('stale')");
-    page.until(&text_is("link", "s old"));
-    assert_eq!(page.eval("document.getElementById('send').disabled"), json!(true));
-    assert_eq!(page.eval("document.getElementById('stop').disabled"), json!(false));
-    page.eval("document.getElementById('stop').click()");
-    page.until(&text_is("stop-text", "NOT CONFIRMED"));
+    common::in_real_time(|| {
+        let mut stack = Stack::start();
+        let Some(mut page) = Browser::open(&format!("http://127.0.0.1:{}/", stack.site.port)) else { return };
+        page.until("document.readyState === 'complete' && typeof state !== 'undefined'");
+        page.until(&text_is("link", "live"));
+        stack.thrust(40.0, 60_000);
+        page.until("state.armed");
+        let gateway = stack.process_of("gateway");
+        common::kill(gateway, "STOP");
+        page.until("document.body.classList.contains('stale')");
+        page.until(&text_is("link", "s old"));
+        assert_eq!(page.eval("document.getElementById('send').disabled"), json!(true));
+        assert_eq!(page.eval("document.getElementById('stop').disabled"), json!(false));
+        page.eval("document.getElementById('stop').click()");
+        page.until(&text_is("stop-text", "NOT CONFIRMED"));
+    });
 }

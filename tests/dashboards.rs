@@ -148,50 +148,54 @@ fn configuration_and_alert_rules_hold() {
 
 #[test]
 fn the_operation_dashboard_is_answered_from_a_live_run() {
-    if !have("prometheus") {
-        return;
-    }
-    let mut stack = Stack::start();
-    let folder = tempfile::tempdir().unwrap();
-    let (_prometheus, port) = prometheus(folder.path(), stack.site.port, free_port());
-    stack.thrust(60.0, 60_000);
-
-    let metrics = get(&format!("http://127.0.0.1:{}/metrics", stack.site.port)).unwrap();
-    let mut check = Command::new("promtool")
-        .args(["check", "metrics"])
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .spawn()
-        .unwrap();
-    std::io::Write::write_all(&mut check.stdin.take().unwrap(), metrics.as_bytes()).unwrap();
-    let done = check.wait_with_output().unwrap();
-    assert!(done.status.success(), "promtool check metrics: {}", String::from_utf8_lossy(&done.stdout));
-    for line in metrics.lines().filter(|line| !line.starts_with('#')) {
-        assert!(line.starts_with("kort_"), "{line}");
-    }
-    for signal in kort_proto::signals::SIGNALS
-        .iter()
-        .map(|row| row.metric)
-        .filter(|m| m.contains("current") || m.contains("thrust"))
-    {
-        for stat in ["", "_min", "_max"] {
-            let wanted = format!("kort_{signal}{stat}{{thruster=\"t1\"}}");
-            wait(&wanted, || {
-                get(&format!("http://127.0.0.1:{}/metrics", stack.site.port))?.contains(&wanted).then_some(())
-            });
+    common::in_real_time(|| {
+        if !have("prometheus") {
+            return;
         }
-    }
+        let mut stack = Stack::start();
+        let folder = tempfile::tempdir().unwrap();
+        let (_prometheus, port) = prometheus(folder.path(), stack.site.port, free_port());
+        stack.thrust(60.0, 60_000);
 
-    let (path, dashboard) =
-        dashboards().into_iter().find(|(path, _)| path.ends_with("operation.json")).unwrap();
-    assert_all_answered(port, &dashboard, &path.display().to_string());
-    let thrust = ask(port, r#"kort_thrust_newtons{thruster="t1"}"#);
-    let value: f64 = thrust["data"]["result"][0]["value"][1].as_str().unwrap().parse().unwrap();
-    assert!((value - 60.0).abs() < 12.0, "Prometheus shows the thrust that is there: {value}");
-    assert_eq!(
-        ask(port, "ALERTS{alertstate=\"firing\",severity=\"critical\"}")["data"]["result"],
-        serde_json::json!([])
-    );
+        let metrics = get(&format!("http://127.0.0.1:{}/metrics", stack.site.port)).unwrap();
+        let mut check = Command::new("promtool")
+            .args(["check", "metrics"])
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        std::io::Write::write_all(&mut check.stdin.take().unwrap(), metrics.as_bytes()).unwrap();
+        let done = check.wait_with_output().unwrap();
+        assert!(done.status.success(), "promtool check metrics: {}", String::from_utf8_lossy(&done.stdout));
+        for line in metrics.lines().filter(|line| !line.starts_with('#')) {
+            assert!(line.starts_with("kort_"), "{line}");
+        }
+        for signal in kort_proto::signals::SIGNALS
+            .iter()
+            .map(|row| row.metric)
+            .filter(|m| m.contains("current") || m.contains("thrust"))
+        {
+            for stat in ["", "_min", "_max"] {
+                let wanted = format!("kort_{signal}{stat}{{thruster=\"t1\"}}");
+                wait(&wanted, || {
+                    get(&format!("http://127.0.0.1:{}/metrics", stack.site.port))?
+                        .contains(&wanted)
+                        .then_some(())
+                });
+            }
+        }
+
+        let (path, dashboard) =
+            dashboards().into_iter().find(|(path, _)| path.ends_with("operation.json")).unwrap();
+        assert_all_answered(port, &dashboard, &path.display().to_string());
+        let thrust = ask(port, r#"kort_thrust_newtons{thruster="t1"}"#);
+        let value: f64 = thrust["data"]["result"][0]["value"][1].as_str().unwrap().parse().unwrap();
+        assert!((value - 60.0).abs() < 12.0, "Prometheus shows the thrust that is there: {value}");
+        assert_eq!(
+            ask(port, "ALERTS{alertstate=\"firing\",severity=\"critical\"}")["data"]["result"],
+            serde_json::json!([])
+        );
+    });
 }
 
 #[test]

@@ -30,36 +30,40 @@ fn soak(stack: &Stack) -> Output {
 
 #[test]
 fn a_running_service_is_driven_scored_and_given_back() {
-    let stack = Stack::start();
-    let run = soak(&stack);
-    let said = String::from_utf8_lossy(&run.stderr).into_owned();
-    assert!(run.status.success(), "{said}");
-    let report: Value = serde_json::from_slice(&run.stdout).expect("one JSON document");
-    assert_eq!(report["schema"], "kort.soak/1");
-    assert_eq!(report["virtual_seconds"], 10.0);
-    let laws = report["scenarios"][0]["laws"].as_array().expect("laws");
-    let names: Vec<&str> = laws.iter().filter_map(|l| l["name"].as_str()).collect();
-    assert_eq!(names, ["velocity_servo", "model3_inversion"]);
-    for law in laws {
-        let of = |score: &str| law["scores"][score]["mean"].as_f64();
-        // A thruster that never turned would be about 75 N off.
-        assert!(of("thrust_rms_n").is_some_and(|rms| rms > 0.0 && rms < 60.0), "{law}");
-        assert!(of("useful_impulse_n_s").is_some_and(|impulse| impulse > 50.0), "{law}");
-        assert!(of("energy_j").is_some_and(|energy| energy > 0.0), "{law}");
-    }
-    let state = stack.state().expect("the service goes on");
-    assert_eq!(state["controller"], "model3_inversion", "{state}");
-    assert_eq!((&state["armed"], &state["lease"]), (&json!(false), &Value::Null), "{state}");
+    common::in_real_time(|| {
+        let stack = Stack::start();
+        let run = soak(&stack);
+        let said = String::from_utf8_lossy(&run.stderr).into_owned();
+        assert!(run.status.success(), "{said}");
+        let report: Value = serde_json::from_slice(&run.stdout).expect("one JSON document");
+        assert_eq!(report["schema"], "kort.soak/1");
+        assert_eq!(report["virtual_seconds"], 10.0);
+        let laws = report["scenarios"][0]["laws"].as_array().expect("laws");
+        let names: Vec<&str> = laws.iter().filter_map(|l| l["name"].as_str()).collect();
+        assert_eq!(names, ["velocity_servo", "model3_inversion"]);
+        for law in laws {
+            let of = |score: &str| law["scores"][score]["mean"].as_f64();
+            // A thruster that never turned would be about 75 N off.
+            assert!(of("thrust_rms_n").is_some_and(|rms| rms > 0.0 && rms < 60.0), "{law}");
+            assert!(of("useful_impulse_n_s").is_some_and(|impulse| impulse > 50.0), "{law}");
+            assert!(of("energy_j").is_some_and(|energy| energy > 0.0), "{law}");
+        }
+        let state = stack.state().expect("the service goes on");
+        assert_eq!(state["controller"], "model3_inversion", "{state}");
+        assert_eq!((&state["armed"], &state["lease"]), (&json!(false), &Value::Null), "{state}");
+    });
 }
 
 #[test]
 fn a_thruster_in_other_hands_is_left_alone() {
-    let mut stack = Stack::start();
-    stack.thrust(30.0, 60_000);
-    let run = soak(&stack);
-    assert_eq!(run.status.code(), Some(1));
-    let said = String::from_utf8_lossy(&run.stderr).into_owned();
-    assert!(said.contains("lease") && said.contains("test") && said.contains("hint:"), "{said}");
-    assert!(run.stdout.is_empty());
-    assert_eq!(stack.state().expect("state")["armed"], true);
+    common::in_real_time(|| {
+        let mut stack = Stack::start();
+        stack.thrust(30.0, 60_000);
+        let run = soak(&stack);
+        assert_eq!(run.status.code(), Some(1));
+        let said = String::from_utf8_lossy(&run.stderr).into_owned();
+        assert!(said.contains("lease") && said.contains("test") && said.contains("hint:"), "{said}");
+        assert!(run.stdout.is_empty());
+        assert_eq!(stack.state().expect("state")["armed"], true);
+    });
 }

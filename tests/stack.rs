@@ -30,224 +30,248 @@ fn now_ns() -> u64 {
 
 #[test]
 fn starts_thrusts_and_goes_to_zero_before_it_ends() {
-    let mut stack = Stack::start();
-    let state = stack.state().unwrap();
-    assert_eq!((&state["armed"], &state["faults"]), (&false.into(), &serde_json::json!([])));
-    stack.thrust(80.0, LEASE_MS);
-    let servo = stack.process_of("servo");
-    let mut watch = stack.watch();
-    kill(stack.supervisor.id(), "TERM");
-    let zero = watch.until("zero", at_zero);
-    assert_eq!(zero.faults, 0, "an ordered stop is no fault");
-    assert!(zero.signals.thrust_n.abs() < 10.0, "the drive went off at {} N", zero.signals.thrust_n);
-    assert!(alive(servo), "the servo still ran when thrust was at zero");
-    let status = stack.supervisor.wait().unwrap();
-    assert_eq!(status.code(), Some(0), "{}", stack.site.log());
-    assert!(!alive(servo));
-    let log = stack.site.log();
-    assert!(log.contains("thrust at zero ("), "{log}");
-    assert!(log.contains(&format!("http://127.0.0.1:{}/", stack.site.port)), "{log}");
+    common::in_real_time(|| {
+        let mut stack = Stack::start();
+        let state = stack.state().unwrap();
+        assert_eq!((&state["armed"], &state["faults"]), (&false.into(), &serde_json::json!([])));
+        stack.thrust(80.0, LEASE_MS);
+        let servo = stack.process_of("servo");
+        let mut watch = stack.watch();
+        kill(stack.supervisor.id(), "TERM");
+        let zero = watch.until("zero", at_zero);
+        assert_eq!(zero.faults, 0, "an ordered stop is no fault");
+        assert!(zero.signals.thrust_n.abs() < 10.0, "the drive went off at {} N", zero.signals.thrust_n);
+        assert!(alive(servo), "the servo still ran when thrust was at zero");
+        let status = stack.supervisor.wait().unwrap();
+        assert_eq!(status.code(), Some(0), "{}", stack.site.log());
+        assert!(!alive(servo));
+        let log = stack.site.log();
+        assert!(log.contains("thrust at zero ("), "{log}");
+        assert!(log.contains(&format!("http://127.0.0.1:{}/", stack.site.port)), "{log}");
+    });
 }
 
 #[test]
 fn a_killed_controller_ends_at_zero_and_its_successor_starts_there() {
-    let mut stack = Stack::start();
-    stack.thrust(80.0, LEASE_MS);
-    let mut watch = stack.watch();
-    let first = stack.process_of("controller");
-    kill(first, "KILL");
-    let zero = watch.until("zero", at_zero);
-    within(5, zero.command_stamp_ns, &zero);
-    assert_ne!(zero.faults & (Fault::CommandTimeout.bit() | Fault::ControllerRestarted.bit()), 0);
-    wait("a successor", || stack.process("controller").filter(|pid| *pid != first));
-    watch.stays_at_zero(Duration::from_millis(700));
-    stack.thrust(60.0, LEASE_MS);
+    common::in_real_time(|| {
+        let mut stack = Stack::start();
+        stack.thrust(80.0, LEASE_MS);
+        let mut watch = stack.watch();
+        let first = stack.process_of("controller");
+        kill(first, "KILL");
+        let zero = watch.until("zero", at_zero);
+        within(5, zero.command_stamp_ns, &zero);
+        assert_ne!(zero.faults & (Fault::CommandTimeout.bit() | Fault::ControllerRestarted.bit()), 0);
+        wait("a successor", || stack.process("controller").filter(|pid| *pid != first));
+        watch.stays_at_zero(Duration::from_millis(700));
+        stack.thrust(60.0, LEASE_MS);
+    });
 }
 
 #[test]
 fn a_killed_gateway_ends_at_zero_and_its_successor_starts_there() {
-    let mut stack = Stack::start();
-    stack.thrust(80.0, LEASE_MS);
-    let mut watch = stack.watch();
-    let first = stack.process_of("gateway");
-    let killed_ns = now_ns();
-    kill(first, "KILL");
-    let zero = watch.until("zero", at_zero);
-    ramped(killed_ns, &zero);
-    wait("a successor", || stack.process("gateway").filter(|pid| *pid != first));
-    stack.wait_until_up();
-    wait("the fault to be shown", || {
-        let faults = stack.state()?["faults"].to_string();
-        (faults.contains("gateway_lost") || faults.contains("gateway_restarted")).then_some(())
+    common::in_real_time(|| {
+        let mut stack = Stack::start();
+        stack.thrust(80.0, LEASE_MS);
+        let mut watch = stack.watch();
+        let first = stack.process_of("gateway");
+        let killed_ns = now_ns();
+        kill(first, "KILL");
+        let zero = watch.until("zero", at_zero);
+        ramped(killed_ns, &zero);
+        wait("a successor", || stack.process("gateway").filter(|pid| *pid != first));
+        stack.wait_until_up();
+        wait("the fault to be shown", || {
+            let faults = stack.state()?["faults"].to_string();
+            (faults.contains("gateway_lost") || faults.contains("gateway_restarted")).then_some(())
+        });
+        watch.stays_at_zero(Duration::from_millis(700));
+        stack.thrust(60.0, LEASE_MS);
     });
-    watch.stays_at_zero(Duration::from_millis(700));
-    stack.thrust(60.0, LEASE_MS);
 }
 
 #[test]
 fn a_killed_servo_is_replaced_by_one_at_zero() {
-    let mut stack = Stack::start();
-    stack.thrust(80.0, LEASE_MS);
-    let first = stack.process_of("servo");
-    let mut watch = stack.watch();
-    let session = watch.next().header.session;
-    kill(first, "KILL");
-    let fresh = watch.until("a successor", |t| t.header.session != session);
-    assert!(at_zero(&fresh), "{fresh:?}");
-    assert_ne!(fresh.faults & Fault::ServoRestarted.bit(), 0, "{fresh:?}");
-    watch.stays_at_zero(Duration::from_millis(700));
-    stack.thrust(60.0, LEASE_MS);
+    common::in_real_time(|| {
+        let mut stack = Stack::start();
+        stack.thrust(80.0, LEASE_MS);
+        let first = stack.process_of("servo");
+        let mut watch = stack.watch();
+        let session = watch.next().header.session;
+        kill(first, "KILL");
+        let fresh = watch.until("a successor", |t| t.header.session != session);
+        assert!(at_zero(&fresh), "{fresh:?}");
+        assert_ne!(fresh.faults & Fault::ServoRestarted.bit(), 0, "{fresh:?}");
+        watch.stays_at_zero(Duration::from_millis(700));
+        stack.thrust(60.0, LEASE_MS);
+    });
 }
 
 #[test]
 fn a_stop_that_nobody_asked_for_is_latched_through_every_restart_and_tells_what_was_before() {
-    let mut stack = Stack::start();
-    stack.thrust(80.0, LEASE_MS);
-    kill(stack.process_of("servo"), "KILL");
-    let told = |state: &serde_json::Value| {
-        let fault = state["faults"].as_array()?.iter().find(|f| f["name"] == "servo_restarted")?.clone();
-        (!fault["since"].is_null()).then_some(fault)
-    };
-    let fault = wait("the fault", || told(&stack.state()?));
-    let before = fault["before"]["thrust_n"].as_f64().expect("thrust before");
-    assert!((before - 80.0).abs() < 25.0, "{fault}");
-    for role in ["controller", "servo", "gateway"] {
-        let first = stack.process_of(role);
-        kill(first, "KILL");
-        wait("a successor", || stack.process(role).filter(|pid| *pid != first));
-        stack.wait_until_up();
-        assert_eq!(
-            told(&stack.state().unwrap()).map(|f| f["since"].clone()),
-            Some(fault["since"].clone()),
-            "{role}"
-        );
-    }
-    let events = stack.get("/v1/events").unwrap();
-    for kind in ["lease_taken", "armed", "commanded", "process_ended", "process_started", "tripped"] {
-        let there = events.as_array().unwrap().iter().any(|event| event["kind"] == kind);
-        assert!(there, "{kind} is not in {events}");
-    }
-    let (status, _) = stack.http("POST", "/arm", None).unwrap();
-    assert_eq!(status, 409, "latched");
-    stack.thrust(60.0, LEASE_MS);
-    assert_eq!(stack.state().unwrap()["faults"], serde_json::json!([]));
+    common::in_real_time(|| {
+        let mut stack = Stack::start();
+        stack.thrust(80.0, LEASE_MS);
+        kill(stack.process_of("servo"), "KILL");
+        let told = |state: &serde_json::Value| {
+            let fault = state["faults"].as_array()?.iter().find(|f| f["name"] == "servo_restarted")?.clone();
+            (!fault["since"].is_null()).then_some(fault)
+        };
+        let fault = wait("the fault", || told(&stack.state()?));
+        let before = fault["before"]["thrust_n"].as_f64().expect("thrust before");
+        assert!((before - 80.0).abs() < 25.0, "{fault}");
+        for role in ["controller", "servo", "gateway"] {
+            let first = stack.process_of(role);
+            kill(first, "KILL");
+            wait("a successor", || stack.process(role).filter(|pid| *pid != first));
+            stack.wait_until_up();
+            assert_eq!(
+                told(&stack.state().unwrap()).map(|f| f["since"].clone()),
+                Some(fault["since"].clone()),
+                "{role}"
+            );
+        }
+        let events = stack.get("/v1/events").unwrap();
+        for kind in ["lease_taken", "armed", "commanded", "process_ended", "process_started", "tripped"] {
+            let there = events.as_array().unwrap().iter().any(|event| event["kind"] == kind);
+            assert!(there, "{kind} is not in {events}");
+        }
+        let (status, _) = stack.http("POST", "/arm", None).unwrap();
+        assert_eq!(status, 409, "latched");
+        stack.thrust(60.0, LEASE_MS);
+        assert_eq!(stack.state().unwrap()["faults"], serde_json::json!([]));
+    });
 }
 
 #[test]
 fn a_service_that_died_while_armed_says_so_when_it_comes_back() {
-    let mut stack = Stack::start();
-    stack.thrust(80.0, LEASE_MS);
-    std::thread::sleep(Duration::from_millis(1200));
-    kill(stack.supervisor.id(), "KILL");
-    stack.supervisor.wait().unwrap();
-    stack.supervisor = stack.site.spawn("up");
-    let fault = wait("the fault", || {
-        stack.state()?["faults"].as_array()?.iter().find(|f| f["name"] == "servo_restarted").cloned()
+    common::in_real_time(|| {
+        let mut stack = Stack::start();
+        stack.thrust(80.0, LEASE_MS);
+        std::thread::sleep(Duration::from_millis(1200));
+        kill(stack.supervisor.id(), "KILL");
+        stack.supervisor.wait().unwrap();
+        stack.supervisor = stack.site.spawn("up");
+        let fault = wait("the fault", || {
+            stack.state()?["faults"].as_array()?.iter().find(|f| f["name"] == "servo_restarted").cloned()
+        });
+        assert!(fault["since"].is_string(), "{fault}");
+        stack.thrust(60.0, LEASE_MS);
     });
-    assert!(fault["since"].is_string(), "{fault}");
-    stack.thrust(60.0, LEASE_MS);
 }
 
 #[test]
 fn a_dead_servo_is_not_shown_as_armed() {
-    let mut stack = Stack::start();
-    stack.thrust(80.0, LEASE_MS);
-    kill(stack.process_of("servo"), "STOP");
-    std::thread::sleep(Duration::from_millis(60));
-    let state = stack.state().unwrap();
-    assert_eq!(state["armed"], false, "{state}");
-    assert!(state["faults"].to_string().contains("servo_lost"), "{state}");
+    common::in_real_time(|| {
+        let mut stack = Stack::start();
+        stack.thrust(80.0, LEASE_MS);
+        kill(stack.process_of("servo"), "STOP");
+        std::thread::sleep(Duration::from_millis(60));
+        let state = stack.state().unwrap();
+        assert_eq!(state["armed"], false, "{state}");
+        assert!(state["faults"].to_string().contains("servo_lost"), "{state}");
+    });
 }
 
 #[test]
 fn of_two_thrusters_the_one_goes_on_when_the_others_servo_dies() {
-    let mut stack = Stack::start_at(Site::new().with_t2());
-    stack.at("t2").wait_until_up();
-    // A machine that stands still may stop t1 by itself; were it the death of t2, it did so every time.
-    let went_on = (0..5).any(|_| {
-        stack.at("t1").thrust(80.0, LEASE_MS);
-        stack.at("t2").thrust(15.0, LEASE_MS);
-        let mut other = stack.watch();
-        let session = other.next().header.session;
-        let mut going_on = stack.at("t1").watch();
-        let armed_at = going_on.next().armed_at_ns;
+    common::in_real_time(|| {
+        let mut stack = Stack::start_at(Site::new().with_t2());
+        stack.at("t2").wait_until_up();
+        // A machine that stands still may stop t1 by itself; were it the death of t2, it did so every time.
+        let went_on = (0..5).any(|_| {
+            stack.at("t1").thrust(80.0, LEASE_MS);
+            stack.at("t2").thrust(15.0, LEASE_MS);
+            let mut other = stack.watch();
+            let session = other.next().header.session;
+            let mut going_on = stack.at("t1").watch();
+            let armed_at = going_on.next().armed_at_ns;
 
-        kill(stack.at("t2").process_of("servo"), "KILL");
-        let fresh = other.until("a successor", |t| t.header.session != session);
-        assert!(at_zero(&fresh), "{fresh:?}");
-        other.stays_at_zero(Duration::from_millis(700));
-        let now = now_ns();
-        let t1 = going_on.until("t1 after all that", |t| t.time_ns > now);
-        let thrusts = (t1.signals.thrust_n - 80.0).abs() < 16.0;
-        (t1.armed, t1.faults, t1.armed_at_ns) == (1, 0, armed_at) && thrusts
+            kill(stack.at("t2").process_of("servo"), "KILL");
+            let fresh = other.until("a successor", |t| t.header.session != session);
+            assert!(at_zero(&fresh), "{fresh:?}");
+            other.stays_at_zero(Duration::from_millis(700));
+            let now = now_ns();
+            let t1 = going_on.until("t1 after all that", |t| t.time_ns > now);
+            let thrusts = (t1.signals.thrust_n - 80.0).abs() < 16.0;
+            (t1.armed, t1.faults, t1.armed_at_ns) == (1, 0, armed_at) && thrusts
+        });
+        assert!(went_on, "t1 stopped with t2");
+        stack.at("t2").thrust(10.0, LEASE_MS);
     });
-    assert!(went_on, "t1 stopped with t2");
-    stack.at("t2").thrust(10.0, LEASE_MS);
 }
 
 #[test]
 fn a_setpoint_right_after_the_arming_is_kept() {
-    let mut stack = Stack::start();
-    stack.thrust(40.0, LEASE_MS);
-    for newton in 41..=50 {
-        stack.expect("POST", "/disarm", None);
-        stack.expect("POST", "/arm", None);
-        let thrust_n = f64::from(newton);
-        stack.expect("PUT", "/setpoint", Some(serde_json::json!({"thrust_n": thrust_n})));
-        let mut watch = stack.watch();
-        watch.until("the drive to follow", |t| t.armed != 0 && t.signals.thrust_cmd_n == thrust_n);
-        assert_eq!(stack.state().unwrap()["setpoint"]["thrust_n"], thrust_n);
-    }
+    common::in_real_time(|| {
+        let mut stack = Stack::start();
+        stack.thrust(40.0, LEASE_MS);
+        for newton in 41..=50 {
+            stack.expect("POST", "/disarm", None);
+            stack.expect("POST", "/arm", None);
+            let thrust_n = f64::from(newton);
+            stack.expect("PUT", "/setpoint", Some(serde_json::json!({"thrust_n": thrust_n})));
+            let mut watch = stack.watch();
+            watch.until("the drive to follow", |t| t.armed != 0 && t.signals.thrust_cmd_n == thrust_n);
+            assert_eq!(stack.state().unwrap()["setpoint"]["thrust_n"], thrust_n);
+        }
+    });
 }
 
 #[test]
 fn a_frozen_controller_ends_at_zero_and_resumes_nothing_when_it_thaws() {
-    let mut stack = Stack::start();
-    stack.thrust(80.0, LEASE_MS);
-    let mut watch = stack.watch();
-    let controller = stack.process_of("controller");
-    kill(controller, "STOP");
-    let zero = watch.until("zero", at_zero);
-    within(5, zero.command_stamp_ns, &zero);
-    assert_eq!(zero.faults, Fault::CommandTimeout.bit());
-    kill(controller, "CONT");
-    watch.stays_at_zero(Duration::from_millis(700));
-    stack.thrust(60.0, LEASE_MS);
+    common::in_real_time(|| {
+        let mut stack = Stack::start();
+        stack.thrust(80.0, LEASE_MS);
+        let mut watch = stack.watch();
+        let controller = stack.process_of("controller");
+        kill(controller, "STOP");
+        let zero = watch.until("zero", at_zero);
+        within(5, zero.command_stamp_ns, &zero);
+        assert_eq!(zero.faults, Fault::CommandTimeout.bit());
+        kill(controller, "CONT");
+        watch.stays_at_zero(Duration::from_millis(700));
+        stack.thrust(60.0, LEASE_MS);
+    });
 }
 
 #[test]
 fn a_process_that_hangs_is_ended_and_replaced() {
-    let mut stack = Stack::start();
-    std::thread::sleep(Duration::from_secs(6)); // a start is given that long to be heard
-    stack.thrust(40.0, LEASE_MS);
-    for role in ["servo", "controller", "gateway"] {
-        let frozen = stack.process_of(role);
-        kill(frozen, "STOP");
-        let stopped = Instant::now();
-        wait("a successor", || stack.process(role).filter(|pid| *pid != frozen));
-        assert!(stopped.elapsed() < Duration::from_secs(5), "{role}: {:?}", stopped.elapsed());
-        std::thread::sleep(Duration::from_secs(6));
-    }
-    stack.wait_until_up();
-    let events = stack.get("/v1/events").unwrap().to_string();
-    assert_eq!(events.matches("process_hung").count(), 3, "{events}");
-    let metrics = stack.text("/metrics").unwrap();
-    for (thruster, role) in [("t1", "servo"), ("t1", "controller"), ("", "gateway")] {
-        let line = format!("kort_process_restarts_total{{thruster=\"{thruster}\",process=\"{role}\"}} 1");
-        assert!(metrics.contains(&line), "{line} is not in {metrics}");
-    }
-    stack.thrust(60.0, LEASE_MS);
+    common::in_real_time(|| {
+        let mut stack = Stack::start();
+        std::thread::sleep(Duration::from_secs(6)); // a start is given that long to be heard
+        stack.thrust(40.0, LEASE_MS);
+        for role in ["servo", "controller", "gateway"] {
+            let frozen = stack.process_of(role);
+            kill(frozen, "STOP");
+            let stopped = Instant::now();
+            wait("a successor", || stack.process(role).filter(|pid| *pid != frozen));
+            assert!(stopped.elapsed() < Duration::from_secs(5), "{role}: {:?}", stopped.elapsed());
+            std::thread::sleep(Duration::from_secs(6));
+        }
+        stack.wait_until_up();
+        let events = stack.get("/v1/events").unwrap().to_string();
+        assert_eq!(events.matches("process_hung").count(), 3, "{events}");
+        let metrics = stack.text("/metrics").unwrap();
+        for (thruster, role) in [("t1", "servo"), ("t1", "controller"), ("", "gateway")] {
+            let line = format!("kort_process_restarts_total{{thruster=\"{thruster}\",process=\"{role}\"}} 1");
+            assert!(metrics.contains(&line), "{line} is not in {metrics}");
+        }
+        stack.thrust(60.0, LEASE_MS);
+    });
 }
 
 #[test]
 fn the_end_of_the_terminal_leaves_nothing_in_shared_memory() {
-    let stack = Stack::start();
-    let ours = || std::fs::read_dir("/dev/shm").unwrap().flatten().count();
-    let before = ours();
-    kill(stack.supervisor.id(), "HUP");
-    wait("the end", || (!alive(stack.supervisor.id())).then_some(()));
-    assert!(ours() + 20 < before, "{before} files before, {} after", ours());
-    assert!(stack.site.log().contains("stopped"), "{}", stack.site.log());
+    common::in_real_time(|| {
+        let stack = Stack::start();
+        let ours = || std::fs::read_dir("/dev/shm").unwrap().flatten().count();
+        let before = ours();
+        kill(stack.supervisor.id(), "HUP");
+        wait("the end", || (!alive(stack.supervisor.id())).then_some(()));
+        assert!(ours() + 20 < before, "{before} files before, {} after", ours());
+        assert!(stack.site.log().contains("stopped"), "{}", stack.site.log());
+    });
 }
 
 #[test]
@@ -287,77 +311,87 @@ fn what_others_could_write_is_not_trusted() {
 
 #[test]
 fn a_frozen_gateway_ends_at_zero_and_resumes_nothing_when_it_thaws() {
-    let mut stack = Stack::start();
-    stack.thrust(80.0, LEASE_MS);
-    let mut watch = stack.watch();
-    let gateway = stack.process_of("gateway");
-    let frozen_ns = now_ns();
-    kill(gateway, "STOP");
-    let zero = watch.until("zero", at_zero);
-    ramped(frozen_ns, &zero);
-    kill(gateway, "CONT");
-    watch.stays_at_zero(Duration::from_millis(700));
-    stack.thrust(60.0, LEASE_MS);
+    common::in_real_time(|| {
+        let mut stack = Stack::start();
+        stack.thrust(80.0, LEASE_MS);
+        let mut watch = stack.watch();
+        let gateway = stack.process_of("gateway");
+        let frozen_ns = now_ns();
+        kill(gateway, "STOP");
+        let zero = watch.until("zero", at_zero);
+        ramped(frozen_ns, &zero);
+        kill(gateway, "CONT");
+        watch.stays_at_zero(Duration::from_millis(700));
+        stack.thrust(60.0, LEASE_MS);
+    });
 }
 
 #[test]
 fn the_end_of_a_lease_ramps_to_zero_within_half_a_second() {
-    let mut stack = Stack::start();
-    let taken = Instant::now();
-    stack.thrust(80.0, 3000);
-    let mut watch = stack.watch();
-    // The lease was renewed by the setpoint at the latest; from then on nobody renews it.
-    watch.until("the whole setpoint", |t| t.signals.thrust_cmd_n == 80.0);
-    let falling = watch.until("the ramp", |t| t.armed != 0 && t.signals.thrust_cmd_n < 70.0);
-    let zero = watch.until("zero", at_zero);
-    let took_ms = (zero.time_ns - falling.time_ns) / 1_000_000;
-    assert!(took_ms <= 500 + 2 * PERIOD_NS / 1_000_000, "{took_ms} ms");
-    assert!(took_ms >= 150, "a ramp, no step: {took_ms} ms");
-    assert!(taken.elapsed() >= Duration::from_millis(2900), "the lease ended early");
-    watch.stays_at_zero(Duration::from_millis(500));
-    stack.thrust(60.0, LEASE_MS);
+    common::in_real_time(|| {
+        let mut stack = Stack::start();
+        let taken = Instant::now();
+        stack.thrust(80.0, 3000);
+        let mut watch = stack.watch();
+        // The lease was renewed by the setpoint at the latest; from then on nobody renews it.
+        watch.until("the whole setpoint", |t| t.signals.thrust_cmd_n == 80.0);
+        let falling = watch.until("the ramp", |t| t.armed != 0 && t.signals.thrust_cmd_n < 70.0);
+        let zero = watch.until("zero", at_zero);
+        let took_ms = (zero.time_ns - falling.time_ns) / 1_000_000;
+        assert!(took_ms <= 500 + 2 * PERIOD_NS / 1_000_000, "{took_ms} ms");
+        assert!(took_ms >= 150, "a ramp, no step: {took_ms} ms");
+        assert!(taken.elapsed() >= Duration::from_millis(2900), "the lease ended early");
+        watch.stays_at_zero(Duration::from_millis(500));
+        stack.thrust(60.0, LEASE_MS);
+    });
 }
 
 #[test]
 fn kills_at_any_instant_start_up_included_need_no_person() {
-    let mut stack = Stack::start();
-    // Delays sweep what a start goes through: exec, configuration, ports, first ticks.
-    let roles = ["servo", "controller", "gateway"];
-    for i in 0u64..30 {
-        let role = roles[(i % 3) as usize];
-        std::thread::sleep(Duration::from_micros((i * 7919) % 60_000));
-        if let Some(pid) = stack.process(role) {
-            let _ = std::process::Command::new("kill").args(["-KILL", &pid.to_string()]).status();
+    common::in_real_time(|| {
+        let mut stack = Stack::start();
+        // Delays sweep what a start goes through: exec, configuration, ports, first ticks.
+        let roles = ["servo", "controller", "gateway"];
+        for i in 0u64..30 {
+            let role = roles[(i % 3) as usize];
+            std::thread::sleep(Duration::from_micros((i * 7919) % 60_000));
+            if let Some(pid) = stack.process(role) {
+                let _ = std::process::Command::new("kill").args(["-KILL", &pid.to_string()]).status();
+            }
         }
-    }
-    stack.wait_until_up();
-    stack.thrust(60.0, LEASE_MS);
-    assert!(alive(stack.supervisor.id()));
+        stack.wait_until_up();
+        stack.thrust(60.0, LEASE_MS);
+        assert!(alive(stack.supervisor.id()));
+    });
 }
 
 #[test]
 fn a_killed_supervisor_takes_its_children_along_and_the_next_one_starts() {
-    let mut stack = Stack::start();
-    stack.thrust(80.0, LEASE_MS);
-    let orphans = children(stack.supervisor.id());
-    assert_eq!(orphans.len(), 3);
-    kill(stack.supervisor.id(), "KILL");
-    stack.supervisor.wait().unwrap();
-    wait("the children to end", || orphans.iter().all(|(pid, _)| !alive(*pid)).then_some(()));
-    stack.supervisor = stack.site.spawn("up");
-    stack.wait_until_up();
-    stack.watch().stays_at_zero(Duration::from_millis(300));
-    stack.thrust(60.0, LEASE_MS);
+    common::in_real_time(|| {
+        let mut stack = Stack::start();
+        stack.thrust(80.0, LEASE_MS);
+        let orphans = children(stack.supervisor.id());
+        assert_eq!(orphans.len(), 3);
+        kill(stack.supervisor.id(), "KILL");
+        stack.supervisor.wait().unwrap();
+        wait("the children to end", || orphans.iter().all(|(pid, _)| !alive(*pid)).then_some(()));
+        stack.supervisor = stack.site.spawn("up");
+        stack.wait_until_up();
+        stack.watch().stays_at_zero(Duration::from_millis(300));
+        stack.thrust(60.0, LEASE_MS);
+    });
 }
 
 #[test]
 fn a_second_supervisor_is_told_who_runs_here() {
-    let stack = Stack::start();
-    let second = run(&mut stack.site.command("up"));
-    assert_eq!(second.status.code(), Some(1));
-    let words = String::from_utf8_lossy(&second.stderr);
-    assert!(words.contains(&stack.supervisor.id().to_string()) && words.contains("hint:"), "{words}");
-    assert!(stack.state().is_some(), "the first one still runs");
+    common::in_real_time(|| {
+        let stack = Stack::start();
+        let second = run(&mut stack.site.command("up"));
+        assert_eq!(second.status.code(), Some(1));
+        let words = String::from_utf8_lossy(&second.stderr);
+        assert!(words.contains(&stack.supervisor.id().to_string()) && words.contains("hint:"), "{words}");
+        assert!(stack.state().is_some(), "the first one still runs");
+    });
 }
 
 #[test]
