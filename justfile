@@ -27,3 +27,12 @@ prove *ARGS:
 # the fault campaign: each process killed 1000 times, and the rest of docs/operations.md's table
 faults KILLS="1000":
     KORT_FAULT_KILLS={{KILLS}} cargo test --test faults -- --nocapture
+
+# fuzz an entry point: csv, mcap, toml, deployment, bodies or messages (nightly, cargo-fuzz)
+fuzz TARGET SECONDS="60":
+    mkdir -p fuzz/corpus/{{TARGET}}
+    cargo +nightly fuzz run {{TARGET}} fuzz/corpus/{{TARGET}} $(fuzz/seeds.sh {{TARGET}}) -- -max_total_time={{SECONDS}} -rss_limit_mb=4096
+
+# undefined behaviour in what shared memory carries: messages, texts, freshness (nightly, miri)
+miri:
+    cargo +nightly miri test -p kort-proto --lib

@@ -41,5 +41,16 @@ if [ -x "$schemathesis" ]; then export KORT_SCHEMATHESIS="$schemathesis"; else s
 say "cargo test --workspace"
 cargo test --workspace --no-fail-fast
 
+# Fuzzing where its tools are; elsewhere tests/any_input.rs stands in for it.
+if cargo +nightly fuzz --version >/dev/null 2>&1; then
+  for target in csv mcap toml deployment bodies messages; do
+    say "fuzzing $target for a minute"
+    mkdir -p "fuzz/corpus/$target"
+    cargo +nightly fuzz run "$target" "fuzz/corpus/$target" $(fuzz/seeds.sh "$target") -- -max_total_time=60 -rss_limit_mb=4096
+  done
+else
+  skipped+=("cargo fuzz (needs nightly and cargo-fuzz); its entry points were given random input by tests/any_input.rs")
+fi
+
 say "all tests passed"
 for line in ${skipped[@]+"${skipped[@]}"}; do echo "not run: $line"; done

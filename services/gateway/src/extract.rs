@@ -3,13 +3,55 @@
 use axum::body::{Body, Bytes};
 use axum::extract::{FromRequest, FromRequestParts, Request};
 use axum::http::request::Parts;
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{DeserializeOwned, MapAccess, Visitor};
+use serde::{Deserialize, Deserializer};
 
 use crate::problem::{Kind, Problem};
 
-/// A JSON body; every rejection is a problem document.
-#[derive(FromRequest)]
-#[from_request(via(axum::Json), rejection(Problem))]
+/// A JSON object and nothing else. serde also takes a list for a struct, field by field: a command given by the order
+/// of its numbers, which nobody has promised.
+pub struct Object<T>(pub T);
+
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for Object<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct OnlyObject<T>(std::marker::PhantomData<T>);
+
+        impl<'de, T: Deserialize<'de>> Visitor<'de> for OnlyObject<T> {
+            type Value = T;
+
+            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str("an object")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<T, A::Error> {
+                T::deserialize(MapAccessDeserializer::new(map))
+            }
+        }
+
+        deserializer.deserialize_map(OnlyObject(std::marker::PhantomData)).map(Object)
+    }
+}
+
+/// A JSON body, an object; every rejection is a problem document.
 pub struct Json<T>(pub T);
+
+impl<T: DeserializeOwned> Json<T> {
+    /// Reads a body's bytes.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Json<T>, Problem> {
+        let axum::Json(Object(value)) = axum::Json::from_bytes(bytes)?;
+        Ok(Json(value))
+    }
+}
+
+impl<S: Send + Sync, T: DeserializeOwned> FromRequest<S> for Json<T> {
+    type Rejection = Problem;
+
+    async fn from_request(request: Request, state: &S) -> Result<Json<T>, Problem> {
+        let axum::Json(Object(value)) = axum::Json::from_request(request, state).await?;
+        Ok(Json(value))
+    }
+}
 
 /// Path parameters; every rejection is a problem document.
 #[derive(FromRequestParts)]
@@ -46,7 +88,18 @@ impl<S: Sync> FromRequestParts<S> for LeaseId {
 /// A JSON body that may be left out altogether, or be `null`.
 pub struct OptionalJson<T>(pub Option<T>);
 
-impl<S: Send + Sync, T: serde::de::DeserializeOwned> FromRequest<S> for OptionalJson<T> {
+impl<T: DeserializeOwned> OptionalJson<T> {
+    /// Reads a body's bytes.
+    pub fn from_bytes(bytes: &[u8]) -> Result<OptionalJson<T>, Problem> {
+        if bytes.is_empty() {
+            return Ok(OptionalJson(None));
+        }
+        let axum::Json(value) = axum::Json::<Option<Object<T>>>::from_bytes(bytes)?;
+        Ok(OptionalJson(value.map(|Object(value)| value)))
+    }
+}
+
+impl<S: Send + Sync, T: DeserializeOwned> FromRequest<S> for OptionalJson<T> {
     type Rejection = Problem;
 
     async fn from_request(request: Request, state: &S) -> Result<OptionalJson<T>, Problem> {
@@ -55,7 +108,9 @@ impl<S: Send + Sync, T: serde::de::DeserializeOwned> FromRequest<S> for Optional
         if bytes.is_empty() {
             return Ok(OptionalJson(None));
         }
-        let Json(value) = Json::from_request(Request::from_parts(parts, Body::from(bytes)), state).await?;
-        Ok(OptionalJson(value))
+        // The header is looked at too.
+        let request = Request::from_parts(parts, Body::from(bytes));
+        let axum::Json(value) = axum::Json::<Option<Object<T>>>::from_request(request, state).await?;
+        Ok(OptionalJson(value.map(|Object(value)| value)))
     }
 }

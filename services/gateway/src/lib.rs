@@ -8,6 +8,7 @@
     reason = "a problem is made at most once a request; a box would only add a step"
 )]
 
+pub mod bodies;
 mod bus;
 mod connections;
 mod desk;

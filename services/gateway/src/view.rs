@@ -7,6 +7,8 @@ use utoipa::openapi::RefOr;
 use utoipa::openapi::schema::{ObjectBuilder, Schema, SchemaType, Type};
 use utoipa::{PartialSchema, ToSchema};
 
+use crate::extract::Object;
+
 /// Everything known of one thruster at one instant.
 #[derive(Clone, Debug, Serialize, ToSchema)]
 pub struct ThrusterState {
@@ -51,7 +53,7 @@ pub struct ThrusterState {
 
 /// What is commanded: exactly one of the two.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(rename_all = "snake_case", try_from = "SetpointKeys")]
+#[serde(rename_all = "snake_case", try_from = "Object<SetpointKeys>")]
 #[schema(example = json!({"thrust_n": 25.0}))]
 pub enum Setpoint {
     /// Thrust, N; positive pushes ahead.
@@ -69,10 +71,10 @@ struct SetpointKeys {
     speed_rad_s: Option<f64>,
 }
 
-impl TryFrom<SetpointKeys> for Setpoint {
+impl TryFrom<Object<SetpointKeys>> for Setpoint {
     type Error = &'static str;
 
-    fn try_from(keys: SetpointKeys) -> Result<Self, Self::Error> {
+    fn try_from(Object(keys): Object<SetpointKeys>) -> Result<Self, Self::Error> {
         match keys {
             SetpointKeys { thrust_n: Some(value), speed_rad_s: None } => Ok(Self::ThrustN(value)),
             SetpointKeys { thrust_n: None, speed_rad_s: Some(value) } => Ok(Self::SpeedRadS(value)),

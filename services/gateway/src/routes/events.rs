@@ -5,6 +5,9 @@ use std::sync::Arc;
 use axum::extract::State;
 use kort_proto::events::Event;
 use serde::{Deserialize, Serialize};
+use time::OffsetDateTime;
+use time::format_description::well_known::Rfc3339;
+use utoipa::openapi::schema::{KnownFormat, ObjectBuilder, OneOfBuilder, Schema, SchemaFormat, Type};
 use utoipa::{IntoParams, ToSchema};
 use utoipa_axum::{router::OpenApiRouter, routes};
 
@@ -26,8 +29,8 @@ pub fn routes() -> OpenApiRouter<Arc<App>> {
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 struct Since {
-    /// Only later ones: the `id` of an event, or a time in RFC 3339.
-    #[param(example = "2026-01-01T12:00:00Z")]
+    /// Only later ones: the `id` of an event, or a time in RFC 3339 (a `+` of its offset is `%2B` in an address).
+    #[param(schema_with = since_schema, example = "2026-01-01T12:00:00Z")]
     since: Option<String>,
     /// At most so many, the newest.
     #[param(minimum = 1, maximum = 5000, default = 200)]
@@ -83,16 +86,29 @@ async fn list(
     Ok(axum::Json(app.events().since(after, limit).into_iter().map(EventView::from).collect()))
 }
 
+/// An id or a time: two schemas, so that a client's generator makes no word that is neither.
+fn since_schema() -> Schema {
+    let id = ObjectBuilder::new()
+        .schema_type(Type::Integer)
+        .minimum(Some(0))
+        .maximum(Some(u64::MAX))
+        .description(Some("the `id` of the last event that is known"));
+    let time = ObjectBuilder::new()
+        .schema_type(Type::String)
+        .format(Some(SchemaFormat::KnownFormat(KnownFormat::DateTime)))
+        .description(Some("wall time"));
+    OneOfBuilder::new().item(id).item(time).into()
+}
+
 /// The id after which events are wanted: ids are microseconds of wall time.
 fn after(since: &str) -> Result<u64, Problem> {
     if let Ok(id) = since.parse() {
         return Ok(id);
     }
-    let time = humantime::parse_rfc3339_weak(since)
-        .ok()
-        .and_then(|time| time.duration_since(std::time::SystemTime::UNIX_EPOCH).ok());
-    time.map(|time| time.as_micros() as u64).ok_or_else(|| {
+    let time = OffsetDateTime::parse(since, &Rfc3339).map_err(|_| {
         Problem::new(Kind::OutOfRange, format!("since = {since:?} is neither the id of an event nor a time"))
             .hint("2026-01-01T12:00:00Z, or the id of the last event that is known")
-    })
+    })?;
+    // Before 1970 nothing happened.
+    Ok(u64::try_from(time.unix_timestamp_nanos() / 1000).unwrap_or(0))
 }

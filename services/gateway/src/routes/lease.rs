@@ -25,7 +25,7 @@ pub fn routes() -> OpenApiRouter<Arc<App>> {
 #[derive(Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object with holder")]
 #[schema(example = json!({"holder": "bench", "ttl_ms": 10000}))]
-struct LeaseRequest {
+pub struct LeaseRequest {
     /// Name shown to everybody else who asks: 1 to 64 characters, no control characters.
     #[schema(min_length = 1, max_length = 64, pattern = r"^[^\u0000-\u001f\u007f-\u009f]+$")]
     holder: String,

@@ -17,6 +17,14 @@ mod thrusters;
 
 pub use controller::{ControllerRequest, ControllerView, LawParameter};
 
+/// What clients send, for [`crate::bodies`].
+pub mod bodies {
+    pub use super::controller::ControllerRequest;
+    pub use super::lease::LeaseRequest;
+    pub use super::recordings::RecordingRequest;
+    pub use super::stream::parse as incoming;
+}
+
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 

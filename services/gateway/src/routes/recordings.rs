@@ -29,7 +29,7 @@ pub fn routes() -> OpenApiRouter<Arc<App>> {
 #[derive(Default, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 #[schema(example = json!({"thruster": "t1", "name": "step-100-n", "rate_hz": 100}))]
-struct RecordingRequest {
+pub struct RecordingRequest {
     /// Thruster to record; the first of the configuration if left out.
     #[serde(default)]
     #[schema(nullable = false)]

@@ -15,7 +15,7 @@ use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::thrusters::json;
 use crate::App;
-use crate::extract::{Path, Query};
+use crate::extract::{Object, Path, Query};
 use crate::problem::{Kind, Problem};
 use crate::thruster::Thruster;
 use crate::token::{Identity, Role};
@@ -59,7 +59,7 @@ fn hz_default() -> f64 {
 /// What a client may send: a setpoint under its lease, or a stop.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, expecting = "an object with setpoint and lease_id, or with stop")]
-struct Incoming {
+pub struct Incoming {
     setpoint: Option<Setpoint>,
     lease_id: Option<String>,
     #[serde(default)]
@@ -236,7 +236,8 @@ impl Session {
 
 const EXAMPLE: &str = r#"send {"setpoint": {"thrust_n": 25.0}, "lease_id": "…"}, or {"stop": true}"#;
 
-fn parse(body: &str) -> Result<Incoming, Problem> {
+/// Reads a text message.
+pub fn parse(body: &str) -> Result<Incoming, Problem> {
     if body.len() > MESSAGE_BYTES_MAX {
         return Err(Problem::new(
             Kind::BodyTooLarge,
@@ -244,7 +245,7 @@ fn parse(body: &str) -> Result<Incoming, Problem> {
         )
         .hint("no command needs that much"));
     }
-    serde_json::from_str(body).map_err(|error| {
+    serde_json::from_str(body).map(|Object(incoming)| incoming).map_err(|error| {
         let kind = if error.is_data() { Kind::InvalidField } else { Kind::MalformedJson };
         Problem::new(kind, error.to_string()).hint(EXAMPLE)
     })

@@ -1,0 +1,74 @@
+//! What reads bytes that others wrote, entry by entry, with what must hold whatever the bytes are: no panic, and an
+//! error says where and what to do. The fuzz targets beside this file and `tests/any_input.rs` call the same functions.
+
+use std::path::Path;
+
+use kort_gateway::bodies::Body;
+use kort_lab::check::Kind;
+use kort_proto::config::Config;
+use kort_recording::{ColumnMap, Recording};
+use kort_thruster::rig::Rig;
+
+const NAME: &str = "any.input";
+
+/// A map that takes columns of `seeds/csv/foreign.csv`.
+const MAP: &str = "[time]\nsource = \"t_ms\"\nunit = \"ms\"\nstale_rows = \"drop\"\n\
+    [columns.shaft_speed_rad_s]\nsource = \"n\"\nunit = \"rev/s\"\nsign_of = \"pwm\"\nsign_zero = 1500\n";
+
+/// A rig for the deployments that are read.
+const RIG: &str = include_str!("../config/thrusters/whitcomb-yoerger-1999.toml");
+
+/// A recording, CSV or MCAP by its first bytes, plain or gzip, alone and through a column map.
+pub fn recording(bytes: &[u8]) -> Result<Recording, String> {
+    let read = |map: Option<&ColumnMap>| {
+        let read = Recording::decode(NAME, bytes, map);
+        if let Ok(recording) = &read {
+            let rows = recording.rows();
+            assert!(rows >= 2 && recording.time_s.windows(2).all(|w| w[0] < w[1]), "time increases");
+            assert!(recording.columns.iter().all(|c| c.values.len() == rows), "columns are as long as time");
+        }
+        read.map_err(|e| located(NAME, e.to_string()))
+    };
+    let map = ColumnMap::from_toml("map", MAP).expect("a sound map");
+    let _ = read(Some(&map));
+    read(None)
+}
+
+/// A rig, scenario, controller or column map, as `kort check` reads it.
+pub fn description(text: &str) -> Result<(), String> {
+    for kind in [Kind::Rig, Kind::Soak, Kind::Scenario, Kind::Columns, Kind::Controller] {
+        // A file of one kind is a bad one of every other.
+        let _ = kind.check(text, Path::new(NAME));
+    }
+    let table: toml::Table = text.parse().map_err(|e: toml::de::Error| e.to_string())?;
+    Kind::of(&table).check(text, Path::new(NAME)).map_err(|e| located("", e))
+}
+
+/// A deployment, read by every process that takes its part of it.
+pub fn deployment(text: &str) -> Result<(), String> {
+    let fail = |e: String| located(NAME, e);
+    let config = Config::parse(text, Some(Path::new(NAME))).map_err(|e| fail(e.to_string()))?;
+    kort_gateway::Settings::new(&config).map_err(|e| fail(e.to_string()))?;
+    let rig = Rig::from_toml(RIG).expect("a sound rig");
+    for (id, thruster) in &config.thrusters {
+        kort_servo::settings::Settings::new(&config, id, thruster, &rig).map_err(|e| fail(e.to_string()))?;
+        kort_servo::amplifier::build(&config, id, thruster, &rig).map_err(|e| fail(e.to_string()))?;
+    }
+    Ok(())
+}
+
+/// A body or a message of a client; the error is the problem document.
+pub fn body(kind: Body, bytes: &[u8]) -> Result<(), serde_json::Value> {
+    kind.read(bytes).inspect_err(|problem| {
+        let word = |key: &str| problem[key].as_str().unwrap_or_default();
+        assert!(word("type").starts_with("urn:kort:problem:"), "{problem}");
+        assert!(!word("detail").is_empty() && !word("hint").is_empty(), "{problem}");
+        assert!((400..500).contains(&problem["status"].as_u64().unwrap_or(0)), "{problem}");
+    })
+}
+
+/// The words of an error begin with the file and end with a way out.
+fn located(file: &str, words: String) -> String {
+    assert!(words.starts_with(file) && words.contains("hint:"), "{words}");
+    words
+}

@@ -1,0 +1,12 @@
+#![no_main]
+#[path = "../entry_points.rs"]
+#[allow(dead_code)]
+mod entry_points;
+
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|bytes: &[u8]| {
+    if let Ok(text) = std::str::from_utf8(bytes) {
+        let _ = entry_points::deployment(text);
+    }
+});

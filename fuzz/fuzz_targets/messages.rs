@@ -1,0 +1,11 @@
+#![no_main]
+#[path = "../entry_points.rs"]
+#[allow(dead_code)]
+mod entry_points;
+
+use kort_gateway::bodies::Body;
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|bytes: &[u8]| {
+    let _ = entry_points::body(Body::Message, bytes);
+});

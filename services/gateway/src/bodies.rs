@@ -1,0 +1,43 @@
+//! Every document that a client may send, read as its route reads it, and nothing done: for tests with any bytes.
+
+use crate::extract::{Json, OptionalJson};
+use crate::problem::Problem;
+use crate::routes::bodies::{ControllerRequest, LeaseRequest, RecordingRequest, incoming};
+use crate::view::Setpoint;
+
+/// What a client sends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Body {
+    /// `PUT …/setpoint`
+    Setpoint,
+    /// `POST …/lease`
+    Lease,
+    /// `PUT …/controller`
+    Controller,
+    /// `POST /v1/recordings`
+    Recording,
+    /// A text message of the stream.
+    Message,
+}
+
+impl Body {
+    /// Every kind.
+    pub const ALL: [Body; 5] =
+        [Body::Setpoint, Body::Lease, Body::Controller, Body::Recording, Body::Message];
+
+    /// Reads the bytes.
+    ///
+    /// # Errors
+    /// The problem document that the client would be answered with, as JSON.
+    pub fn read(self, bytes: &[u8]) -> Result<(), serde_json::Value> {
+        let read = match self {
+            Body::Setpoint => Json::<Setpoint>::from_bytes(bytes).map(drop),
+            Body::Lease => Json::<LeaseRequest>::from_bytes(bytes).map(drop),
+            Body::Controller => Json::<ControllerRequest>::from_bytes(bytes).map(drop),
+            Body::Recording => OptionalJson::<RecordingRequest>::from_bytes(bytes).map(drop),
+            // A message that is not UTF-8 is no message of the stream: the connection is closed before.
+            Body::Message => std::str::from_utf8(bytes).map_or(Ok(()), |text| incoming(text).map(drop)),
+        };
+        read.map_err(|problem: Problem| serde_json::to_value(&problem).unwrap_or_default())
+    }
+}
