@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use common::{PATIENCE, PERIOD_NS, Site, kill, wait};
 use kort_proto::faults::Fault;
-use kort_proto::messages::{Command, Outcome, Process, Reply, Request, RequestKind, Telemetry};
+use kort_proto::messages::{Command, DriveKind, Outcome, Process, Reply, Request, RequestKind, Telemetry};
 use kort_proto::transport::{ControllerPorts, GatewayPorts, Ticker};
 
 /// A servo process, and the ports of a controller and a gateway in this one.
@@ -18,18 +18,23 @@ struct Bench {
     controller: ControllerPorts,
     gateway: GatewayPorts,
     next_id: u64,
+    /// What a controller sends that asks for nothing.
+    zero: Command,
 }
 
 impl Bench {
     fn start() -> Self {
-        let site = Site::new();
+        Self::start_at(Site::new())
+    }
+
+    fn start_at(site: Site) -> Self {
         let servo = site.spawn("servo");
         let deployment = site.deployment();
         deployment.wait_for_generation(PATIENCE).unwrap();
         let controller = wait("ports", || ControllerPorts::open(&deployment, "t1").ok());
         let gateway = wait("ports", || GatewayPorts::open(&deployment, "t1").ok());
         wait("telemetry", || gateway.telemetry.next());
-        Self { servo, site, controller, gateway, next_id: 0 }
+        Self { servo, site, controller, gateway, next_id: 0, zero: Command::default() }
     }
 
     /// Asks the servo for something while a controller at zero goes on.
@@ -40,18 +45,21 @@ impl Bench {
         let session = self.gateway.request.session();
         let mine = |r: &Reply| r.id == id && r.to_session == session && r.from == Process::Servo as u32;
         let reply = wait("a reply", || {
-            self.controller.command.send(Command::default()).unwrap();
+            self.controller.command.send(self.zero).unwrap();
             std::iter::from_fn(|| self.gateway.reply.next()).find(mine)
         });
         (Outcome::from_u32(reply.outcome).unwrap(), reply.message.as_str().to_owned())
     }
 
     fn arm(&mut self) {
-        for _ in 0..3 {
-            self.controller.command.send(Command::default()).unwrap();
+        // A test that is not scheduled for a while is a controller that fell silent: it is asked again.
+        let answer = wait("the servo to have heard a controller", || {
+            self.controller.command.send(self.zero).unwrap();
             std::thread::sleep(Duration::from_millis(4));
-        }
-        assert_eq!(self.ask(RequestKind::Arm), (Outcome::Done, "armed".into()));
+            let answer = self.ask(RequestKind::Arm);
+            (!answer.1.contains("no controller sends")).then_some(answer)
+        });
+        assert_eq!(answer, (Outcome::Done, "armed".into()));
         while self.gateway.telemetry.next().is_some() {}
     }
 
@@ -177,4 +185,25 @@ fn forty_starts_under_the_axe_leave_nothing_behind() {
     });
     servo.kill().unwrap();
     servo.wait().unwrap();
+}
+
+/// A drive with a speed loop of its own tells no current: it arms, and is guarded by the speed it does tell.
+#[test]
+fn a_speed_drive_that_tells_no_current_arms_and_is_guarded_by_its_speed() {
+    let site = Site::new();
+    let config = std::fs::read_to_string(site.config()).unwrap();
+    let config = config.replace("whitcomb-yoerger-1999.toml", "speed-drive.toml").replace(
+        "{ full_drive_s = 0.005 }",
+        "{ full_drive_s = 0.005, speed_rad_s = 60.0, trip_speed_rad_s = 61.0 }",
+    );
+    std::fs::write(site.config(), config).unwrap();
+    let mut bench = Bench::start_at(site);
+    let speed = |drive: f64| Command { drive, kind: DriveKind::Speed as u32, ..Command::default() };
+    bench.zero = speed(0.0);
+    bench.arm();
+    let rows = bench.send(500, |ports, _| ports.command.send(speed(30.0)).unwrap());
+    assert!(rows.iter().all(|t| t.signals.current_a.is_nan()), "the drive tells no current");
+    let last = rows.last().unwrap();
+    assert!(last.armed == 1 && last.faults == 0, "{last:?}");
+    assert!((last.signals.shaft_speed_rad_s - 30.0).abs() < 3.0, "{last:?}");
 }

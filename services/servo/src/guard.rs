@@ -24,6 +24,7 @@ pub struct Guard {
     over_current: u32,
     over_speed: u32,
     missing: u32,
+    current_told: bool,
     supply: u32,
     spikes: u32,
     since_spike: u32,
@@ -45,6 +46,7 @@ impl Guard {
             over_current: 0,
             over_speed: 0,
             missing: 0,
+            current_told: false,
             supply: 0,
             spikes: 0,
             since_spike: SPIKE_WINDOW,
@@ -85,11 +87,15 @@ impl Guard {
             }
         };
 
-        // Needed sensors: hold the last value over a short gap.
-        let finite = measured.current_a.is_finite() && measured.shaft_speed_rad_s.is_finite();
+        // Needed sensors: hold the last value over a short gap. A drive with a speed loop of its own guards its
+        // current itself and need not tell it; one that has told it once must go on.
+        let told = measured.current_a.is_finite();
+        self.current_told |= told;
+        let needed = self.current_told || !matches!(l.kind, DriveKind::Speed | DriveKind::Duty);
+        let finite = (told || !needed) && measured.shaft_speed_rad_s.is_finite();
         self.missing = if finite { 0 } else { self.missing.saturating_add(1) };
         trip(Fault::SensorNotFinite, self.missing >= MISSING_TICKS);
-        if measured.current_a.is_finite() {
+        if told {
             self.held_current_a = measured.current_a;
         }
 
@@ -288,6 +294,24 @@ mod tests {
             }
         };
         assert_eq!(after(spiky, 200, 5.0), Fault::SensorSpike.bit());
+    }
+
+    #[test]
+    fn a_speed_drive_need_not_tell_its_current_but_may_not_fall_silent() {
+        let run = |kind: DriveKind, told_until: u32| {
+            let mut guard = Guard::new(Limits { kind, ..limits() }, 1e-3);
+            (0..100).fold(0, |seen, i| {
+                let current_a = if i < told_until { 1.0 } else { f64::NAN };
+                seen | guard.inspect(&Signals { current_a, ..turning(i) }, 5.0, 1)
+            })
+        };
+        assert_eq!(run(DriveKind::Speed, 0), 0);
+        assert_eq!(run(DriveKind::Speed, 50), Fault::SensorNotFinite.bit());
+        assert_eq!(run(DriveKind::Current, 0), Fault::SensorNotFinite.bit());
+        // What it does tell guards it.
+        let mut guard = Guard::new(Limits { kind: DriveKind::Speed, ..limits() }, 1e-3);
+        let fast = Signals { current_a: f64::NAN, shaft_speed_rad_s: 96.0, ..turning(0) };
+        assert_eq!((0..5).fold(0, |seen, _| seen | guard.inspect(&fast, 5.0, 1)), Fault::OverSpeed.bit());
     }
 
     #[test]

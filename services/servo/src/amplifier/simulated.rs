@@ -140,7 +140,10 @@ impl Amplifier for Simulated {
             return Err(AmplifierFault);
         }
         let read = self.measuring.read(self.time_s, &self.plant.sensed());
-        into.current_a = read.current_a;
+        // A drive with a speed loop of its own tells no current; nothing of it is modelled either.
+        if self.kind != DriveKind::Speed {
+            into.current_a = read.current_a;
+        }
         into.shaft_angle_rad = read.shaft_angle_rad;
         into.shaft_speed_rad_s = read.shaft_speed_rad_s;
         into.thrust_n = read.thrust_n;
