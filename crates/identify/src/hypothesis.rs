@@ -134,7 +134,7 @@ pub struct Hypothesis {
     pub inputs: Arc<Inputs>,
 }
 
-/// Parameters that shape a model's response.
+/// Parameters that shape a model's response; what hangs on a shaft does so unless its speed is prescribed.
 fn used(model: ModelName, dry: bool, shaft_prescribed: bool) -> Vec<P> {
     let shaft = [
         P::InertiaKgM2,
@@ -142,6 +142,12 @@ fn used(model: ModelName, dry: bool, shaft_prescribed: bool) -> Vec<P> {
         P::ViscousFrictionNmS,
         P::WindingResistanceOhm,
         P::TimeConstantS,
+        P::LoadMassKg,
+        P::LoadLengthM,
+        P::LoadInertiaKgM2,
+        P::LoadStiffnessNmRad,
+        P::LoadDampingNmS,
+        P::FanCoefficientNmS2,
     ];
     let water = [
         P::PitchRad,

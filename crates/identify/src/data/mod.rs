@@ -1,7 +1,7 @@
 //! A recording made ready for simulation: inputs on the control grid, responses on the log grid.
 
-use kort_thruster::plant::{Course, Driven, Stimulus, Tick};
-use kort_thruster::rig::{AmplifierKind, Rig};
+use kort_thruster::plant::{Course, Driven, Stimulus, Tick, load_inertia_kg_m2};
+use kort_thruster::rig::{AmplifierKind, Load, Rig};
 
 use crate::refuse;
 
@@ -160,9 +160,16 @@ fn shown(rig: &Rig, driving: Driving, response: Response) -> bool {
 const OBSERVER_RAD_S: f64 = std::f64::consts::TAU;
 
 /// Whether a disturbed shaft returns to its course by itself: blades brake it, or the back-EMF under a
-/// voltage does, within a few tenths of a second. A dry shaft under a current integrates, and drifts.
+/// voltage does, within a few tenths of a second. A dry shaft under a current integrates, and drifts; a
+/// pendulum that passes its top falls on either side.
 fn returns(rig: &Rig, driving: Driving) -> bool {
-    if rig.propeller.is_some() || driving == Driving::Speed {
+    if driving == Driving::Speed || rig.amplifier.kind == AmplifierKind::Speed {
+        return true;
+    }
+    if let Load::Pendulum { .. } = rig.load {
+        return false;
+    }
+    if rig.propeller.is_some() {
         return true;
     }
     let (motor, voltage) = (&rig.motor, rig.amplifier.kind == AmplifierKind::Voltage);
@@ -170,7 +177,7 @@ fn returns(rig: &Rig, driving: Driving) -> bool {
         (Some(ohm), Driving::Command(_)) if voltage => motor.torque_constant_nm_a.value.powi(2) / ohm.value,
         _ => 0.0,
     };
-    rig.amplifier.kind == AmplifierKind::Speed || braking / motor.inertia_kg_m2.value > OBSERVER_RAD_S
+    braking / (motor.inertia_kg_m2.value + load_inertia_kg_m2(rig)) > OBSERVER_RAD_S
 }
 
 /// The coarsest step at which the plant is integrated, s.

@@ -34,6 +34,7 @@ pub fn scale(all: &[Prepared], rig: &Rig) -> Scale {
         * stated.get(kort_thruster::parameters::Parameter::DensityKgM3)
         * stated.area_m2();
     let ohm = stated.get(kort_thruster::parameters::Parameter::WindingResistanceOhm);
+    let inertia_kg_m2 = rig.motor.inertia_kg_m2.value + kort_thruster::plant::load_inertia_kg_m2(rig);
     let torque = if current > 0.0 {
         kt * current
     } else if cq > 0.0 {
@@ -43,7 +44,7 @@ pub fn scale(all: &[Prepared], rig: &Rig) -> Scale {
         kt * command / ohm
     } else {
         // ... or what brings it to speed within a second.
-        rig.motor.inertia_kg_m2.value * speed
+        inertia_kg_m2 * speed
     };
     Scale {
         shaft_speed_rad_s: speed.max(1e-6),
@@ -54,7 +55,7 @@ pub fn scale(all: &[Prepared], rig: &Rig) -> Scale {
         command: command.max(1e-9),
         supply_v: rig.amplifier.supply_v.unwrap_or(0.0),
         winding_resistance_ohm: rig.motor.winding_resistance_ohm.map_or(0.0, |r| r.value),
-        inertia_kg_m2: rig.motor.inertia_kg_m2.value,
+        inertia_kg_m2,
         tick_s: all.first().map_or(0.002, |p| p.tick_s),
         duration_s: all.iter().map(Prepared::duration_s).fold(0.0, f64::max),
     }

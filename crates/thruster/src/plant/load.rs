@@ -2,10 +2,15 @@
 
 use crate::parameters::{Parameter as P, Parameters};
 use crate::real::Real;
-use crate::rig::Load;
+use crate::rig::{Load, Rig};
 
 /// Gravity, m/s^2.
 const GRAVITY_M_S2: f64 = 9.806_65;
+
+/// Inertia that the stated load adds to the shaft's, kg m^2.
+pub fn load_inertia_kg_m2(rig: &Rig) -> f64 {
+    Hanging::new(&rig.load, &Parameters::stated(rig)).inertia_kg_m2
+}
 
 /// The load at work: its torque is the sum of what each kind makes.
 #[derive(Clone, Copy)]

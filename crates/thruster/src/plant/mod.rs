@@ -16,6 +16,7 @@ mod stiff;
 mod tests;
 
 pub use crate::blade::Foil;
+pub use load::load_inertia_kg_m2;
 pub use run::{Response, Stimulus, simulate, simulate_each};
 pub use state::{Balance, Course, Drive, Driven, Local, Sensed, Tick};
 
