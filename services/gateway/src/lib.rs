@@ -13,6 +13,7 @@ mod bus;
 mod connections;
 mod desk;
 mod durations;
+mod energy;
 mod events;
 mod extract;
 mod gate;
@@ -387,9 +388,9 @@ async fn serve(
         patterns: OnceLock::new(),
     };
     let mut links = Vec::new();
-    for Deployed { id, range, heartbeat, servo_silence, .. } in &thrusters {
+    for Deployed { id, range, heartbeat, servo_silence, motor, .. } in &thrusters {
         let (thruster, asks) = Thruster::new(id, *range, *servo_silence, Arc::clone(&events));
-        let (thruster, tally) = (Arc::new(thruster), Arc::new(Tally::default()));
+        let (thruster, tally) = (Arc::new(thruster), Arc::new(Tally::new(*motor)));
         app.thrusters.push(Arc::clone(&thruster));
         app.tallies.push(Arc::clone(&tally));
         let events = Arc::clone(&events);

@@ -10,6 +10,7 @@ use kort_thruster::rig::Rig;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer};
 
+use crate::energy::Motor;
 use crate::hosts;
 use crate::view::SetpointRange;
 
@@ -179,6 +180,8 @@ pub struct Deployed {
     pub range: SetpointRange,
     /// Period at which its setpoint is sent anew: the controller's.
     pub heartbeat: Duration,
+    /// What turns its measured signals into power.
+    pub motor: Motor,
 }
 
 /// The thrusters of the deployment.
@@ -210,7 +213,8 @@ pub fn thrusters(config: &Config) -> Result<Vec<Deployed>, ConfigError> {
             let servo_silence = Duration::from_nanos(
                 (5 * thruster.servo_period_ns()).max(2 * thruster.controller_period_ns()),
             );
-            Ok(Deployed { id: id.clone(), rig: (file, text), servo_silence, range, heartbeat })
+            let motor = Motor::of(&rig);
+            Ok(Deployed { id: id.clone(), rig: (file, text), servo_silence, range, heartbeat, motor })
         })
         .collect()
 }

@@ -6,6 +6,7 @@ use kort_proto::faults::Fault;
 use kort_proto::messages::{ControllerState, Telemetry, Timing};
 use kort_proto::signals::{ESTIMATES, Kind, SIGNALS};
 
+use crate::energy::{Energy, Motor};
 use crate::thruster::lock;
 use crate::windows::{Summary, Window};
 
@@ -29,10 +30,13 @@ pub struct Counts {
     pub telemetry: (u64, u64),
     /// The gateway's own loop.
     pub gateway: Timing,
+    /// Power and energy of the motor.
+    pub energy: Energy,
 }
 
-impl Default for Tally {
-    fn default() -> Tally {
+impl Tally {
+    /// Nothing counted yet.
+    pub fn new(motor: Motor) -> Tally {
         Tally(Mutex::new(Counts {
             signals: vec![Window::new(WINDOW_NS); SIGNALS.len()],
             estimates: vec![Window::new(WINDOW_NS); ESTIMATES.len()],
@@ -41,17 +45,17 @@ impl Default for Tally {
             faults_raised: vec![0; Fault::ALL.len()],
             telemetry: (0, 0),
             gateway: Timing::default(),
+            energy: Energy::new(motor),
         }))
     }
-}
 
-impl Tally {
     /// One more sample of the servo, `lost` samples after the one before.
     pub fn telemetry(&self, telemetry: &Telemetry, lost: u64) {
         let counts = &mut *lock(&self.0);
         for (window, row) in counts.signals.iter_mut().zip(SIGNALS) {
             window.add(telemetry.time_ns, (row.get)(&telemetry.signals));
         }
+        counts.energy.add(telemetry.time_ns, &telemetry.signals);
         counts.telemetry.0 += 1;
         counts.telemetry.1 += lost;
         let before = std::mem::replace(&mut counts.servo_faults, telemetry.faults);

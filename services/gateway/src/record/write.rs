@@ -144,7 +144,9 @@ impl Job {
             if flushed.elapsed() >= FLUSH_EVERY {
                 flushed = Instant::now();
                 self.file.flush()?;
-                recorder.note_info(&lock(&self.info).clone());
+                // Not under the lock: a slow disk must not hold up the bus, which counts losses in it.
+                let info = lock(&self.info).clone();
+                recorder.note_info(&info);
                 guard_space(&self.folder, &self.limits)?;
                 self.rotate(recorder)?;
             }

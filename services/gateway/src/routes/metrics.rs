@@ -50,6 +50,7 @@ fn gather(app: &App) -> Families {
     );
     for (thruster, tally) in app.thrusters().iter().zip(app.tallies()) {
         signals(&mut families, thruster, tally);
+        energy(&mut families, thruster, tally);
         state(&mut families, thruster, tally);
         loops(&mut families, thruster, tally);
         recordings(&mut families, &thruster.id, app);
@@ -142,6 +143,29 @@ fn signals(families: &mut Families, thruster: &Thruster, tally: &Tally) {
             let words = format!("{meaning} Its {stat} in the last second.");
             families.gauge(&format!("{metric}_{stat}"), &words, &label, value);
         }
+    }
+}
+
+/// Power and energy of the motor, where current or shaft torque are measured.
+fn energy(families: &mut Families, thruster: &Thruster, tally: &Tally) {
+    let (label, energy) = ([("thruster", thruster.id.as_str())], tally.counts().energy);
+    let (servo, _) = thruster.heard().alive(Instant::now());
+    let Some(power) = energy.power_w() else { return };
+    if servo {
+        let words = "Power into the motor, winding's loss included where the rig states its resistance; negative when it gives power back.";
+        families.gauge("motor_power_watts", &format!("{words} Mean of the last second."), &label, power.mean);
+        for (stat, value) in [("min", power.min), ("max", power.max)] {
+            let words = format!("{words} Its {stat} in the last second.");
+            families.gauge(&format!("motor_power_watts_{stat}"), &words, &label, value);
+        }
+    }
+    for (direction, energy_j) in [("taken", energy.taken_j), ("returned", energy.returned_j)] {
+        families.counter(
+            "motor_energy_joules_total",
+            "Energy into the motor, and back from it, since the gateway started.",
+            &[("thruster", thruster.id.as_str()), ("direction", direction)],
+            energy_j,
+        );
     }
 }
 
