@@ -251,3 +251,121 @@ fn a_frozen_gateway_is_seen_within_a_second() {
         page.until(&text_is("stop-text", "NOT CONFIRMED"));
     });
 }
+
+/// Every text that is seen, with its colour over the ground it stands on, in the states that a chip and a message can
+/// have: those below 4.5:1 (WCAG 2.2, 1.4.3; what is disabled is exempt there). Canvas text is drawn in `--ink` and `--quiet`.
+const FAINT: &str = r##"(() => {
+  document.getElementById('login').hidden = false;
+  for (const id of ['fault-chip', 'stop-text']) { const e = document.getElementById(id); e.hidden = false; e.textContent ||= 'words'; }
+  const parse = (c) => { const n = c.match(/[\d.]+/g).map(Number); return [n[0], n[1], n[2], n[3] ?? 1]; };
+  const over = (a, b) => [0, 1, 2].map((i) => a[i] * a[3] + b[i] * (1 - a[3])).concat(1);
+  const light = (c) => { const [r, g, b] = c.map((x) => { x /= 255; return x <= 0.04045 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4; }); return 0.2126 * r + 0.7152 * g + 0.0722 * b; };
+  const ground = (e) => { const up = []; for (let at = e; at; at = at.parentElement) up.unshift(parse(getComputedStyle(at).backgroundColor)); return up.reduce((under, c) => over(c, under), [255, 255, 255, 1]); };
+  const ratio = (e, pseudo) => { const on = ground(e), ink = over(parse(getComputedStyle(e, pseudo).color), on); const [a, b] = [light(on), light(ink)].sort((x, y) => y - x); return (a + 0.05) / (b + 0.05); };
+  const faint = [], seen = new Set();
+  const judge = (e, words, pseudo) => {
+    if (!e.checkVisibility() || e.disabled || !words.trim()) return;
+    seen.add(words);
+    const r = ratio(e, pseudo);
+    if (r < 4.5) faint.push(`${words.trim().slice(0, 30)} (${e.tagName} ${e.id} ${e.className}): ${r.toFixed(2)}`);
+  };
+  const all = () => document.querySelectorAll('body *').forEach((e) => {
+    if (['SCRIPT', 'STYLE', 'CANVAS', 'OPTION'].includes(e.tagName)) return;
+    for (const node of e.childNodes) if (node.nodeType === 3) judge(e, node.data);
+    if (e.value !== undefined && e.tagName !== 'BUTTON') judge(e, String(e.value));
+    if (e.placeholder) judge(e, e.placeholder, '::placeholder');
+  });
+  for (const kind of ['', 'good', 'bad', 'warn']) {
+    for (const id of ['link', 'armed', 'fault-chip']) document.getElementById(id).className = `chip ${kind}`;
+    document.getElementById('stop-text').className = kind;
+    all();
+  }
+  const item = document.createElement('li'), fault = document.createElement('li');
+  item.className = 'bad'; item.textContent = 'a refusal'; document.getElementById('log').prepend(item);
+  fault.innerHTML = '<a href="#">4 command_timeout</a><br>what to do'; document.getElementById('faults').prepend(fault);
+  document.querySelector('details').open = true;
+  all();
+  item.remove(); fault.remove();
+  // What the plots write with.
+  for (const name of ['--ink', '--quiet']) { const p = document.createElement('p'); p.style.color = `var(${name})`; p.textContent = name; document.querySelector('figure').append(p); judge(p, name); p.remove(); }
+  return { seen: seen.size, faint: [...new Set(faint)] };
+})()"##;
+
+#[test]
+fn everything_can_be_read_heard_and_reached_by_keyboard() {
+    common::in_real_time(|| {
+        let stack = Stack::start();
+        let Some(mut page) = Browser::open(&format!("http://127.0.0.1:{}/", stack.site.port)) else { return };
+        page.until("document.readyState === 'complete' && typeof state !== 'undefined'");
+        page.until(&text_is("link", "live"));
+        page.until("document.querySelectorAll('#law-parameters input').length > 0");
+        for theme in ["light", "dark"] {
+            let features = json!([{"name": "prefers-color-scheme", "value": theme}]);
+            page.call("Emulation.setEmulatedMedia", json!({ "features": features }));
+            let judged = page.eval(FAINT);
+            assert!(judged["seen"].as_u64().unwrap() > 40, "{theme}: {judged}");
+            assert_eq!(judged["faint"], json!([]), "{theme}: text below 4.5:1");
+        }
+
+        // What a screen reader is given: a name for every control and every picture.
+        page.call("Accessibility.enable", json!({}));
+        let tree = page.call("Accessibility.getFullAXTree", json!({}));
+        let controls =
+            ["button", "textbox", "slider", "spinbutton", "combobox", "radio", "link", "image", "img"];
+        let (mut named, mut nameless) = (0, Vec::new());
+        for node in tree["nodes"].as_array().unwrap().iter().filter(|node| node["ignored"] != json!(true)) {
+            if !controls.contains(&node["role"]["value"].as_str().unwrap_or_default()) {
+                continue;
+            }
+            match node["name"]["value"].as_str() {
+                Some(name) if !name.trim().is_empty() => named += 1,
+                _ => nameless.push(node.clone()),
+            }
+        }
+        assert!(named > 20 && nameless.is_empty(), "{named} named, without a name: {nameless:?}");
+        for (id, role) in [
+            ("link", "status"),
+            ("armed", "status"),
+            ("lease-text", "status"),
+            ("limits", "status"),
+            ("fault-chip", "alert"),
+            ("stop-text", "alert"),
+            ("log", "log"),
+            ("events", "log"),
+        ] {
+            let has = page.eval(&format!("document.getElementById('{id}').getAttribute('role')"));
+            assert_eq!(has, json!(role), "{id}");
+        }
+
+        // The keyboard's End proposes the largest setpoint; nothing is commanded before Send.
+        page.eval("lease_ttl_ms = 60000");
+        page.click("take");
+        page.until(&text_is("lease-text", "You have the lease"));
+        page.click("arm");
+        page.until("state.armed");
+        page.eval("document.getElementById('slider').focus()");
+        for kind in ["keyDown", "keyUp"] {
+            let key = json!({"type": kind, "key": "End", "code": "End", "windowsVirtualKeyCode": 35});
+            page.call("Input.dispatchKeyEvent", key);
+        }
+        page.until("Number(document.getElementById('entry').value) > 170");
+        std::thread::sleep(Duration::from_millis(500));
+        assert_eq!(page.eval("state.setpoint.thrust_n").as_f64(), Some(0.0), "End alone commands nothing");
+        page.eval("document.getElementById('entry').value = 100");
+        page.click("send");
+        // A step of 100 N passes the slew of its law: it does not shoot over by more than a tenth.
+        let mut watch = stack.watch();
+        let began_ns = watch.next().time_ns;
+        let mut largest_n = 0.0f64;
+        loop {
+            let t = watch.next();
+            largest_n = largest_n.max(t.signals.thrust_n);
+            if t.time_ns > began_ns + 4_000_000_000 {
+                assert!((t.signals.thrust_n - 100.0).abs() < 5.0, "{t:?}");
+                break;
+            }
+        }
+        println!("a step of 100 N shoots over to {largest_n:.1} N");
+        assert!((100.0..112.0).contains(&largest_n), "a step of 100 N shoots over to {largest_n} N");
+    });
+}

@@ -230,7 +230,7 @@ async function loadController() {
   $("controller").dataset.running = answer.controller;
   $("controller").replaceChildren(...answer.available.map((name) => new Option(name, name, false, name === answer.controller)));
   $("law-parameters").replaceChildren(...answer.parameters.map((p) => {
-    const entry = Object.assign(document.createElement("input"), { type: "number", step: "any", value: p.value, min: p.low, max: p.high, title: `${p.low} to ${p.high} ${p.unit}` });
+    const entry = Object.assign(document.createElement("input"), { type: "number", step: "any", value: p.value, min: p.low, max: p.high, ariaLabel: `${p.name} in ${p.unit}`, title: `${p.low} to ${p.high} ${p.unit}` });
     entry.addEventListener("change", () => call("PUT", `${base()}/controller`, { parameters: { [p.name]: Number(entry.value) } })
       .then(() => log(`${p.name} = ${entry.value} ${p.unit}`)).catch(() => { entry.value = p.value; }));
     return cells([p.name, entry, p.unit]);
