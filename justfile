@@ -35,4 +35,4 @@ fuzz TARGET SECONDS="60":
 
 # undefined behaviour in what shared memory carries: messages, texts, freshness (nightly, miri)
 miri:
-    cargo +nightly miri test -p kort-proto --lib
+    cargo +nightly miri test -p kort-proto --test payloads
