@@ -260,14 +260,12 @@ impl<W: Write + Seek> Rows<W> {
             .chunk_size(Some(CHUNK_BYTES))
             .disable_seeking(true)
             .create(output)
-            .map_err(io::Error::other)?;
+            .map_err(cause)?;
         let schema = schema(columns).to_string();
-        let schema_id = writer
-            .add_schema("kort.recording/1", "jsonschema", schema.as_bytes())
-            .map_err(io::Error::other)?;
+        let schema_id =
+            writer.add_schema("kort.recording/1", "jsonschema", schema.as_bytes()).map_err(cause)?;
         let topic = topic_of(topic);
-        let channel_id =
-            writer.add_channel(schema_id, &topic, "json", &BTreeMap::new()).map_err(io::Error::other)?;
+        let channel_id = writer.add_channel(schema_id, &topic, "json", &BTreeMap::new()).map_err(cause)?;
         let columns = columns.iter().map(|c| c.to_string()).collect();
         Ok(Self { writer, channel_id, beside: None, origin_ns: 0, columns, sequence: 0, message: Vec::new() })
     }
@@ -286,11 +284,11 @@ impl<W: Write + Seek> Rows<W> {
     ) -> io::Result<Self> {
         let mut rows = Self::create(topic, columns, output)?;
         let about = mcap::records::Metadata { name: ABOUT.into(), metadata: about };
-        rows.writer.write_metadata(&about).map_err(io::Error::other)?;
+        rows.writer.write_metadata(&about).map_err(cause)?;
         let object = br#"{"type":"object"}"#;
         let mut channel = |schema: &str, topic: &str| -> io::Result<u16> {
-            let id = rows.writer.add_schema(schema, "jsonschema", object).map_err(io::Error::other)?;
-            rows.writer.add_channel(id, topic, "json", &BTreeMap::new()).map_err(io::Error::other)
+            let id = rows.writer.add_schema(schema, "jsonschema", object).map_err(cause)?;
+            rows.writer.add_channel(id, topic, "json", &BTreeMap::new()).map_err(cause)
         };
         let state = channel(STATE, &format!("{}/state", topic_of(topic)))?;
         let event = channel(EVENT, "/events")?;
@@ -347,7 +345,7 @@ impl<W: Write + Seek> Rows<W> {
         let log_time = self.origin_ns + (time_s.max(0.0) * 1e9).round() as u64;
         let header = MessageHeader { channel_id, sequence: self.sequence, log_time, publish_time: log_time };
         self.sequence = self.sequence.wrapping_add(1);
-        self.writer.write_to_known_channel(&header, message).map_err(io::Error::other)
+        self.writer.write_to_known_channel(&header, message).map_err(cause)
     }
 
     /// Ends the chunk and hands it to the system: what a kill may cost is what came after.
@@ -355,7 +353,7 @@ impl<W: Write + Seek> Rows<W> {
     /// # Errors
     /// The output cannot be written.
     pub fn flush(&mut self) -> io::Result<()> {
-        self.writer.flush().map_err(io::Error::other)
+        self.writer.flush().map_err(cause)
     }
 
     /// Ends the file.
@@ -363,8 +361,16 @@ impl<W: Write + Seek> Rows<W> {
     /// # Errors
     /// The output cannot be written.
     pub fn finish(mut self) -> io::Result<()> {
-        self.writer.finish().map_err(io::Error::other)?;
+        self.writer.finish().map_err(cause)?;
         self.writer.into_inner().flush()
+    }
+}
+
+/// The system's own words: what a disk refuses with is told by the inner error alone.
+fn cause(error: mcap::McapError) -> io::Error {
+    match error {
+        mcap::McapError::Io(error) => error,
+        other => io::Error::other(other),
     }
 }
 

@@ -232,6 +232,39 @@ fn gaps_are_noted() {
     assert!(csv(&text).unwrap().notes[0].contains("1 gap(s)"));
 }
 
+/// A disk that takes so many bytes and no more.
+struct Small(Cursor<Vec<u8>>, usize);
+
+impl Write for Small {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        match self.1.checked_sub(bytes.len()) {
+            Some(left) => {
+                self.1 = left;
+                self.0.write(bytes)
+            }
+            None => Err(std::io::ErrorKind::StorageFull.into()),
+        }
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+impl std::io::Seek for Small {
+    fn seek(&mut self, to: std::io::SeekFrom) -> std::io::Result<u64> {
+        self.0.seek(to)
+    }
+}
+
+#[test]
+fn a_full_disk_is_called_that() {
+    let disk = Small(Cursor::new(Vec::new()), 20_000);
+    let mut rows = LiveMcap::live("t1", &["thrust_n"], Default::default(), 0, disk).unwrap();
+    let refused = (0..200_000).find_map(|i| rows.row(f64::from(i) * 1e-3, &[f64::from(i).sin()]).err());
+    assert_eq!(refused.expect("it is full").kind(), std::io::ErrorKind::StorageFull);
+}
+
 proptest! {
     #[test]
     fn no_bytes_make_it_panic(bytes in proptest::collection::vec(any::<u8>(), 0..400)) {
