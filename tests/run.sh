@@ -38,6 +38,11 @@ if command -v python3 >/dev/null && [ ! -x "$schemathesis" ]; then
 fi
 if [ -x "$schemathesis" ]; then export KORT_SCHEMATHESIS="$schemathesis"; else skipped+=("schemathesis is not installed"); fi
 
+# A stranger's reader of recordings, beside schemathesis.
+python="$tools/schemathesis/bin/python"
+if [ -x "$python" ]; then "$python" -c 'import mcap' 2>/dev/null || "$tools/schemathesis/bin/pip" install -q 'mcap>=1.2,<2' || true; fi
+if [ -x "$python" ] && "$python" -c 'import mcap' 2>/dev/null; then export KORT_PYTHON="$python"; else skipped+=("Python's mcap is not installed"); fi
+
 say "cargo test --workspace"
 cargo test --workspace --no-fail-fast
 
