@@ -52,6 +52,7 @@ const PURE: &[&str] = &[
     "crates/proof",
     "crates/control",
     "crates/identify",
+    "crates/diagnose",
     "crates/reproduce",
     "crates/soak",
 ];
@@ -193,8 +194,8 @@ fn pure_crates_have_no_clock_thread_file_or_socket() {
             assert!(!used.contains(*name), "{folder} is pure and must not depend on {name}");
         }
         assert!(
-            *folder == "crates/identify" || !used.contains("rayon"),
-            "{folder}: threads belong to identify"
+            matches!(*folder, "crates/identify" | "crates/diagnose") || !used.contains("rayon"),
+            "{folder}: threads belong to identify and diagnose"
         );
         // A program beside the library may write files.
         let library =

@@ -17,6 +17,10 @@ pub struct Checked {
 const FROZEN_ROWS: usize = 40;
 /// A spike stands out of its neighbours by this many times their usual distance.
 const SPIKE_RATIO: f64 = 40.0;
+/// Usual intervals from row to row beyond which rows are missing.
+const GAP_INTERVALS: f64 = 3.5;
+/// Share of the largest command that counts as a step of it.
+const STEP_SHARE: f64 = 0.05;
 /// A gap longer than this may hide changes of the drive, s.
 const LONG_GAP_S: f64 = 0.2;
 /// After such a gap the state is taken as known again, s.
@@ -122,19 +126,28 @@ fn spikes(recording: &str, name: &str, column: &[f64], time_s: &[f64], out: &mut
     }
 }
 
-fn unsigned_speed(series: &Series, out: &mut Checked) {
-    let Some(speed) = series.column("shaft_speed_rad_s") else { return };
+/// Whether only the size of the shaft speed was recorded: never negative although the drive reverses.
+pub fn is_unsigned_speed(series: &Series) -> bool {
+    let Some(speed) = series.column("shaft_speed_rad_s") else { return false };
     let never_negative = speed.iter().all(|v| v.is_nan() || *v >= 0.0);
-    let reversed = ["current_cmd_a", "current_a", "thrust_n", "voltage_cmd_v"].iter().any(|name| {
+    let reversed = REVERSING.iter().any(|name| {
         series.column(name).is_some_and(|c| {
             let top = c.iter().filter(|v| v.is_finite()).fold(0.0_f64, |m, v| m.max(v.abs()));
             let negative = c.iter().filter(|v| **v < -0.2 * top).count();
             negative > c.len() / 20
         })
     });
-    if never_negative && reversed {
+    never_negative && reversed
+}
+
+/// Columns whose sign tells the direction.
+const REVERSING: [&str; 6] =
+    ["current_cmd_a", "current_a", "voltage_cmd_v", "duty_cmd", "speed_cmd_rad_s", "thrust_n"];
+
+fn unsigned_speed(series: &Series, out: &mut Checked) {
+    if is_unsigned_speed(series) {
         out.notes.push(format!(
-            "{}: shaft_speed_rad_s is never negative although the drive reverses: an unsigned speed sensor; give it a sign (column map) before trusting a verdict",
+            "{}: shaft_speed_rad_s is never negative although the drive reverses: an unsigned speed sensor, whose sign is taken from the model (unsigned_speed_sensor); a column map's sign_of gives it the command's",
             series.name
         ));
     }
@@ -275,11 +288,25 @@ fn sparse_commands(series: &Series, out: &mut Checked) {
     }
 }
 
+/// How many gaps begin at a step of the command: within an interval of the row that first shows it.
+fn after_steps(series: &Series, usual_s: f64) -> usize {
+    let names = ["current_cmd_a", "voltage_cmd_v", "duty_cmd", "speed_cmd_rad_s", "thrust_cmd_n"];
+    let Some(command) = names.iter().find_map(|name| series.column(name)) else { return 0 };
+    let top = command.iter().filter(|c| c.is_finite()).fold(0.0_f64, |m, c| m.max(c.abs()));
+    let steps = |k: usize| {
+        // Rows about the gap: the step stands in the last before it or the first after it.
+        (k.saturating_sub(1)..(k + 2).min(command.len() - 1))
+            .any(|i| (command[i + 1] - command[i]).abs() > STEP_SHARE * top)
+    };
+    let wide = |k: &usize| series.time_s[k + 1] - series.time_s[*k] > GAP_INTERVALS * usual_s;
+    (0..series.time_s.len().saturating_sub(1)).filter(wide).filter(|k| steps(*k)).count()
+}
+
 fn gaps(series: &Series, out: &mut Checked) {
     let mut steps: Vec<f64> = series.time_s.windows(2).map(|w| w[1] - w[0]).collect();
     steps.sort_by(f64::total_cmp);
     let Some(usual) = steps.get(steps.len() / 2).copied() else { return };
-    let wide = series.time_s.windows(2).filter(|w| w[1] - w[0] > 3.5 * usual).count();
+    let wide = series.time_s.windows(2).filter(|w| w[1] - w[0] > GAP_INTERVALS * usual).count();
     if wide == 0 {
         return;
     }
@@ -287,19 +314,64 @@ fn gaps(series: &Series, out: &mut Checked) {
     let mut long = 0;
     let mut known_from_s = f64::NEG_INFINITY;
     for (k, w) in series.time_s.windows(2).enumerate() {
-        if w[1] - w[0] > (3.5 * usual).max(LONG_GAP_S) {
+        if w[1] - w[0] > (GAP_INTERVALS * usual).max(LONG_GAP_S) {
             long += 1;
             known_from_s = w[1] + SETTLE_S;
         }
         out.masked[k + 1] |= w[1] < known_from_s;
     }
+    let hurried = after_steps(series, usual);
+    let follow = if 2 * hurried > wide {
+        format!(
+            "; {hurried} of them begin at a step of the command, so that what answers it is seen late, and not equally late for every step"
+        )
+    } else {
+        String::new()
+    };
     let left_out = match long {
         0 => String::new(),
         _ => format!("; the {SETTLE_S} s after each of the {long} longer than {LONG_GAP_S} s are left out"),
     };
     out.notes.push(format!(
-        "{}: the log has {wide} gaps longer than 3 intervals (longest {:.3} s); inputs are taken as straight across them{left_out}",
+        "{}: the log misses rows (log_gaps): {wide} gaps longer than 3 intervals (longest {:.3} s){follow}; the model runs across them with its inputs straight, and only rows that are there are compared{left_out}",
         series.name,
         steps[steps.len() - 1]
     ));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A drive that reverses every second, logged at 100 Hz; rows that `there` leaves out are missing.
+    fn log(speed: fn(f64) -> f64, there: fn(usize) -> bool) -> Series {
+        let rows: Vec<usize> = (0..2000).filter(|k| there(*k)).collect();
+        let time_s: Vec<f64> = rows.iter().map(|k| 0.01 * *k as f64).collect();
+        let command: Vec<f64> = rows.iter().map(|k| if k / 100 % 2 == 0 { 5.0 } else { -5.0 }).collect();
+        let speed = time_s.iter().zip(&command).map(|(t, c)| speed(c.signum() * (1.0 + 0.1 * t.sin())));
+        let speed = speed.collect();
+        let columns = vec![("current_cmd_a".into(), command), ("shaft_speed_rad_s".into(), speed)];
+        Series { name: "log".into(), time_s, columns }
+    }
+
+    fn notes(series: &Series) -> String {
+        let rig = "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = 0.01\ntorque_constant_nm_a = 1.0\n";
+        check(series, &Rig::from_toml(rig).unwrap()).notes.join("\n")
+    }
+
+    #[test]
+    fn a_speed_without_its_sign_is_told_from_one_with_it() {
+        assert!(is_unsigned_speed(&log(f64::abs, |_| true)));
+        assert!(!is_unsigned_speed(&log(|s| s, |_| true)));
+        assert!(notes(&log(f64::abs, |_| true)).contains("unsigned_speed_sensor"));
+    }
+
+    #[test]
+    fn gaps_that_follow_the_commands_are_said_to() {
+        assert!(!notes(&log(|s| s, |_| true)).contains("log_gaps"));
+        let after_steps = notes(&log(|s| s, |k| !(1..9).contains(&(k % 100))));
+        assert!(after_steps.contains("log_gaps") && after_steps.contains("begin at a step"), "{after_steps}");
+        let between = notes(&log(|s| s, |k| !(41..49).contains(&(k % 100))));
+        assert!(between.contains("log_gaps") && !between.contains("begin at a step"), "{between}");
+    }
 }

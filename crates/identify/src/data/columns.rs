@@ -3,8 +3,8 @@
 use super::fill::{filled, linear};
 use super::{Prepared, Series};
 
-/// Columns of the contract; any other is a possible driver of what is left.
-pub const KNOWN: [&str; 16] = [
+/// Columns of the contract, and those that drive where no command is logged; any other is a possible driver of what is left.
+pub const KNOWN: [&str; 18] = [
     "time_s",
     "current_cmd_a",
     "current_a",
@@ -21,6 +21,8 @@ pub const KNOWN: [&str; 16] = [
     "supply_v",
     "temperature_c",
     "depth_m",
+    "power_w",
+    "supply_current_a",
 ];
 
 /// Columns that a model has no use for by itself but that may drive what is left: unknown ones,

@@ -11,7 +11,7 @@ impl Prepared {
         let time = self.time_s.clone();
         let values = match self.driving {
             Driving::Command(_) => return,
-            Driving::Current => self.command.clone(),
+            Driving::Current | Driving::Power => self.command.clone(),
             Driving::Speed => self.speed_between.clone(),
         };
         let n = values.len();
@@ -30,6 +30,7 @@ impl Prepared {
             tick.driven = match tick.driven {
                 Driven::Current(..) => Driven::Current(a, b),
                 Driven::Speed(..) => Driven::Speed(a, b),
+                Driven::Power(..) => Driven::Power(a, b),
                 Driven::Command => Driven::Command,
             };
         }

@@ -2,9 +2,11 @@
 
 use kort_thruster::rig::{AmplifierKind, Rig};
 
+use super::fill::filled;
 use super::{Driving, FEWEST_ROWS, Response, Series};
 
-/// The driving column, by preference: a command that fits the drive, then measured current, then speed.
+/// The driving column, by preference: a command that fits the drive, then measured current, then speed; and
+/// electrical power where nothing but the speed could answer.
 pub(super) fn choose_driving(series: &Series, rig: &Rig, speed_driven: bool) -> Option<Driving> {
     let varies = |name: &str| {
         series.column(name).is_some_and(|c| {
@@ -28,11 +30,34 @@ pub(super) fn choose_driving(series: &Series, rig: &Rig, speed_driven: bool) -> 
     {
         return Some(Driving::Current);
     }
-    varies("shaft_speed_rad_s").then_some(Driving::Speed)
+    if !varies("shaft_speed_rad_s") {
+        return None;
+    }
+    // What a shaft that follows its record shows: the propeller's load on a stand.
+    let answered = rig.propeller.is_some() && ["thrust_n", "torque_n_m", "flow_m_s"].into_iter().any(varies);
+    let powered = rig.motor.winding_resistance_ohm.is_some() && electrical_power(series).is_some();
+    Some(if powered && !answered { Driving::Power } else { Driving::Speed })
+}
+
+/// Electrical power into the motor, W: recorded, or the supply's voltage times its current.
+fn electrical_power(series: &Series) -> Option<Vec<f64>> {
+    if let Some(power) = series.column("power_w") {
+        return Some(power.to_vec());
+    }
+    let (supply, current) = (series.column("supply_v")?, series.column("supply_current_a")?);
+    Some(supply.iter().zip(current).map(|(v, a)| v * a).collect())
+}
+
+/// The power that drives, W: with the sign of the recorded speed, since power does not tell the direction; what
+/// flows back into the supply drives nothing.
+pub(super) fn driving_power(series: &Series) -> Vec<f64> {
+    let power = filled(&electrical_power(series).unwrap_or_default());
+    let speed = filled(series.column("shaft_speed_rad_s").unwrap_or(&[]));
+    power.iter().zip(speed).map(|(p, s)| p.max(0.0) * if s < 0.0 { -1.0 } else { 1.0 }).collect()
 }
 
 /// What a recording without a usable response holds.
-pub(super) fn instead(series: &Series, driving: &str) -> String {
+pub(super) fn instead(series: &Series, rig: &Rig, driving: &str) -> String {
     let few = Response::ALL.into_iter().filter(|r| r.name() != driving).find_map(|r| {
         let samples = series.column(r.name())?.iter().filter(|v| v.is_finite()).count();
         (samples < FEWEST_ROWS)
@@ -43,6 +68,10 @@ pub(super) fn instead(series: &Series, driving: &str) -> String {
     }
     let others: Vec<&str> =
         series.columns.iter().map(|c| c.0.as_str()).filter(|n| *n != driving && *n != "time_s").collect();
+    if rig.motor.winding_resistance_ohm.is_none() && electrical_power(series).is_some() {
+        return "electrical power, which drives the model where the rig states motor.winding_resistance_ohm"
+            .into();
+    }
     let mut found = if others.is_empty() { "nothing else is in it".into() } else { others.join(", ") };
     if let Some(sag) = crate::checks::supply_sag(series).and_then(|sag| sag.words()) {
         found.push_str(&format!("\nnote: {sag}"));

@@ -20,7 +20,7 @@ pub use error::DataError;
 pub use scale::{available, scale};
 
 use command::{find_edges, smooth_between, steps_of};
-use driving::{choose_driving, instead};
+use driving::{choose_driving, driving_power, instead};
 use fill::{filled, held, linear, median_step};
 use start::start_state;
 
@@ -102,6 +102,8 @@ pub enum Driving {
     Current,
     /// Measured shaft speed.
     Speed,
+    /// Measured electrical power: what a speed controller's telemetry gives where no command is logged.
+    Power,
 }
 
 impl Driving {
@@ -111,6 +113,7 @@ impl Driving {
             Self::Command(name) => name,
             Self::Current => "current_a",
             Self::Speed => "shaft_speed_rad_s",
+            Self::Power => "power_w",
         }
     }
 }
@@ -209,7 +212,7 @@ impl Prepared {
             .filter_map(|r| Channel::new(series, r))
             .collect();
         if !channels.iter().any(|c| c.response != Response::Current) {
-            let found = instead(series, driving.column());
+            let found = instead(series, rig, driving.column());
             return Err(DataError::NoResponse { recording, driving: driving.column(), found });
         }
         let tick_s = match rig.sensors.control_rate_hz {
@@ -222,7 +225,11 @@ impl Prepared {
         refuse::too_long(series, tick_s)?;
         let column = series.column(driving.column()).unwrap_or(&[]);
         // A command stands until the next; a response moves on between its samples.
-        let recorded = if let Driving::Command(_) = driving { held(column) } else { filled(column) };
+        let recorded = match driving {
+            Driving::Command(_) => held(column),
+            Driving::Power => driving_power(series),
+            Driving::Current | Driving::Speed => filled(column),
+        };
         let mut prepared = Self {
             name: recording,
             time_s: series.time_s.clone(),
@@ -272,7 +279,9 @@ impl Prepared {
         let angle = series.column("shaft_angle_rad").map(filled);
         let depth = series.column("depth_m").map(filled);
         let temperature = series.column("temperature_c").map(filled);
-        let measured_speed = series.column("shaft_speed_rad_s").map(filled);
+        // A speed without its sign would pull the shaft the wrong way.
+        let signed = !crate::checks::is_unsigned_speed(series);
+        let measured_speed = series.column("shaft_speed_rad_s").filter(|_| signed).map(filled);
         let enabled = series.column("torque_enable").map(held);
         let speed = (self.driving == Driving::Speed).then(|| self.driving_speed(series, rig));
         let mut ticks = Vec::with_capacity(count);
@@ -294,6 +303,7 @@ impl Prepared {
                         let s = speed.as_deref().unwrap_or(&[]);
                         Driven::Speed(at(s, time_s), at(s, next_s))
                     }
+                    Driving::Power => Driven::Power(at(&self.command, time_s), at(&self.command, next_s)),
                 },
                 ambient_m_s: ambient.as_deref().map_or((0.0, 0.0), |a| (at(a, time_s), at(a, next_s))),
                 supply_v: supply.as_deref().map(|s| at(s, time_s)),

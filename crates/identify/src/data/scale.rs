@@ -46,6 +46,8 @@ pub fn scale(all: &[Prepared], rig: &Rig) -> Scale {
         // ... or what brings it to speed within a second.
         inertia_kg_m2 * speed
     };
+    // Where no current is recorded, the one that makes the torque: effects in amperes need a size.
+    let current = if current > 0.0 { current } else { torque / kt };
     Scale {
         shaft_speed_rad_s: speed.max(1e-6),
         torque_n_m: torque.max(1e-9),
@@ -72,8 +74,9 @@ pub fn available(model: ModelName, series: &[Series], all: &[Prepared]) -> Avail
     Available {
         columns,
         shaft_prescribed: all.iter().all(|p| p.driving == Driving::Speed),
-        current_prescribed: all.iter().all(|p| p.driving == Driving::Current),
+        current_prescribed: all.iter().all(|p| matches!(p.driving, Driving::Current | Driving::Power)),
         axial_flow_modelled: !matches!(model, ModelName::Model0 | ModelName::Model1),
+        speed_unsigned: series.iter().any(crate::checks::is_unsigned_speed),
         supply_sag_share: series
             .iter()
             .map(|s| crate::checks::supply_sag(s).map(|sag| sag.share()))

@@ -28,6 +28,8 @@ pub(super) fn start_state(series: &Series, prepared: &Prepared) -> [f64; 4] {
         return [0.0, 0.0, current, 0.0];
     }
     let flow = first("flow_m_s").unwrap_or(0.0);
-    let current = first("current_a").or_else(|| prepared.command.first().copied()).unwrap_or(0.0);
+    // Under a recorded power the current follows from it at once.
+    let asked = if prepared.driving == Driving::Power { None } else { prepared.command.first().copied() };
+    let current = first("current_a").or(asked).unwrap_or(0.0);
     [speed, flow, current, first("shaft_angle_rad").unwrap_or(0.0)]
 }

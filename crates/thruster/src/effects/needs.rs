@@ -9,10 +9,12 @@ pub struct Available {
     pub columns: Vec<String>,
     /// The shaft speed is prescribed (a recorded speed drives the model).
     pub shaft_prescribed: bool,
-    /// The current is prescribed (a recorded current drives the model).
+    /// The current is prescribed (a recorded current or electrical power drives the model).
     pub current_prescribed: bool,
     /// The baseline model has the axial flow as a state.
     pub axial_flow_modelled: bool,
+    /// Only the size of the shaft speed was recorded: it is never negative although the drive reverses.
+    pub speed_unsigned: bool,
     /// Share of the supply lost at the largest load, where every recording holds the supply.
     pub supply_sag_share: Option<f64>,
 }
@@ -50,7 +52,7 @@ pub fn free_shaft(rig: &Rig, available: &Available) -> Result<(), &'static str> 
     }
 }
 
-/// Needs a command: a recorded current or speed that drives the model has the drive behind it.
+/// Needs a command: a recorded current, power or speed that drives the model has the drive behind it.
 pub fn commanded(_: &Rig, available: &Available) -> Result<(), &'static str> {
     if available.current_prescribed || available.shaft_prescribed {
         Err(

@@ -1,8 +1,9 @@
 //! The speed sensor does not know the direction.
 
-use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, one_start, speed_measured};
+use super::{Available, Descriptor, Effect, Hooks, Path, Scale, Spec, one_start, speed_measured};
 use crate::plant::{Sensed, Tick};
 use crate::real::Real;
+use crate::rig::Rig;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -21,9 +22,18 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     forms: &[],
     parameters: |_: &Scale| vec![Spec::switch("unsigned")],
     starts: one_start,
-    needs: speed_measured,
+    needs,
     build: both!(|values, _| Box::new(UnsignedSpeed { share: values[0] })),
 };
+
+fn needs(rig: &Rig, available: &Available) -> Result<(), &'static str> {
+    speed_measured(rig, available)?;
+    if available.speed_unsigned {
+        Ok(())
+    } else {
+        Err("the recorded shaft speed has its sign, or the drive never reverses")
+    }
+}
 
 struct UnsignedSpeed<T> {
     share: T,

@@ -36,12 +36,12 @@ impl<T: Real> Plant<T> {
             self.effects[*i].effect.drive(tick, &mut drive);
         }
         let commanded = tick.driven == Driven::Command && !tick.released;
-        let by_speed = commanded
-            && match self.amplifier {
-                AmplifierKind::Voltage => true,
-                AmplifierKind::Current => drive.voltage_limited,
-                AmplifierKind::Speed => false,
-            };
+        let by_speed = match (tick.driven, self.amplifier) {
+            (Driven::Power(..), _) => !tick.released,
+            (_, AmplifierKind::Voltage) => commanded,
+            (_, AmplifierKind::Current) => commanded && drive.voltage_limited,
+            (_, AmplifierKind::Speed) => false,
+        };
         let speed_rad_s = match self.amplifier {
             AmplifierKind::Speed if commanded => {
                 let (now, tau) = (self.x[SPEED], drive.time_constant_s);
@@ -68,6 +68,17 @@ impl<T: Real> Plant<T> {
         }
     }
 
+    /// Motor current, A, that takes this electrical power at this speed: `P = (R i + kt |Om|) i`. A shaft that is
+    /// turned against the power adds no voltage of its own.
+    fn current_of_power(&self, power_w: f64, resistance_ohm: T, speed_rad_s: T) -> T {
+        let ahead = 1.0_f64.copysign(power_w);
+        let back_emf_v = (self.constants.torque_constant_nm_a * speed_rad_s * ahead).max(T::ZERO);
+        let drop_v2 = resistance_ohm.max(T::from(1e-9)) * (4.0 * power_w.abs());
+        // At no power and at rest there is no current, and the root has no slope.
+        let root_v = (back_emf_v * back_emf_v + drop_v2 + T::from(1e-12)).sqrt();
+        T::from(2.0 * power_w) / (back_emf_v + root_v)
+    }
+
     fn current_path(&self, tick: &Tick, drive: &Drive<T>, part: f64, speed_rad_s: T) -> T {
         if let Driven::Current(a, b) = tick.driven {
             return T::from(a + (b - a) * part);
@@ -75,6 +86,9 @@ impl<T: Real> Plant<T> {
         // Open terminals: no current, and so no braking by the back-EMF.
         if tick.released {
             return T::ZERO;
+        }
+        if let Driven::Power(a, b) = tick.driven {
+            return self.current_of_power(a + (b - a) * part, drive.resistance_ohm, speed_rad_s);
         }
         let lagging = drive.time_constant_s > 0.0;
         if lagging && part == 0.0 {

@@ -58,6 +58,8 @@ pub enum Driven {
     Current(f64, f64),
     /// Measured shaft speed, rad/s.
     Speed(f64, f64),
+    /// Measured electrical power into the motor, W; negative where it drives astern.
+    Power(f64, f64),
 }
 
 impl Tick {
