@@ -25,6 +25,9 @@ pub const TERMS: &[&Descriptor] = &[
     &FLOW_OVER_TIME,
     &SENSOR_OVER_THRUST,
     &SENSOR_OVER_TIME,
+    &crate::column::SHAFT,
+    &crate::column::BLADE,
+    &crate::column::SENSOR,
 ];
 
 /// Whether an effect is one of these.
@@ -334,6 +337,9 @@ const INSTANTS: usize = 24;
 pub fn expression(term: &Descriptor, values: &[f64]) -> String {
     if term.id == SHAFT_STEP.id {
         return format!("{:+.4} N m from t = {:.2} s on", values[0], values[1]);
+    }
+    if let Some(words) = crate::column::expression(term, values) {
+        return words;
     }
     let reach = values[POINTS];
     let points = if term.id.ends_with("over_time") { in_time(reach) } else { over(reach) };

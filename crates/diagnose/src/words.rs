@@ -68,12 +68,14 @@ pub fn empirical(
     let slot = fit.hypothesis.effects.iter().position(|m| m.effect.id == id).unwrap_or(0);
     let member = &problem.members(&fit.hypothesis, &fit.values)[slot];
     let (enters, over) = flexible::enters(member.effect);
+    let column = problem.recordings.iter().find_map(|r| r.extra.clone());
+    let over = column.filter(|_| over == "a column").unwrap_or_else(|| over.into());
     let values: Vec<ParameterReport> = parameters(fit, std_errors, Some(slot));
     EmpiricalTerm {
         path: member.effect.path.name().into(),
         enters: enters.into(),
         expression: flexible::expression(member.effect, &member.values),
-        variables: vec![over.into()],
+        variables: vec![over],
         parameters: values,
         heldout,
     }
@@ -116,11 +118,19 @@ pub fn strained(baseline: &Fit) -> Option<String> {
 
 /// Columns that were not used.
 pub fn unused(series: &[Series], problem: &Problem) -> Option<String> {
-    let mut used: Vec<&str> =
-        vec!["time_s", "ambient_m_s", "shaft_angle_rad", "supply_v", "depth_m", "temperature_c"];
+    let mut used: Vec<&str> = vec![
+        "time_s",
+        "torque_enable",
+        "ambient_m_s",
+        "shaft_angle_rad",
+        "supply_v",
+        "depth_m",
+        "temperature_c",
+    ];
     for recording in &problem.recordings {
         used.push(recording.driving.column());
         used.extend(recording.channels.iter().map(|c| c.response.name()));
+        used.extend(recording.extra.as_deref());
     }
     let mut left: Vec<&str> = series
         .iter()

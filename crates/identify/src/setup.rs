@@ -7,7 +7,7 @@ use kort_thruster::parameters::Parameters;
 use kort_thruster::rig::Rig;
 
 use crate::checks;
-use crate::data::{DataError, Driving, Prepared, Response, Series};
+use crate::data::{DataError, Driving, Prepared, Response, Series, possible_drivers, spread};
 use crate::hypothesis::{Hypothesis, Inputs, UNSTATED_TOL, nothing_stated};
 use crate::noise::Criterion;
 use crate::simulate::Problem;
@@ -71,9 +71,44 @@ impl<'a> Setup<'a> {
         recordings.iter_mut().for_each(|r| r.mark_smooth(model, rig, &stated));
         let inputs = Arc::new(Inputs::late(&recordings));
         let baseline = Hypothesis::baseline(model, rig, prescribed, current_seen, inputs);
-        let problem = Problem::new(model, rig, recordings, masked, criterion);
+        let mut problem = Problem::new(model, rig, recordings, masked, criterion);
+        if let Some(name) = telling_column(series, &problem, &baseline) {
+            let sizes = spread(series, &name);
+            for (one, recording) in series.iter().zip(&mut problem.recordings) {
+                recording.lay_extra(&name, one.column(&name).unwrap_or(&[]), sizes);
+            }
+        }
         Ok(Self { problem, baseline, notes, thin })
     }
+}
+
+/// Of the columns that the model has no use for, the one that follows best what the stated rig leaves: the
+/// driver that a term without a name may try.
+fn telling_column(series: &[Series], problem: &Problem, baseline: &Hypothesis) -> Option<String> {
+    let names = possible_drivers(series);
+    if names.len() < 2 {
+        return names.into_iter().next();
+    }
+    let residual = problem.residual(baseline, &baseline.start);
+    let follows = |name: &String| {
+        let (mean, deviation) = spread(series, name);
+        let mut most = 0.0_f64;
+        for (r, recording) in problem.recordings.iter().enumerate() {
+            let Some(column) = series[r].column(name) else { continue };
+            for (channel, left) in recording.channels.iter().zip(&residual[r]) {
+                let pairs: Vec<(f64, f64)> = (channel.rows.iter().zip(left))
+                    .map(|(row, e)| ((column[*row] - mean) / deviation, *e))
+                    .filter(|(x, e)| x.is_finite() && e.is_finite())
+                    .collect();
+                let product: f64 = pairs.iter().map(|(x, e)| x * e).sum();
+                let sizes = pairs.iter().map(|(x, _)| x * x).sum::<f64>()
+                    * pairs.iter().map(|(_, e)| e * e).sum::<f64>();
+                most = most.max(product.abs() / sizes.sqrt().max(1e-300));
+            }
+        }
+        most
+    };
+    names.into_iter().max_by(|a, b| follows(a).total_cmp(&follows(b)))
 }
 
 /// Fewest rows in all that noise can be learnt from.

@@ -25,31 +25,40 @@ pub const KNOWN: [&str; 18] = [
     "supply_current_a",
 ];
 
-/// Columns that a model has no use for by itself but that may drive what is left: unknown ones,
-/// and known ones that no part of the baseline reads. Every recording must have them, varying.
+/// Columns beside the contract's that another part of the model reads.
+const READ: [&str; 1] = ["torque_enable"];
+
+/// Columns that no part of the model reads but that may drive what is left. Every recording must have them,
+/// varying. What a controller asks for is no physics: in a closed loop it follows whatever is wrong.
 pub fn possible_drivers(series: &[Series]) -> Vec<String> {
     let Some(first) = series.first() else { return Vec::new() };
-    let optional = ["supply_v", "temperature_c", "depth_m"];
     let varies = |column: &[f64]| {
-        let known: Vec<f64> = column.iter().copied().filter(|v| v.is_finite()).collect();
-        known.iter().any(|v| *v != known[0])
+        let mut known = column.iter().filter(|v| v.is_finite());
+        known.next().is_some_and(|first| known.any(|v| v != first))
     };
+    let unknown = |name: &str| !KNOWN.contains(&name) && !READ.contains(&name) && !name.contains("_cmd");
     first
         .columns
         .iter()
         .map(|c| c.0.clone())
-        .filter(|name| !KNOWN.contains(&name.as_str()) || optional.contains(&name.as_str()))
+        .filter(|name| unknown(name))
         .filter(|name| series.iter().all(|s| s.column(name).is_some_and(varies)))
         .collect()
 }
 
+/// A column over all recordings: mean and standard deviation of its samples.
+pub fn spread(series: &[Series], name: &str) -> (f64, f64) {
+    let samples = || series.iter().filter_map(|s| s.column(name)).flatten().filter(|v| v.is_finite());
+    let n = samples().count().max(1) as f64;
+    let mean = samples().sum::<f64>() / n;
+    let variance = samples().map(|v| (v - mean).powi(2)).sum::<f64>() / n;
+    (mean, variance.sqrt().max(1e-12))
+}
+
 impl Prepared {
-    /// Lays an unknown column beside the inputs, standardised, as a possible driver.
-    pub fn lay_extra(&mut self, column: &[f64]) {
+    /// Lays a column beside the inputs as a possible driver, in standard deviations from its mean.
+    pub fn lay_extra(&mut self, name: &str, column: &[f64], (mean, deviation): (f64, f64)) {
         let values = filled(column);
-        let n = values.len() as f64;
-        let mean = values.iter().sum::<f64>() / n;
-        let deviation = (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt().max(1e-12);
         let mut row = 0;
         for tick in &mut self.stimulus.ticks {
             while row + 2 < self.time_s.len() && self.time_s[row + 1] <= tick.time_s {
@@ -57,5 +66,6 @@ impl Prepared {
             }
             tick.extra = (linear(&self.time_s, &values, row, tick.time_s) - mean) / deviation;
         }
+        self.extra = Some(name.into());
     }
 }

@@ -15,9 +15,9 @@ mod scale;
 mod start;
 
 pub use channel::{Channel, rates};
-pub use columns::{KNOWN, possible_drivers};
+pub use columns::{KNOWN, possible_drivers, spread};
 pub use error::DataError;
-pub use scale::{available, scale};
+pub use scale::{COLUMN, available, scale};
 
 use command::{find_edges, smooth_between, steps_of};
 use driving::{choose_driving, driving_power, instead};
@@ -145,6 +145,8 @@ pub struct Prepared {
     pub start: [f64; 4],
     /// Shaft speed at each row, where it drives.
     pub speed_between: Vec<f64>,
+    /// The column that is laid beside the inputs as a possible driver of what is left.
+    pub extra: Option<String>,
     /// Bandwidth with which the simulated shaft is kept with the recorded one, rad/s; 0 where it runs freely.
     pub observer_rad_s: f64,
 }
@@ -162,15 +164,19 @@ fn shown(rig: &Rig, driving: Driving, response: Response) -> bool {
 /// Bandwidth of the observer on a shaft that nothing brings back to its course, rad/s: 1 Hz.
 const OBSERVER_RAD_S: f64 = std::f64::consts::TAU;
 
+/// Angle of a pendulum near its top, rad.
+const TOP_RAD: f64 = 0.9 * std::f64::consts::PI;
+
 /// Whether a disturbed shaft returns to its course by itself: blades brake it, or the back-EMF under a
-/// voltage does, within a few tenths of a second. A dry shaft under a current integrates, and drifts; a
-/// pendulum that passes its top falls on either side.
-fn returns(rig: &Rig, driving: Driving) -> bool {
+/// voltage does, within a few tenths of a second; a pendulum hangs. A dry shaft under a current integrates, and
+/// drifts; a pendulum that passes its top falls on either side.
+fn returns(series: &Series, rig: &Rig, driving: Driving) -> bool {
     if driving == Driving::Speed || rig.amplifier.kind == AmplifierKind::Speed {
         return true;
     }
     if let Load::Pendulum { .. } = rig.load {
-        return false;
+        let angle = series.column("shaft_angle_rad");
+        return angle.is_some_and(|q| q.iter().all(|q| q.is_nan() || q.abs() < TOP_RAD));
     }
     if rig.propeller.is_some() {
         return true;
@@ -243,7 +249,8 @@ impl Prepared {
             tick_s,
             start: [0.0; 4],
             speed_between: Vec::new(),
-            observer_rad_s: if returns(rig, driving) { 0.0 } else { OBSERVER_RAD_S },
+            extra: None,
+            observer_rad_s: if returns(series, rig, driving) { 0.0 } else { OBSERVER_RAD_S },
         };
         if let Driving::Command("duty_cmd") = driving {
             // A duty of the supply is a voltage: of the recorded supply, or else the nominal one.

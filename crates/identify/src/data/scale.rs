@@ -46,8 +46,8 @@ pub fn scale(all: &[Prepared], rig: &Rig) -> Scale {
         // ... or what brings it to speed within a second.
         inertia_kg_m2 * speed
     };
-    // Where no current is recorded, the one that makes the torque: effects in amperes need a size.
-    let current = if current > 0.0 { current } else { torque / kt };
+    // Under a recorded power, the current that makes the torque: effects in amperes need a size.
+    let current = if driven_by(Driving::Power.column()) { torque / kt } else { current };
     Scale {
         shaft_speed_rad_s: speed.max(1e-6),
         torque_n_m: torque.max(1e-9),
@@ -63,12 +63,18 @@ pub fn scale(all: &[Prepared], rig: &Rig) -> Scale {
     }
 }
 
+/// Name under which [`Available`] lists that a column is laid beside the inputs ([`Prepared::lay_extra`]).
+pub const COLUMN: &str = "a column of its own";
+
 /// What the recordings offer, for the effects' `needs`.
 pub fn available(model: ModelName, series: &[Series], all: &[Prepared]) -> Available {
     let mut columns: Vec<String> = series
         .iter()
         .flat_map(|s| s.columns.iter().filter(|c| s.column(&c.0).is_some()).map(|c| c.0.clone()))
         .collect();
+    if all.iter().any(|p| p.extra.is_some()) {
+        columns.push(COLUMN.into());
+    }
     columns.sort();
     columns.dedup();
     Available {
