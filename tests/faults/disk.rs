@@ -1,14 +1,16 @@
-//! A disk without space: the recording ends, says why, stays readable, and the thrust is untouched.
+//! A disk without space, or a slow one: the recording ends, says why, stays readable, and the thrust is untouched.
 
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use serde_json::json;
+use serde_json::{Value, json};
 
-use crate::common::{Site, Stack, wait};
+use crate::common::{Site, Stack, kill, wait};
 use crate::table::Table;
 
 /// The guard of free space refuses at once; a file that may not grow is followed by others and then ends.
-pub fn full(table: &mut Table) {
+pub fn at_its_limit(table: &mut Table) {
     let site = Site::new();
     site.add("[gateway]", "recording = { file_bytes_max = 65536, files_max = 2, free_bytes_min = 0 }");
     let mut stack = Stack::start_at(site);
@@ -39,4 +41,160 @@ pub fn full(table: &mut Table) {
     let t = stack.watch().next();
     assert!(t.armed == 1 && t.faults == 0, "the thrust is untouched: {t:?}");
     table.row("recording at its limit", "ends with its cause, reads whole", Duration::from_secs(60), &[took]);
+}
+
+/// A small disk of its own, where this user may mount one.
+struct SmallDisk(String);
+
+impl SmallDisk {
+    fn mount(at: &Path, size: &str) -> Option<SmallDisk> {
+        std::fs::create_dir_all(at).unwrap();
+        let at = at.display().to_string();
+        let done = Command::new("mount")
+            .args(["-t", "tmpfs", "-o", size, "kort-test", &at])
+            .stderr(Stdio::null())
+            .status();
+        done.is_ok_and(|status| status.success()).then_some(SmallDisk(at))
+    }
+}
+
+impl Drop for SmallDisk {
+    fn drop(&mut self) {
+        let _ = Command::new("umount").args(["--lazy", &self.0]).status();
+    }
+}
+
+fn record(stack: &Stack, name: &str, rate_hz: f64) {
+    let agent: ureq::Agent = ureq::Agent::config_builder().http_status_as_error(false).build().into();
+    let url = format!("http://127.0.0.1:{}/v1/recordings", stack.site.port);
+    let started = agent.post(url).send_json(json!({"name": name, "rate_hz": rate_hz})).expect("an answer");
+    assert_eq!(started.status(), 201);
+}
+
+fn recording(stack: &Stack, name: &str) -> Option<Value> {
+    let list = stack.get("/v1/recordings")?;
+    list.as_array()?.iter().find(|info| info["name"] == name).cloned()
+}
+
+/// The disk refuses a write: a file system of 256 KiB; where none may be mounted, a limit of the files' size.
+pub fn full(table: &mut Table) {
+    let site = Site::new();
+    site.add("[gateway]", "recording = { free_bytes_min = 0 }");
+    let folder = site.folder.path().join("recordings");
+    let disk = SmallDisk::mount(&folder, "size=256k");
+    // The limit sends a signal that would end the process; ignored, the write fails as on a full disk.
+    let limited = ["sh", "-c", r#"trap "" XFSZ; ulimit -f 512; exec "$0" "$@""#];
+    let fault = if disk.is_some() { "disk full (256 KiB)" } else { "files may not grow (ulimit -f)" };
+    let mut stack = Stack::start_in(if disk.is_some() { &[] } else { &limited }, site);
+    stack.thrust(30.0, 60_000);
+    record(&stack, "full", 500.0);
+    let file = folder.join("full.mcap");
+    let (mut bytes, mut grown) = (0, Instant::now());
+    let info = wait("the recording to end", || {
+        let now = std::fs::metadata(&file).map_or(0, |file| file.len());
+        if now > bytes {
+            (bytes, grown) = (now, Instant::now());
+        }
+        recording(&stack, "full").filter(|info| info["state"] != "recording")
+    });
+    let took = grown.elapsed();
+    assert_eq!(info["state"], "failed", "{info}");
+    let cause = info["cause"].as_str().expect("a cause").to_lowercase();
+    assert!(cause.contains("space") || cause.contains("too large"), "{info}");
+    wait("metrics to say so", || {
+        let metrics = stack.text("/metrics")?;
+        let says = |line: &str| metrics.lines().any(|l| l == line);
+        (says("kort_recording_active{thruster=\"t1\"} 0")
+            && says("kort_recordings_failed_total{thruster=\"t1\"} 1"))
+        .then_some(())
+    });
+    wait("the event log to say so", || {
+        let events = stack.get("/v1/events")?;
+        events.as_array()?.iter().any(|event| event["kind"] == "recording_ended").then_some(())
+    });
+    // What the disk took is readable.
+    let kept = kort_recording::Recording::read(&file, None).expect("it reads");
+    assert!(kept.rows() > 500, "{} rows", kept.rows());
+    let t = stack.watch().next();
+    assert!(t.armed == 1 && t.faults == 0, "the thrust is untouched: {t:?}");
+    table.row(
+        fault,
+        "recording ends with its cause, reads, thrust untouched",
+        Duration::from_secs(2),
+        &[took],
+    );
+    drop(stack);
+    drop(disk);
+}
+
+/// A tracer that holds up every write of a recording, as a slow disk does.
+struct SlowDisk(Child);
+
+impl SlowDisk {
+    fn under(process: u32, files: &[&Path], write_takes: Duration) -> Option<SlowDisk> {
+        let mut command = Command::new("strace");
+        command.args(["-f", "-q", "-o", "/dev/null", "-p", &process.to_string(), "-e", "trace=write"]);
+        command.args(["-e", &format!("inject=write:delay_enter={}", write_takes.as_micros())]);
+        for file in files {
+            command.arg("-P").arg(file);
+        }
+        let mut tracer = SlowDisk(command.stdin(Stdio::null()).stderr(Stdio::null()).spawn().ok()?);
+        let traced = wait("the tracer", || {
+            let status = std::fs::read_to_string(format!("/proc/{process}/status")).ok()?;
+            let by = status.lines().find_map(|line| line.strip_prefix("TracerPid:"))?.trim();
+            let ended = tracer.0.try_wait().is_ok_and(|status| status.is_some());
+            (by != "0" || ended).then_some(!ended)
+        });
+        traced.then_some(tracer)
+    }
+}
+
+impl Drop for SlowDisk {
+    fn drop(&mut self) {
+        // One that ended by itself was not permitted.
+        if matches!(self.0.try_wait(), Ok(None)) {
+            kill(self.0.id(), "TERM");
+            let _ = self.0.wait();
+        }
+    }
+}
+
+/// Every write takes two seconds, for longer than rows may wait: samples are lost and counted, the thrust is not.
+pub fn slow(table: &mut Table) {
+    let site = Site::new();
+    let config = std::fs::read_to_string(site.config()).unwrap();
+    std::fs::write(site.config(), config.replace("servo = { rate_hz = 500 }", "servo = { rate_hz = 2000 }"))
+        .unwrap();
+    let folder = site.folder.path().join("recordings");
+    let mut stack = Stack::start_at(site);
+    stack.thrust(30.0, 60_000);
+    record(&stack, "slow", 2000.0);
+    std::thread::sleep(Duration::from_secs(1));
+    let files = [folder.join("slow.mcap"), folder.join(".slow.draft")];
+    let files = files.each_ref().map(std::path::PathBuf::as_path);
+    let Some(disk) = SlowDisk::under(stack.process_of("gateway"), &files, Duration::from_secs(2)) else {
+        println!("not run: a slow disk (strace is not installed or not permitted)");
+        return;
+    };
+    let mut watch = stack.watch();
+    let (began_ns, mut longest_ns) = (watch.next().time_ns, 0);
+    loop {
+        let t = watch.next();
+        assert!(t.armed == 1 && t.faults == 0, "the thrust is untouched: {t:?}");
+        // The newest command's age: the chain from gateway to servo goes on.
+        longest_ns = longest_ns.max(t.time_ns.saturating_sub(t.command_stamp_ns));
+        if t.time_ns > began_ns + 9_000_000_000 {
+            break;
+        }
+    }
+    drop(disk);
+    let lost =
+        wait("losses to be told", || recording(&stack, "slow")?["lost_samples"].as_u64().filter(|n| *n > 0));
+    println!("slow disk: {lost} samples lost, and said so");
+    table.row(
+        "disk slow (2 s a write)",
+        "losses counted, thrust untouched; age of a command",
+        Duration::from_nanos(5 * crate::common::PERIOD_NS),
+        &[Duration::from_nanos(longest_ns)],
+    );
 }

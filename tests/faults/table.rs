@@ -10,13 +10,15 @@ pub struct Table(Vec<Row>);
 struct Row {
     fault: String,
     what: &'static str,
-    bound: Duration,
-    worst: Duration,
+    unit: &'static str,
+    bound: f64,
+    worst: f64,
+    slack: f64,
     times: usize,
 }
 
 impl Table {
-    /// Notes what was measured of one fault.
+    /// Notes the times measured of one fault.
     pub fn row(
         &mut self,
         fault: impl Into<String>,
@@ -24,25 +26,40 @@ impl Table {
         bound: Duration,
         measured: &[Duration],
     ) {
-        let worst = measured.iter().copied().max().unwrap_or(Duration::MAX);
-        self.0.push(Row { fault: fault.into(), what, bound, worst, times: measured.len() });
+        let ms = |time: Duration| (time.as_secs_f64() * 1e3).floor();
+        let worst = measured.iter().copied().max().map_or(f64::INFINITY, ms);
+        // A machine shared with others may add two controller periods of the deployments under test, as in the
+        // other tests.
+        let slack = 2e-6 * crate::common::PERIOD_NS as f64;
+        let (fault, bound) = (fault.into(), ms(bound));
+        self.0.push(Row { fault, what, unit: "ms", bound, worst, slack, times: measured.len() });
     }
 
-    /// Every bound holds; a machine shared with others may add two controller periods of the deployments under
-    /// test, as in the other tests.
+    /// Notes another quantity that a fault must not let grow beyond its bound.
+    pub fn quantity(
+        &mut self,
+        fault: impl Into<String>,
+        what: &'static str,
+        unit: &'static str,
+        bound: f64,
+        worst: f64,
+    ) {
+        self.0.push(Row { fault: fault.into(), what, unit, bound, worst, slack: 0.0, times: 1 });
+    }
+
+    /// Does every bound hold?
     pub fn holds(&self) -> bool {
-        let slack = Duration::from_nanos(2 * crate::common::PERIOD_NS);
-        self.0.iter().all(|row| row.worst <= row.bound + slack)
+        self.0.iter().all(|row| row.worst <= row.bound + row.slack)
     }
 }
 
 impl fmt::Display for Table {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "| fault | what follows | promised, ms | worst, ms | times |")?;
+        writeln!(f, "| fault | what follows | promised | worst | times |")?;
         writeln!(f, "| --- | --- | --- | --- | --- |")?;
-        for Row { fault, what, bound, worst, times } in &self.0 {
-            let (bound, worst) = (bound.as_millis(), worst.as_millis());
-            writeln!(f, "| {fault} | {what} | {bound} | {worst} | {times} |")?;
+        for Row { fault, what, unit, bound, worst, times, .. } in &self.0 {
+            let worst = (worst * 100.0).round() / 100.0;
+            writeln!(f, "| {fault} | {what} | {bound} {unit} | {worst} {unit} | {times} |")?;
         }
         Ok(())
     }
