@@ -207,7 +207,8 @@ impl Blames for kort_gateway::GatewayError {
 }
 
 fn fail(code: u8, error: &dyn std::fmt::Display) -> ExitCode {
-    eprintln!("error: {error}");
+    // Where nobody listens the exit code still speaks; eprintln! would panic.
+    let _ = std::io::Write::write_all(&mut std::io::stderr(), format!("error: {error}\n").as_bytes());
     ExitCode::from(code)
 }
 
@@ -220,5 +221,8 @@ fn log() {
         .with_env_filter(filter)
         .with_writer(std::io::stderr)
         .with_ansi(terminal)
+        // A log on a full disk must not end a servo: what cannot be written is not complained of where it cannot
+        // be written either.
+        .log_internal_errors(false)
         .try_init();
 }

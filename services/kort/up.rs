@@ -5,6 +5,7 @@ mod role;
 mod scribe;
 mod watch;
 
+use std::io::Write;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -103,16 +104,17 @@ pub fn run(config: &Config, deployment: &Deployment) -> Result<(), UpError> {
     let program = std::env::current_exe().map_err(system("this program's own path"))?;
     let mut service = Service::new(config, owner, scribe, program);
     service.begin()?;
-    match &config.file {
-        Some(file) => println!("config   {}", file.display()),
-        None => {
-            println!("config   as built in; --config FILE takes another, config/kort.toml is found by itself")
-        }
-    }
+    let file = config.file.as_ref().map_or_else(
+        || "as built in; --config FILE takes another, config/kort.toml is found by itself".to_owned(),
+        |file| file.display().to_string(),
+    );
     let address = format!("{}://{}", gateway.scheme(), gateway.bind);
-    println!("console  {address}/");
-    println!("API      {address}/v1/thrusters   (described at /docs)");
-    println!("Ctrl-C stops all, thrust at zero first");
+    // Not println!: stdout on a full disk is no reason to end.
+    let _ = write!(
+        std::io::stdout(),
+        "config   {file}\nconsole  {address}/\nAPI      {address}/v1/thrusters   (described at /docs)\n\
+         Ctrl-C stops all, thrust at zero first\n"
+    );
     let result = service.watch_until(&stop);
     service.end();
     result

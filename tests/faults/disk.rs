@@ -4,6 +4,7 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use rustix::process::{Pid, Resource, Rlimit, prlimit};
 use serde_json::{Value, json};
 
 use crate::common::{Site, Stack, kill, wait};
@@ -82,10 +83,13 @@ pub fn full(table: &mut Table) {
     site.add("[gateway]", "recording = { free_bytes_min = 0 }");
     let folder = site.folder.path().join("recordings");
     let disk = SmallDisk::mount(&folder, "size=256k");
-    // The limit sends a signal that would end the process; ignored, the write fails as on a full disk.
-    let limited = ["sh", "-c", r#"trap "" XFSZ; ulimit -f 512; exec "$0" "$@""#];
-    let fault = if disk.is_some() { "disk full (256 KiB)" } else { "files may not grow (ulimit -f)" };
-    let mut stack = Stack::start_in(if disk.is_some() { &[] } else { &limited }, site);
+    let fault = if disk.is_some() { "disk full (256 KiB)" } else { "files may not grow (256 KiB)" };
+    let mut stack = Stack::start_at(site);
+    if disk.is_none() {
+        let gateway = i32::try_from(stack.process_of("gateway")).ok().and_then(Pid::from_raw);
+        let limit = Rlimit { current: Some(262_144), maximum: Some(262_144) };
+        prlimit(gateway, Resource::Fsize, limit).expect("a lower limit is always permitted");
+    }
     stack.thrust(30.0, 60_000);
     record(&stack, "full", 500.0);
     let file = folder.join("full.mcap");
@@ -197,4 +201,22 @@ pub fn slow(table: &mut Table) {
         Duration::from_nanos(5 * crate::common::PERIOD_NS),
         &[Duration::from_nanos(longest_ns)],
     );
+}
+
+/// What the processes say goes to a full disk: none ends for it, not even where there is much to say.
+pub fn log_full(table: &mut Table) {
+    let to_a_full_disk = ["sh", "-c", r#"exec "$0" "$@" > /dev/full 2>&1"#];
+    let mut stack = Stack::start_in(&to_a_full_disk, Site::new());
+    let roles = ["servo", "controller", "gateway"];
+    let before = roles.map(|role| stack.process_of(role));
+    for newton in [20.0, 30.0, 40.0] {
+        stack.thrust(newton, 60_000);
+    }
+    assert_eq!(
+        stack.http("PUT", "/setpoint", Some(json!({"thrust_n": 1e6}))).map(|answer| answer.0),
+        Some(422)
+    );
+    let after = roles.map(|role| stack.process_of(role));
+    let ended = before.iter().zip(after).filter(|(before, after)| **before != *after).count();
+    table.quantity("log on a full disk", "thrust as ever; processes that ended", "", 0.0, ended as f64);
 }

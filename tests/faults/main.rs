@@ -24,7 +24,7 @@ fn every_fault_ends_within_its_bound() {
     let groups: [(&str, &[Fault]); 5] = [
         ("processes", &[kills::killed, kills::stopped, kills::foreign_version]),
         ("network", &[network::rivals, network::slow_reader, network::half_open]),
-        ("disk", &[disk::at_its_limit, disk::full, disk::slow]),
+        ("disk", &[disk::at_its_limit, disk::full, disk::slow, disk::log_full]),
         ("shared_memory", &[shared_memory::full_at_the_start, shared_memory::full_under_way]),
         ("sensors", &[sensors::lying]),
     ];

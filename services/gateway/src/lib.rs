@@ -425,6 +425,8 @@ async fn serve(
     else {
         return Err(std::io::Error::other("signals").into());
     };
+    // A limit of the files' size fails a write, as a full disk does; it must not end the gateway.
+    let _limited = signal(SignalKind::from_raw(rustix::process::Signal::XFSZ.as_raw()))?;
     let scheme = if certificate.is_some() { "https" } else { "http" };
     tracing::info!("listening on {scheme}://{}", listener.local_addr()?);
     let router = routes::router(Arc::clone(&app));
