@@ -211,7 +211,7 @@ impl Problem<'_> {
 
     /// The same baseline, at a fit's values, with other members; derivatives that carry over come with it.
     pub fn recompose(&self, fit: &Fit, members: &[Member]) -> (Hypothesis, Columns) {
-        let is_base = |k: &usize| matches!(fit.hypothesis.free[*k].target, Target::Base(_));
+        let is_base = |k: &usize| !matches!(fit.hypothesis.free[*k].target, Target::Effect(..));
         let base: Vec<usize> = (0..fit.values.len()).filter(is_base).collect();
         let mut hypothesis = Hypothesis {
             effects: Vec::new(),
@@ -225,6 +225,7 @@ impl Problem<'_> {
         }
         let key = |h: &Hypothesis, target: Target| match target {
             Target::Base(p) => (p.name(), usize::MAX),
+            Target::Sampling { response, .. } => (response.name(), usize::MAX - 1),
             Target::Effect(i, j) => (h.effects[i].effect.id, j),
         };
         let columns = hypothesis

@@ -11,7 +11,7 @@ use kort_thruster::models::ModelName;
 use kort_thruster::parameters::{Parameter as P, Parameters};
 use kort_thruster::rig::{Quantity, Rig};
 
-use crate::data::Prepared;
+use crate::data::{Prepared, Response};
 
 /// Relative uncertainty (two sigma) of a coefficient in a rig that states no tolerance at all.
 pub const UNSTATED_TOL: f64 = 0.5;
@@ -24,6 +24,13 @@ const REACH: f64 = 1.5;
 pub enum Target {
     /// A parameter of the baseline.
     Base(P),
+    /// When a channel was sampled, s late; `slow` where its sensor is slower than the log.
+    Sampling {
+        /// The channel.
+        response: Response,
+        /// Slower than the log.
+        slow: bool,
+    },
     /// A value of an effect: which effect of the hypothesis, which value.
     Effect(usize, usize),
 }
@@ -251,6 +258,15 @@ impl Hypothesis {
         Self { effects: Vec::new(), free, start, inputs }
     }
 
+    /// With the instants free at which these recordings' channels were sampled.
+    pub fn with_sampling(mut self, recordings: &[Prepared]) -> Self {
+        for free in crate::sampling::free(recordings) {
+            self.start.push(free.mean);
+            self.free.push(free);
+        }
+        self
+    }
+
     /// The same with one more effect, from these values of what is free so far.
     pub fn with(&self, values: &[f64], member: Member, scale: &Scale) -> Self {
         let mut larger = self.clone();
@@ -291,6 +307,8 @@ impl Hypothesis {
             match free.target {
                 Target::Base(p) => parameters.set(p, *value),
                 Target::Effect(i, j) => effects[i][j] = *value,
+                // Not the plant's business.
+                Target::Sampling { .. } => (),
             }
         }
         (parameters, effects)

@@ -14,6 +14,7 @@ pub mod identify;
 pub mod noise;
 mod quadratic;
 mod refuse;
+pub mod sampling;
 pub mod scores;
 pub mod setup;
 mod shared_lanes;

@@ -70,7 +70,8 @@ impl<'a> Setup<'a> {
         let stated = Parameters::stated(rig);
         recordings.iter_mut().for_each(|r| r.mark_smooth(model, rig, &stated));
         let inputs = Arc::new(Inputs::late(&recordings));
-        let baseline = Hypothesis::baseline(model, rig, prescribed, current_seen, inputs);
+        let baseline =
+            Hypothesis::baseline(model, rig, prescribed, current_seen, inputs).with_sampling(&recordings);
         let mut problem = Problem::new(model, rig, recordings, masked, criterion);
         if let Some(name) = telling_column(series, &problem, &baseline) {
             let sizes = spread(series, &name);

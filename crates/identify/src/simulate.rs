@@ -14,8 +14,9 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 
 use crate::data::{Driving, Prepared, Response, rates};
-use crate::hypothesis::{Hypothesis, Member};
+use crate::hypothesis::{Hypothesis, Member, Target};
 use crate::noise::{Criterion, Floor};
+use crate::sampling::{Delays, Instant};
 use crate::shared_lanes::{groups, last_acting};
 use crate::spectrum::Spectrum;
 
@@ -122,7 +123,7 @@ impl<'a> Problem<'a> {
     /// Simulated rows of all recordings.
     pub fn rows(&self, hypothesis: &Hypothesis, values: &[f64]) -> Vec<Vec<Sensed>> {
         let mut all: Vec<Vec<Sensed>> = vec![Vec::new(); self.recordings.len()];
-        self.simulate(hypothesis, values, |r, _, sensed| all[r].push(*sensed));
+        self.simulate(hypothesis, values, |r, _, instant| all[r].push(*instant.now));
         all
     }
 
@@ -137,7 +138,7 @@ impl<'a> Problem<'a> {
         &self,
         hypothesis: &Hypothesis,
         values: &[T],
-        mut show: impl FnMut(usize, usize, &Sensed<T>),
+        mut show: impl FnMut(usize, usize, &Instant<T>),
     ) {
         let (parameters, effects) = hypothesis.assemble(&self.stated, values);
         let hooked: Vec<(&Descriptor, &[T])> =
@@ -147,7 +148,7 @@ impl<'a> Problem<'a> {
                 .with_observer(recording.observer_rad_s);
             let [speed, flow, current, angle] = recording.start;
             plant.start(recording.time_s[0], speed, flow, current, angle);
-            run(&mut plant, recording, &hypothesis.inputs.commands[r], |row, sensed| show(r, row, sensed));
+            run(&mut plant, recording, &hypothesis.inputs.commands[r], |row, instant| show(r, row, instant));
         }
     }
 
@@ -158,13 +159,24 @@ impl<'a> Problem<'a> {
         values: &[T],
         numbers: impl Fn(T) -> [f64; K],
     ) -> [Stack; K] {
+        let delays = Delays::of(&hypothesis.free, values);
+        self.collect(hypothesis, values, |response, instant| numbers(delays.sampled(response, instant)))
+    }
+
+    /// Some numbers of every channel at every instant where it has a sample, a stack each.
+    fn collect<T: Real, const K: usize>(
+        &self,
+        hypothesis: &Hypothesis,
+        values: &[T],
+        numbers: impl Fn(Response, &Instant<T>) -> [f64; K],
+    ) -> [Stack; K] {
         let room = |r: &Prepared| r.channels.iter().map(|c| Vec::with_capacity(c.rows.len())).collect();
         let mut stacks: [Stack; K] = std::array::from_fn(|_| self.recordings.iter().map(room).collect());
-        self.simulate(hypothesis, values, |r, row, sensed| {
+        self.simulate(hypothesis, values, |r, row, instant| {
             for (c, channel) in self.recordings[r].channels.iter().enumerate() {
                 // Samples come in order of their rows; a row may have none.
                 if channel.rows.get(stacks[0][r][c].len()) == Some(&row) {
-                    let all = numbers(channel.response.of(sensed));
+                    let all = numbers(channel.response, instant);
                     stacks.iter_mut().zip(all).for_each(|(stack, one)| stack[r][c].push(one));
                 }
             }
@@ -187,6 +199,8 @@ impl<'a> Problem<'a> {
         wanted: &[usize],
     ) -> Vec<(usize, DVector<f64>)> {
         let always = Stretch { from_s: 0.0, length_s: 0.0, period_s: 0.0 };
+        let (shifts, wanted): (Vec<usize>, Vec<usize>) =
+            wanted.iter().partition(|k| matches!(hypothesis.free[**k].target, Target::Sampling { .. }));
         let (some, all): (Vec<usize>, Vec<usize>) =
             wanted.iter().partition(|k| hypothesis.free[**k].acts.is_some());
         let tasks: Vec<Vec<(usize, Stretch)>> = all
@@ -198,7 +212,40 @@ impl<'a> Problem<'a> {
             .par_chunks(LANES)
             .flat_map_iter(|groups| self.lanes(hypothesis, values, groups))
             .map(|(k, stack)| (k, self.spectrum.transform(&stack)))
+            .chain(self.by_sampling(hypothesis, values, &shifts))
             .collect()
+    }
+
+    /// Derivatives by the instants of sampling: rates of change, which one plain simulation tells.
+    fn by_sampling(
+        &self,
+        hypothesis: &Hypothesis,
+        values: &[f64],
+        shifts: &[usize],
+    ) -> Vec<(usize, DVector<f64>)> {
+        if shifts.is_empty() {
+            return Vec::new();
+        }
+        let wanted = shifts.iter().filter_map(|k| match hypothesis.free[*k].target {
+            Target::Sampling { response, slow } => Some((*k, response, slow)),
+            _ => None,
+        });
+        let wanted: Vec<(usize, Response, bool)> = wanted.collect();
+        let slow = |response| wanted.iter().any(|(_, r, slow)| *r == response && *slow);
+        let [rates] =
+            self.collect(hypothesis, values, |response, instant| [-instant.rate(response, slow(response))]);
+        let only = |response| {
+            let mut stack = rates.clone();
+            for (recording, channels) in self.recordings.iter().zip(&mut stack) {
+                for (channel, samples) in recording.channels.iter().zip(channels) {
+                    if channel.response != response {
+                        samples.fill(0.0);
+                    }
+                }
+            }
+            self.spectrum.transform(&stack)
+        };
+        wanted.iter().map(|(k, response, _)| (*k, only(*response))).collect()
     }
 
     /// The residual and its derivatives by up to four free numbers, as lines, by one simulation.
@@ -265,29 +312,42 @@ fn run<T: Real>(
     plant: &mut Plant<T>,
     recording: &Prepared,
     commands: &[f64],
-    mut show: impl FnMut(usize, &Sensed<T>),
+    mut show: impl FnMut(usize, &Instant<T>),
 ) {
-    let stimulus = &recording.stimulus;
+    let (stimulus, time_s, tick_s) = (&recording.stimulus, &recording.time_s, recording.tick_s);
     let mut next = stimulus.logs.iter().enumerate().peekable();
+    let mut before = plant.sensed();
+    let mut last_row = before;
+    let mut log = |row: usize, now: &Sensed<T>, tick: (&Sensed<T>, &Sensed<T>)| {
+        let row_s = if row == 0 { tick_s } else { time_s[row] - time_s[row - 1] };
+        show(row, &Instant { now, tick, tick_s, last_row: &last_row, row_s });
+        last_row = *now;
+    };
     // An instant on the grid shows the state before that tick's command acts.
     while let Some((row, _)) = next.next_if(|(_, (tick, part))| *tick == 0 && *part == 0.0) {
-        show(row, &plant.sensed());
+        log(row, &before, (&before, &before));
     }
     for (i, (tick, command)) in stimulus.ticks.iter().zip(commands).enumerate() {
         let Some((_, (at, part))) = next.peek() else { break };
-        let before = (*at == i && *part > 0.0).then(|| plant.sensed());
+        let shows = *at == i && *part > 0.0 || *at == i + 1 && *part == 0.0;
+        if shows {
+            before = plant.sensed();
+        }
         plant.step(&Tick { command: *command, ..*tick });
+        if !shows {
+            continue;
+        }
+        let after = plant.sensed();
         while let Some((row, (_, part))) =
             next.next_if(|(_, (at, part))| *at == i && *part > 0.0 || *at == i + 1 && *part == 0.0)
         {
-            match &before {
-                Some(before) if *part > 0.0 => show(row, &before.between(&plant.sensed(), *part)),
-                _ => show(row, &plant.sensed()),
-            }
+            let now = if *part > 0.0 { before.between(&after, *part) } else { after };
+            log(row, &now, (&before, &after));
         }
     }
     // Instants past the last tick see the last state.
+    let end = plant.sensed();
     for (row, _) in next {
-        show(row, &plant.sensed());
+        log(row, &end, (&end, &end));
     }
 }

@@ -88,7 +88,8 @@ impl Spectrum {
                 frame.transform(&channel.values, less, &mut signal);
                 let quantisation = (quantum(&channel.values) / channel.full_scale).powi(2) / 12.0;
                 let row_s = median_interval(&recording.time_s);
-                let stale_s = if interval_s > 1.5 * row_s { 0.5 * row_s } else { 0.0 };
+                // Of a delay anywhere in a row the mean is a free number; what differs from sample to sample is not.
+                let stale_s = if is_slow(interval_s, row_s) { row_s / 12.0_f64.sqrt() } else { 0.0 };
                 let ranges = band_ranges(n);
                 for (i, range) in ranges.iter().enumerate() {
                     let power: f64 = signal[range.clone()].iter().map(|v| v * v).sum();
@@ -167,10 +168,15 @@ fn band_ranges(lines: usize) -> Vec<Range<usize>> {
     ranges
 }
 
-fn median_interval(times: &[f64]) -> f64 {
+pub(crate) fn median_interval(times: &[f64]) -> f64 {
     let mut steps: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).collect();
     steps.sort_by(f64::total_cmp);
     steps.get(steps.len() / 2).copied().unwrap_or(1.0)
+}
+
+/// Whether a sensor is slower than the log.
+pub(crate) fn is_slow(interval_s: f64, row_s: f64) -> bool {
+    interval_s > 1.5 * row_s
 }
 
 /// Least distance between two different values: the step of a coarse converter, nearly nothing of a fine one.
