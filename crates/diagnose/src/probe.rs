@@ -118,23 +118,33 @@ pub fn probe(problem: &Problem, baseline: &Fit, effect: &'static Descriptor) -> 
 /// Departure from proportion to its size, as a share, that makes an action worth probing at larger ones.
 const BENDS: f64 = 0.05;
 
-/// The best that an effect's probes promise on top of a set, with all of its sizes or one alone. `known` are
-/// the products of the set's own derivatives.
-pub fn promise(problem: &Problem, parent: &Fit, known: &[DMatrix<f64>], probes: &[Probe]) -> Option<Promise> {
-    probes
-        .iter()
-        .flat_map(|probe| {
-            let specs = (probe.member.effect.parameters)(&problem.scale);
-            let forms = probe.member.effect.forms(&specs);
-            let of = move |form: Vec<usize>| {
-                let sizes: Vec<usize> =
-                    (0..probe.sizes.len()).filter(|k| form.contains(&probe.sizes[*k].0)).collect();
-                (probe, form, sizes)
-            };
-            forms.into_iter().map(of)
+/// Promises of one effect that are worth a closer look: where its shape is far off, a size alone shows little.
+const MOST_PROMISES: usize = 3;
+
+/// What an effect's probes promise on top of a set, each by its best form; the best few. `known` are the
+/// products of the set's own derivatives.
+pub fn promises(problem: &Problem, parent: &Fit, known: &[DMatrix<f64>], probes: &[Probe]) -> Vec<Promise> {
+    let mut all: Vec<Promise> =
+        probes.iter().filter_map(|probe| of_probe(problem, parent, known, probe)).collect();
+    all.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    all.truncate(MOST_PROMISES);
+    all
+}
+
+fn of_probe(problem: &Problem, parent: &Fit, known: &[DMatrix<f64>], probe: &Probe) -> Option<Promise> {
+    let specs = (probe.member.effect.parameters)(&problem.scale);
+    probe
+        .member
+        .effect
+        .forms(&specs)
+        .into_iter()
+        .map(|form| {
+            let sizes: Vec<usize> =
+                (0..probe.sizes.len()).filter(|k| form.contains(&probe.sizes[*k].0)).collect();
+            (form, sizes)
         })
-        .filter(|(probe, _, sizes)| !sizes.is_empty() || probe.always.is_some())
-        .filter_map(|(probe, form, sizes)| of_form(problem, parent, known, probe, &form, &sizes))
+        .filter(|(_, sizes)| !sizes.is_empty() || probe.always.is_some())
+        .filter_map(|(form, sizes)| of_form(problem, parent, known, probe, &form, &sizes))
         .min_by(|a, b| a.cost.total_cmp(&b.cost))
 }
 

@@ -1,8 +1,10 @@
 //! Which effects are worth an exact fit on top of a set? Those whose probes promise most are simulated there:
 //! the response is taken as linear about that point, and the criterion minimised and priced as a fit's is.
 
+use std::sync::Arc;
+
 use kort_identify::Quadratic;
-use kort_identify::fit::Fit;
+use kort_identify::fit::{Columns, Fit};
 use kort_identify::hypothesis::{Hypothesis, Member};
 use kort_identify::simulate::Problem;
 use kort_thruster::dual::LANES;
@@ -10,15 +12,18 @@ use kort_thruster::effects::Descriptor;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use crate::probe::{Probe, Promise, promise};
+use crate::probe::{Probe, Promise, promises};
 
 /// An effect on top of a set, as the screen sees it.
 #[derive(Clone)]
 pub struct Screened {
     /// The effect.
     pub effect: &'static Descriptor,
-    /// The set with it, from where the screen saw it do best.
+    /// The set with it, from where the screen looked: the step from there is the fit's to take, which sees
+    /// where the response bends.
     pub hypothesis: Hypothesis,
+    /// Derivatives there.
+    pub columns: Columns,
     /// Its cost there, without the prior odds of its effects.
     pub cost: f64,
     /// What the effect does to the response there: mean square by band.
@@ -27,18 +32,18 @@ pub struct Screened {
 
 /// What a closer look may gain beyond a probe's promise.
 const HOPE: f64 = 10.0;
-/// Effects looked at closely on top of one set.
-const CLOSELY: usize = 10;
+/// Promises looked at closely on top of one set.
+const CLOSELY: usize = 14;
 
 /// Screens effects on top of a fit, cheapest first. Effects that break the simulation down are left out.
 pub fn screen(problem: &Problem, parent: &Fit, probes: &[&[Probe]]) -> Vec<Screened> {
     let known = problem.about(&parent.lines, &parent.columns, &parent.hypothesis);
     let known = known.curvature();
-    let mut promises: Vec<Promise> =
-        probes.par_iter().filter_map(|probes| promise(problem, parent, known, probes)).collect();
-    promises.retain(|p| p.cost < parent.cost() + HOPE);
-    promises.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-    promises.truncate(CLOSELY);
+    let mut promised: Vec<Promise> =
+        probes.par_iter().flat_map_iter(|probes| promises(problem, parent, known, probes)).collect();
+    promised.retain(|p| p.cost < parent.cost() + HOPE);
+    promised.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    promised.truncate(CLOSELY);
     let best_of = |p: Promise| {
         let near =
             p.member.values.iter().zip(&p.probed.values).all(|(a, b)| a == b || (a / b - 1.0).abs() < 0.5);
@@ -46,8 +51,15 @@ pub fn screen(problem: &Problem, parent: &Fit, probes: &[&[Probe]]) -> Vec<Scree
         let scaled = at(problem, parent, known, p.member);
         scaled.into_iter().chain(from_probe).min_by(|a, b| a.cost.total_cmp(&b.cost))
     };
-    let mut all: Vec<Screened> = promises.into_par_iter().filter_map(best_of).collect();
+    let mut all: Vec<Screened> = promised.into_par_iter().filter_map(best_of).collect();
     all.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    // The best of an effect's promises.
+    let mut seen = Vec::new();
+    all.retain(|s| {
+        let new = !seen.contains(&s.effect.id);
+        seen.push(s.effect.id);
+        new
+    });
     all
 }
 
@@ -86,17 +98,7 @@ fn at(problem: &Problem, parent: &Fit, known: &[DMatrix<f64>], member: Member) -
         minimum = Some(found);
     }
     let minimum = minimum?;
-    let price = model.price(&minimum.noise);
-    let start = hypothesis
-        .free
-        .iter()
-        .enumerate()
-        .map(|(k, free)| (hypothesis.start[k] + minimum.step[k] * free.sigma).clamp(free.low, free.high))
-        .collect();
-    Some(Screened {
-        effect,
-        hypothesis: Hypothesis { start, ..hypothesis },
-        cost: minimum.misfit + minimum.penalty + price,
-        action: actions.pop()?,
-    })
+    let cost = minimum.misfit + minimum.penalty + model.price(&minimum.noise);
+    let columns = parent.columns.iter().cloned().chain(new.into_iter().map(|c| Some(Arc::new(c)))).collect();
+    Some(Screened { effect, hypothesis, columns, cost, action: actions.pop()? })
 }

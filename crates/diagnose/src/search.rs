@@ -242,7 +242,7 @@ impl<'a, 'p> Search<'a, 'p> {
             .map(|s| {
                 let mut actions = parent.actions.clone();
                 actions.push(s.action.clone());
-                (with(s.effect), self.problem.settle(&s.hypothesis, &parent.columns, &actions, ITERATIONS))
+                (with(s.effect), self.problem.settle(&s.hypothesis, &s.columns, &actions, ITERATIONS))
             })
             .collect();
         for (set, fit) in new {

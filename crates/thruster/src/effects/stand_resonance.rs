@@ -38,7 +38,7 @@ fn parameters(_: &Scale) -> Vec<Spec> {
 fn starts(_: &Scale) -> Vec<Vec<f64>> {
     [5.0, 6.0, 7.2, 8.6, 10.3, 12.4, 14.8, 17.8, 21.4, 25.6, 30.7, 40.0, 56.0, 80.0]
         .iter()
-        .map(|hz| vec![0.5, *hz, 0.05])
+        .map(|hz| vec![0.5, *hz, 0.1])
         .collect()
 }
 
