@@ -31,8 +31,6 @@ pub struct RemainderConstants {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SearchConstants {
-    /// Cost of one more effect, beyond its share of the catalogue.
-    pub per_effect: f64,
     /// Sets within this cost of the best are fitted exactly and can be its rivals.
     pub rivals: f64,
     /// Effects of one screen that are fitted exactly at most.
@@ -76,7 +74,6 @@ mod tests {
             c.criterion.own_form_error,
             c.criterion.facts_a_band,
             c.criterion.timing_s,
-            c.search.per_effect,
             c.search.rivals,
             c.posterior.temper,
             c.posterior.surprise,

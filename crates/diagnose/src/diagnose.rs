@@ -6,6 +6,7 @@ use kort_identify::setup::Setup;
 use kort_thruster::effects::{self, Available, Descriptor};
 use kort_thruster::models::ModelName;
 use kort_thruster::rig::Rig;
+use serde::Serialize;
 
 use crate::constants::Constants;
 use crate::posterior::posterior;
@@ -32,6 +33,19 @@ pub struct Diagnosis {
     pub report: Report,
     /// For plots.
     pub traces: Traces,
+    /// Every set that was fitted: what odds are made of.
+    pub evidence: Vec<Evidence>,
+}
+
+/// What speaks for a set of effects, apart from how much of it is believed.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Evidence {
+    /// The set.
+    pub effects: Set,
+    /// Twice the negative log of what the data say for it.
+    pub cost: f64,
+    /// Negative log of its prior odds.
+    pub rarity: f64,
 }
 
 /// Diagnoses recordings of one rig together.
@@ -53,7 +67,7 @@ pub fn diagnose(
     }
     let offered = available(options.model, series, &problem.recordings);
     let candidates = candidates(rig, &offered, &options.with);
-    let mut search = Search::new(&problem, candidates, constants.search);
+    let mut search = Search::new(&problem, candidates, &constants);
     let best = search.run(&baseline, progress);
     if search.fits[&Set::new()].broke_down() {
         let recording = series.iter().map(|s| s.name.as_str()).collect::<Vec<_>>().join(", ");
@@ -64,7 +78,14 @@ pub fn diagnose(
     let costs: Vec<(Set, f64)> = search.fits.keys().map(|set| (set.clone(), search.cost(set))).collect();
     let explanations = posterior(costs, constants.posterior.temper, constants.posterior.surprise);
     progress("scoring on held-out data");
-    Ok(Writer::new(&search, explanations, series, rig, options).write(notes, thin))
+    let evidence = search.fits.iter().map(|(set, fit)| Evidence {
+        effects: set.clone(),
+        cost: fit.cost(),
+        rarity: search.rarity(set),
+    });
+    let evidence = evidence.collect();
+    let (report, traces) = Writer::new(&search, explanations, series, rig, options).write(notes, thin);
+    Ok(Diagnosis { report, traces, evidence })
 }
 
 /// Effects that can act here.

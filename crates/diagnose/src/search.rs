@@ -9,7 +9,7 @@ use kort_identify::simulate::Problem;
 use kort_thruster::effects::Descriptor;
 use rayon::prelude::*;
 
-use crate::constants::SearchConstants;
+use crate::constants::{Constants, SearchConstants};
 use crate::flexible::TERMS;
 use crate::probe::{Probe, probe};
 use crate::screen::{Screened, screen};
@@ -36,15 +36,12 @@ pub struct Search<'a, 'p> {
     dropped: BTreeSet<(Set, Set)>,
     probes: Vec<Vec<Probe>>,
     constants: SearchConstants,
+    temper: f64,
 }
 
 impl<'a, 'p> Search<'a, 'p> {
     /// Before anything is fitted.
-    pub fn new(
-        problem: &'a Problem<'p>,
-        effects: Vec<&'static Descriptor>,
-        constants: SearchConstants,
-    ) -> Self {
+    pub fn new(problem: &'a Problem<'p>, effects: Vec<&'static Descriptor>, constants: &Constants) -> Self {
         Self {
             problem,
             effects,
@@ -52,24 +49,31 @@ impl<'a, 'p> Search<'a, 'p> {
             screens: BTreeMap::new(),
             dropped: BTreeSet::new(),
             probes: Vec::new(),
-            constants,
+            constants: constants.search,
+            temper: constants.posterior.temper,
         }
     }
 
     /// Cost of a set: of its fit, and of the prior odds of each effect.
     pub fn cost(&self, set: &Set) -> f64 {
-        self.fits.get(set).map_or(f64::INFINITY, |fit| fit.cost() + self.prior(set))
+        self.fits.get(set).map_or(f64::INFINITY, |fit| fit.cost() + 2.0 * self.temper * self.rarity(set))
     }
 
-    /// Cost of a set's effects before any data: rare physics costs more than common.
-    fn prior(&self, set: &Set) -> f64 {
+    /// What speaks against a set before any data, as a natural logarithm: each effect is one of the catalogue,
+    /// more or less common.
+    pub fn rarity(&self, set: &Set) -> f64 {
         let of = |id: &&'static str| self.descriptor(id).map_or(1.0, |d| d.commonness);
-        set.iter().map(|id| self.per_effect() - 2.0 * of(id).ln()).sum()
+        set.iter().map(|id| self.one_of_all() - of(id).ln()).sum()
     }
 
-    /// Cost of one more effect of average odds: one of the catalogue at equal odds, and what chance alone may gain.
+    fn one_of_all(&self) -> f64 {
+        (self.effects.len().max(1) as f64).ln()
+    }
+
+    /// Cost of one more effect of average odds. Costs are tempered as a whole where they become odds, so a
+    /// logarithm of the prior counts that much more among them.
     pub fn per_effect(&self) -> f64 {
-        2.0 * (self.effects.len().max(1) as f64).ln() + self.constants.per_effect
+        2.0 * self.temper * self.one_of_all()
     }
 
     /// An effect or term of any set.
@@ -227,13 +231,13 @@ impl<'a, 'p> Search<'a, 'p> {
         let best = screened.first().map_or(f64::INFINITY, |s| s.cost);
         // What a screen promises is off by a share of the gain where the response bends.
         let doubt = self.constants.rivals + SCREEN_DOUBT * (parent.cost() - best).max(0.0);
-        let prior = self.prior(set) + self.per_effect();
+        let prior = |effect: &Descriptor| {
+            2.0 * self.temper * (self.rarity(set) + self.one_of_all() - effect.commonness.ln())
+        };
         let chosen: Vec<&Screened> = screened
             .iter()
             .take(self.constants.exact)
-            .filter(|s| {
-                s.cost < best + doubt && s.cost + prior - 2.0 * s.effect.commonness.ln() < bar + doubt
-            })
+            .filter(|s| s.cost < best + doubt && s.cost + prior(s.effect) < bar + doubt)
             .collect();
         let sets: Vec<Set> = chosen.iter().map(|s| with(s.effect)).collect();
         let new: Vec<(Set, Fit)> = chosen

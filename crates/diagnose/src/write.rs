@@ -10,7 +10,7 @@ use kort_thruster::rig::Rig;
 
 use crate::constants::Constants;
 use crate::decide::{Circumstances, Decision, Named, decide};
-use crate::diagnose::{Diagnosis, Options};
+use crate::diagnose::Options;
 use crate::experiment;
 use crate::flexible::is_term;
 use crate::left;
@@ -18,7 +18,7 @@ use crate::locate::{self, locate};
 use crate::posterior::{Explanation, presence};
 use crate::report::{Alternative, Baseline, Finding, Mismatch, Remainder, Report, SetReport, Verdict};
 use crate::search::{Search, Set};
-use crate::traces::traces;
+use crate::traces::{Traces, traces};
 use crate::words;
 
 /// What the report is written from.
@@ -120,7 +120,7 @@ impl<'a, 'p> Writer<'a, 'p> {
     }
 
     /// The report, and curves for its plots.
-    pub fn write(self, mut notes: Vec<String>, thin: Option<String>) -> Diagnosis {
+    pub fn write(self, mut notes: Vec<String>, thin: Option<String>) -> (Report, Traces) {
         let (problem, options) = (self.problem, self.options);
         let baseline_full = self.residual(self.baseline);
         let last_full = self.residual(self.last);
@@ -275,7 +275,7 @@ impl<'a, 'p> Writer<'a, 'p> {
             next_experiment,
             notes,
         };
-        Diagnosis { report, traces: traces(problem, &baseline_full, &last_full, &speed) }
+        (report, traces(problem, &baseline_full, &last_full, &speed))
     }
 
     /// A mismatch that neither name nor term describes, located by its error alone.

@@ -6,6 +6,7 @@
 //! - [`measured`]: recordings that others measured, with an open key beside them;
 //! - [`concealed`]: exact changes hidden in measured recordings;
 //! - [`calibrate`]: every probability that was stated, with what became of it, in folds;
+//! - [`temper`]: the odds' one free constant, fitted on some cases and tested on those left out;
 //! - [`ledger`]: seeds that were used, so that none is used twice.
 
 pub mod blind;
@@ -17,6 +18,7 @@ pub mod measured;
 pub mod report;
 pub mod score;
 pub mod tally;
+pub mod temper;
 
 use serde_json::Value;
 

@@ -66,7 +66,7 @@ const ASKED: f64 = 0.15;
 
 /// A name stands for a hidden effect: its id, another id of the same physics, or one of a set that
 /// together does the same.
-fn stands_for(name: &str, hidden: &HiddenEffect) -> bool {
+pub(crate) fn stands_for(name: &str, hidden: &HiddenEffect) -> bool {
     hidden.effect == name
         || hidden.same_physics.contains(&name)
         || hidden.same_sets.iter().any(|set| set.contains(&name))

@@ -1,9 +1,11 @@
-//! Records for fitting constants: a JSON line a finding.
+//! Records for fitting constants, a JSON line a finding; and the temper of the odds, fitted and tested.
 
 use std::path::Path;
 
-use kort_proof::calibrate::{Fold, records};
+use kort_diagnose::constants::Constants;
+use kort_proof::calibrate::{Fold, fold_of, records};
 use kort_proof::score::Scored;
+use kort_proof::temper::{TEMPERS, Weighed, best, cross_validate, mean_score};
 use kort_truth::Answer;
 use serde_json::Value;
 
@@ -36,5 +38,26 @@ pub fn write(
     }
     write_text(path, &text)?;
     eprintln!("wrote {count} records to {}", path.display());
+    print_temper(results, by, folds);
     Ok(())
+}
+
+/// The temper that these cases ask for, and what it is worth on folds left out.
+fn print_temper(results: &[(Scored, Answer, Value)], by: Fold, folds: usize) {
+    let cases: Vec<Weighed> = results
+        .iter()
+        .filter_map(|(_, answer, report)| Weighed::of(answer, report, fold_of(answer, by, folds)))
+        .collect();
+    let odds = Constants::built_in().posterior;
+    let all: Vec<&Weighed> = cases.iter().collect();
+    eprintln!("temper  mean log score of the names in {} cases (0 is best)", all.len());
+    for temper in TEMPERS {
+        eprintln!("{temper:6}  {:.3}", mean_score(&all, temper, odds.surprise));
+    }
+    eprintln!("best {}, in use {}", best(&all, odds.surprise), odds.temper);
+    eprintln!("fold  cases  fitted on the others  its score here  in use");
+    for left in cross_validate(&cases, odds.temper, odds.surprise) {
+        let (fold, count, temper) = (left.fold, left.cases, left.temper);
+        eprintln!("{fold:4}  {count:5}  {temper:20}  {:14.3}  {:6.3}", left.score, left.in_use);
+    }
 }

@@ -19,6 +19,8 @@ impl Diagnosis for Ours {
         let started = std::time::Instant::now();
         let diagnosis = diagnose(&series, &rig, &options, &|_| ()).map_err(|error| error.to_string())?;
         let mut report = serde_json::to_value(&diagnosis.report).map_err(|error| error.to_string())?;
+        // Not part of the report: what its odds are made of, for the calibration.
+        report["evidence"] = serde_json::to_value(&diagnosis.evidence).map_err(|error| error.to_string())?;
         report["took_seconds"] = json!(started.elapsed().as_secs_f64());
         Ok(report)
     }
