@@ -10,7 +10,7 @@ use kort_thruster::effects::Descriptor;
 use rayon::prelude::*;
 
 use crate::constants::{Constants, SearchConstants};
-use crate::flexible::TERMS;
+use crate::flexible::{TERMS, is_term};
 use crate::probe::{Probe, probe};
 use crate::screen::{Screened, screen};
 
@@ -59,21 +59,25 @@ impl<'a, 'p> Search<'a, 'p> {
         self.fits.get(set).map_or(f64::INFINITY, |fit| fit.cost() + 2.0 * self.temper * self.rarity(set))
     }
 
-    /// What speaks against a set before any data, as a natural logarithm: each effect is one of the catalogue,
-    /// more or less common.
+    /// What speaks against a set before any data, as a natural logarithm.
     pub fn rarity(&self, set: &Set) -> f64 {
-        let of = |id: &&'static str| self.descriptor(id).map_or(1.0, |d| d.commonness);
-        set.iter().map(|id| self.one_of_all() - of(id).ln()).sum()
+        set.iter().map(|id| self.rarity_of(id)).sum()
     }
 
-    fn one_of_all(&self) -> f64 {
-        (self.effects.len().max(1) as f64).ln()
+    /// An effect is one of the catalogue, more or less common. What has no name is as likely as one of them,
+    /// at one of the places where it may be.
+    fn rarity_of(&self, id: &str) -> f64 {
+        if is_term(id) {
+            return (TERMS.len() as f64).ln();
+        }
+        let commonness = self.descriptor(id).map_or(1.0, |d| d.commonness);
+        (self.effects.len().max(1) as f64 / commonness).ln()
     }
 
-    /// Cost of one more effect of average odds. Costs are tempered as a whole where they become odds, so a
-    /// logarithm of the prior counts that much more among them.
-    pub fn per_effect(&self) -> f64 {
-        2.0 * self.temper * self.one_of_all()
+    /// What one more member adds to a cost before any data. Costs are tempered as a whole where they become
+    /// odds, so a logarithm of the prior counts that much more among them.
+    pub fn price_of(&self, id: &str) -> f64 {
+        2.0 * self.temper * self.rarity_of(id)
     }
 
     /// An effect or term of any set.
@@ -231,13 +235,11 @@ impl<'a, 'p> Search<'a, 'p> {
         let best = screened.first().map_or(f64::INFINITY, |s| s.cost);
         // What a screen promises is off by a share of the gain where the response bends.
         let doubt = self.constants.rivals + SCREEN_DOUBT * (parent.cost() - best).max(0.0);
-        let prior = |effect: &Descriptor| {
-            2.0 * self.temper * (self.rarity(set) + self.one_of_all() - effect.commonness.ln())
-        };
+        let prior = 2.0 * self.temper * self.rarity(set);
         let chosen: Vec<&Screened> = screened
             .iter()
             .take(self.constants.exact)
-            .filter(|s| s.cost < best + doubt && s.cost + prior(s.effect) < bar + doubt)
+            .filter(|s| s.cost < best + doubt && s.cost + prior + self.price_of(s.effect.id) < bar + doubt)
             .collect();
         let sets: Vec<Set> = chosen.iter().map(|s| with(s.effect)).collect();
         let new: Vec<(Set, Fit)> = chosen

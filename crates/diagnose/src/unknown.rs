@@ -39,7 +39,7 @@ fn put_on(search: &mut Search, set: &Set, terms: &[&'static Descriptor]) -> Opti
     let promised: Vec<(f64, &'static Descriptor, Hypothesis)> =
         terms.par_iter().filter_map(|term| promise(search, parent, term)).collect();
     let (cost, term, hypothesis) = promised.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
-    if cost + search.per_effect() >= parent.cost() {
+    if cost + search.price_of(term.id) >= parent.cost() {
         return None;
     }
     let (columns, actions) = (parent.columns.clone(), parent.actions.clone());
