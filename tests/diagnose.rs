@@ -119,7 +119,7 @@ fn optional_columns_may_be_missing_and_others_may_drive() {
         // One response alone may show too little of it: no name is no error, another name is.
         let names = found(&report);
         let silent = columns.len() == 3 && names.is_empty();
-        let first = names.first().map(String::as_str);
+        let first = names.first().copied();
         assert!(silent || first == Some("rotational_flow"), "{name}: {}", report["summary"]);
         assert!(report["baseline"]["channels"].get(driving).is_none(), "{name}: {driving} drives");
     }
