@@ -4,6 +4,7 @@ use kort_thruster::rig::{AmplifierKind, Rig};
 
 use crate::config::ControllerConfig;
 use crate::estimators::{Adapted, Estimator, EstimatorInput};
+use crate::known::Known;
 use crate::laws::{Law, LawInput, LawKind, RotationalFlowOptions};
 use crate::limits::{Bumpless, Limit, LimitSet, RateLimiter};
 use crate::model::{ControlModel, ModelError, Swirl};
@@ -25,8 +26,11 @@ pub struct Output {
     pub speed_target_rad_s: f64,
 }
 
-/// A running controller. Plain data: a tick neither allocates nor blocks nor panics.
-#[derive(Clone, Copy, Debug)]
+/// Commands that are kept for a drive that answers late.
+const SENT: usize = 256;
+
+/// A running controller. A tick neither allocates nor blocks nor panics.
+#[derive(Debug)]
 pub struct Controller {
     config: ControllerConfig,
     /// As the rig states it.
@@ -43,11 +47,18 @@ pub struct Controller {
     /// Serves speed references whatever the law.
     speed_law: Law,
     adapted: Adapted,
+    /// Stands between the ideal plant of laws and observers and the one the rig is known to be.
+    known: Known,
+    stated_supply_v: Option<f64>,
     mode: Mode,
     thrust_rate: RateLimiter,
     current_rate: RateLimiter,
     bumpless: Bumpless,
+    /// Last current in the ideal motor's terms, A.
     current_a: f64,
+    /// Last currents asked of the drive, A: a ring, and the place of the newest.
+    sent_a: [f64; SENT],
+    newest: usize,
     drive_a: f64,
     last_speed_rad_s: f64,
     gated: u64,
@@ -82,16 +93,40 @@ impl Controller {
             law: Law::new(config.law, &nominal, &config.laws),
             speed_law: Law::new(servo.law, &nominal, &config.laws),
             adapted: Adapted::default(),
+            known: Known::new(rig, &nominal),
+            stated_supply_v: rig.amplifier.supply_v,
             mode: Mode::Off,
             thrust_rate: RateLimiter::default(),
             current_rate: RateLimiter::default(),
             bumpless: Bumpless::default(),
             current_a: 0.0,
+            sent_a: [0.0; SENT],
+            newest: 0,
             drive_a: 0.0,
             last_speed_rad_s: 0.0,
             gated: 0,
             limited: false,
         })
+    }
+
+    /// A controller for another revision of the rig that goes on where this one is: the command, what the observer
+    /// believes, and the reference's ramp; it learns its coefficients anew.
+    ///
+    /// # Errors
+    /// [`ModelError`] as of [`Controller::new`]; this one then stays as it is.
+    pub fn revised(&self, rig: &Rig, period_s: f64) -> Result<Self, ModelError> {
+        let mut next = Self::new(rig, &self.config, period_s)?;
+        if let Some(last) = &self.estimate {
+            next.observer = Observer::after(self.config.observer, &next.model, &self.config.observers, last);
+            next.estimate = Some(*last);
+        }
+        next.mode = self.mode;
+        (next.thrust_rate, next.current_rate) = (self.thrust_rate, self.current_rate);
+        (next.current_a, next.drive_a) = (self.current_a, self.drive_a);
+        (next.sent_a, next.newest) = (self.sent_a, self.newest);
+        (next.last_speed_rad_s, next.gated) = (self.last_speed_rad_s, 0);
+        next.bumpless.arm();
+        Ok(next)
     }
 
     /// The configuration in force.
@@ -147,7 +182,7 @@ impl Controller {
         let dt = if dt_s.is_finite() { dt_s.clamp(0.2 * period, 5.0 * period) } else { period };
         let m = &self.stated;
         let measured = measured.sane(3.0 * m.speed_max_rad_s, 3.0 * m.current_limit_a, 4.0 * m.thrust_max_n);
-        let current_a = self.drive_current(&measured, dt);
+        let (measured, supply_v, current_a) = self.ideal(&measured, dt);
         let estimate = self.observer.tick(&ObserverInput {
             model: &self.model,
             measured: &measured,
@@ -169,12 +204,13 @@ impl Controller {
         let (demand, thrust_n) = match reference {
             Reference::Off => {
                 self.current_a = 0.0;
+                self.send(0.0);
                 self.current_rate.reset(0.0);
                 self.limited = false;
                 self.last_speed_rad_s = speed;
                 return Output {
-                    command: self.command(0.0, 0.0, &estimate, &measured, &mut limits),
-                    estimate,
+                    command: DriveCommand::off(self.stated.amplifier),
+                    estimate: self.felt(estimate),
                     limits,
                     thrust_reference_n: None,
                     speed_target_rad_s: 0.0,
@@ -186,7 +222,7 @@ impl Controller {
                     model: &self.model,
                     measured: &measured,
                     estimate: &estimate,
-                    thrust_n: thrust,
+                    thrust_n: self.model.blade_thrust_n(thrust, estimate.flow_m_s.value),
                     dt_s: dt,
                 };
                 (self.law.tick(&input), Some(thrust))
@@ -212,7 +248,9 @@ impl Controller {
         let kt = self.model.torque_constant_nm_a;
         let asked = if demand.torque_n_m.is_finite() { demand.torque_n_m / kt } else { 0.0 };
         let blended = self.bumpless.step(asked, self.current_a, self.config.limits.fade_s, dt);
-        let applied = self.limit_current(blended, speed, &measured, dt, &mut limits);
+        let wanted = self.known.actual_a(&self.model, blended);
+        let actual = self.limit_current(wanted, speed, &measured, dt, &mut limits);
+        let applied = if actual == wanted { blended } else { self.known.ideal_a(&self.model, actual) };
         // The law follows what was applied of its own demand, the fading difference left out.
         let own = if applied == blended { asked } else { applied - (blended - asked) };
         match reference {
@@ -224,20 +262,55 @@ impl Controller {
             || limits.contains(Limit::Voltage)
             || limits.contains(Limit::AntiSpin);
         self.last_speed_rad_s = speed;
-        let command = self.command(applied, demand.speed_rad_s, &estimate, &measured, &mut limits);
+        self.send(actual);
+        let command = self.command(actual, demand.speed_rad_s, &measured, supply_v, &mut limits);
         Output {
             command,
-            estimate,
+            estimate: self.felt(estimate),
             limits,
             thrust_reference_n: thrust_n,
             speed_target_rad_s: demand.speed_rad_s,
         }
     }
 
-    /// Motor current over the last period: measured, or the last command behind the drive's lag.
+    /// The measurement as ideal sensors would show it, the supply that the drive was told, and the current, A, that
+    /// an ideal motor had over the last period.
+    fn ideal(&mut self, raw: &Measurement, dt: f64) -> (Measurement, Option<f64>, f64) {
+        let last = self.estimate;
+        let mut measured = self.known.measured(raw, last.as_ref(), &self.model);
+        let actual_a = self.drive_current(&measured, dt);
+        if self.known.advance(&measured, last.as_ref(), actual_a, dt) {
+            self.model.ambient_mean_m_s = self.known.ambient_m_s();
+        }
+        let current_a = self.known.ideal_a(&self.model, actual_a);
+        measured.current_a = measured.current_a.map(|_| current_a);
+        let flow = last.map_or(0.0, |l| l.flow_m_s.value);
+        measured.thrust_n = measured.thrust_n.map(|t| self.model.blade_thrust_n(t, flow));
+        let speed = last.map_or(0.0, |l| l.shaft_speed_rad_s.value);
+        if let Some(reach) = self.known.reach(raw.supply_v, actual_a, speed) {
+            measured.supply_v = Some(reach.supply_v).filter(|v| v.is_finite());
+        }
+        (measured, raw.supply_v, current_a)
+    }
+
+    /// The estimate as it is reported: thrust as stand or hull feel it.
+    fn felt(&self, mut estimate: Estimate) -> Estimate {
+        let thrust = &mut estimate.thrust_n;
+        thrust.value = self.model.net_thrust_n(thrust.value, estimate.flow_m_s.value);
+        estimate
+    }
+
+    fn send(&mut self, current_a: f64) {
+        self.newest = (self.newest + 1) % SENT;
+        self.sent_a[self.newest] = current_a;
+    }
+
+    /// Motor current over the last period: measured, or the command that has reached the drive behind its lag.
     fn drive_current(&mut self, measured: &Measurement, dt: f64) -> f64 {
         let lag = self.model.amplifier_lag_s;
-        self.drive_a += (self.current_a - self.drive_a) * dt / (lag + dt);
+        let ago = ((self.model.delay_s / self.stated.period_s).round() as usize).min(SENT - 1);
+        let reached = self.sent_a[(self.newest + SENT - ago) % SENT];
+        self.drive_a += (reached - self.drive_a) * dt / (lag + dt);
         if let Some(current) = measured.current_a {
             self.drive_a = current;
         }
@@ -336,32 +409,39 @@ impl Controller {
     }
 
     fn command(
-        &self,
+        &mut self,
         current_a: f64,
         target: f64,
-        estimate: &Estimate,
         measured: &Measurement,
+        supply_v: Option<f64>,
         limits: &mut LimitSet,
     ) -> DriveCommand {
         let model = &self.model;
         // The back-EMF is that of the speed itself, not of what its filter shows later.
-        let speed = estimate.shaft_speed_rad_s.value;
+        let speed = self.estimate.map_or(0.0, |e| e.shaft_speed_rad_s.value);
+        let drive_a = self.drive_a;
         match model.amplifier {
-            AmplifierKind::Current => DriveCommand { current_a, ..DriveCommand::default() },
+            AmplifierKind::Current => {
+                let command = self.known.command(current_a, supply_v, drive_a, speed);
+                DriveCommand { current_a: command, ..DriveCommand::default() }
+            }
             AmplifierKind::Voltage => {
                 let wanted = model.winding_resistance_ohm.unwrap_or(0.0) * current_a
                     + model.torque_constant_nm_a * speed;
                 let supply = measured.supply_v.or(model.supply_v).unwrap_or(f64::INFINITY);
-                let voltage =
-                    if current_a == 0.0 && target == 0.0 { 0.0 } else { wanted.clamp(-supply, supply) };
                 if wanted.abs() > supply {
                     limits.set(Limit::Voltage);
                 }
-                DriveCommand { current_a, voltage_v: Some(voltage), speed_rad_s: None }
+                let voltage =
+                    if current_a == 0.0 && target == 0.0 { 0.0 } else { wanted.clamp(-supply, supply) };
+                let told = supply_v.or(self.stated_supply_v).unwrap_or(f64::INFINITY);
+                let command = self.known.command(voltage, supply_v, drive_a, speed).clamp(-told, told);
+                DriveCommand { current_a, voltage_v: Some(command), speed_rad_s: None }
             }
             AmplifierKind::Speed => {
                 let cap = model.speed_max_rad_s;
-                DriveCommand { current_a, voltage_v: None, speed_rad_s: Some(target.clamp(-cap, cap)) }
+                let command = self.known.command(target.clamp(-cap, cap), supply_v, drive_a, speed);
+                DriveCommand { current_a, voltage_v: None, speed_rad_s: Some(command.clamp(-cap, cap)) }
             }
         }
     }

@@ -19,6 +19,7 @@ pub mod advice;
 pub mod config;
 pub mod controller;
 pub mod estimators;
+pub mod known;
 pub mod laws;
 pub mod limits;
 pub mod model;

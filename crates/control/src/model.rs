@@ -5,8 +5,11 @@
 //! options serves a 1 kW test stand and a 76 mm thruster alike.
 
 use kort_thruster::blade::{self, Blade, BladeLoad, BladeRow, Inflow};
-use kort_thruster::rig::{AmplifierKind, KnownEffect, Rig};
+use kort_thruster::effects::Scale;
+use kort_thruster::rig::{AmplifierKind, Rig};
 use thiserror::Error;
+
+use crate::known::{self, FoilCurve, FrictionCurve};
 
 /// Why a controller cannot be designed for a rig.
 #[derive(Debug, Error, Clone, PartialEq)]
@@ -66,22 +69,39 @@ pub struct StaticMap {
     pub torque_n_m_s2: f64,
     /// `vp / Om`, m.
     pub flow_m: f64,
+    /// The three turning astern as multiples of those ahead: 1 unless the rig is known to differ.
+    pub astern: [f64; 3],
 }
 
 impl StaticMap {
+    /// A multiple of one side: of thrust (0), torque (1) or flow (2), by the sign of thrust or speed.
+    fn side(&self, of: usize, sign: f64) -> f64 {
+        if sign < 0.0 { self.astern[of] } else { 1.0 }
+    }
+
+    /// Torque of the blades at a shaft speed in still water, N m.
+    pub fn torque_n_m(&self, speed_rad_s: f64) -> f64 {
+        self.torque_n_m_s2 * self.side(1, speed_rad_s) * speed_rad_s * speed_rad_s.abs()
+    }
+
+    /// Axial flow at a shaft speed in still water, m/s.
+    pub fn flow_m_s(&self, speed_rad_s: f64) -> f64 {
+        self.flow_m * self.side(2, speed_rad_s) * speed_rad_s
+    }
+
     /// Shaft speed that gives a thrust in still water, rad/s.
     pub fn speed_rad_s(&self, thrust_n: f64) -> f64 {
-        (thrust_n.abs() / self.thrust_n_s2).sqrt().copysign(thrust_n)
+        (thrust_n.abs() / (self.thrust_n_s2 * self.side(0, thrust_n))).sqrt().copysign(thrust_n)
     }
 
     /// Thrust that a shaft speed gives in still water, N.
     pub fn thrust_n(&self, speed_rad_s: f64) -> f64 {
-        self.thrust_n_s2 * speed_rad_s * speed_rad_s.abs()
+        self.thrust_n_s2 * self.side(0, speed_rad_s) * speed_rad_s * speed_rad_s.abs()
     }
 
     /// Torque a thrust costs in still water, N m: (20) of the paper, whatever the level.
     pub fn torque_for_thrust_n_m(&self, thrust_n: f64) -> f64 {
-        thrust_n * self.torque_n_m_s2 / self.thrust_n_s2
+        thrust_n * self.torque_n_m_s2 * self.side(1, thrust_n) / (self.thrust_n_s2 * self.side(0, thrust_n))
     }
 }
 
@@ -106,8 +126,22 @@ pub struct ControlModel {
     pub torque_constant_nm_a: f64,
     /// Viscous friction, N m s.
     pub viscous_friction_nm_s: f64,
-    /// Coulomb friction, N m; the rig does not state it, a configuration may.
+    /// Coulomb friction, N m, that a configuration adds to what the rig is known to have.
     pub coulomb_friction_n_m: f64,
+    /// Friction beyond the viscous that the rig is known to have.
+    pub known_friction: Option<FrictionCurve>,
+    /// What the rig is known to have at its blades beyond the sinusoids of (17).
+    pub foil: Option<FoilCurve>,
+    /// Flux coefficient of a flow astern as a multiple of that ahead.
+    pub flux_astern: f64,
+    /// Force on the stand beyond the blades' thrust, as a share of it: less than zero where a hull takes some.
+    pub stand_share: f64,
+    /// The same by the square of the axial flow, kg/m: the duct's own thrust.
+    pub stand_kg_m: f64,
+    /// Ambient flow that the rig is known to stand in, m/s.
+    pub ambient_mean_m_s: f64,
+    /// Dead time between command and drive, s.
+    pub delay_s: f64,
     /// Winding resistance, ohm.
     pub winding_resistance_ohm: Option<f64>,
     /// How the drive is commanded.
@@ -169,6 +203,13 @@ impl ControlModel {
             torque_constant_nm_a: rig.motor.torque_constant_nm_a.value,
             viscous_friction_nm_s: rig.motor.viscous_friction_nm_s.map_or(0.0, |q| q.value),
             coulomb_friction_n_m: 0.0,
+            known_friction: None,
+            foil: None,
+            flux_astern: 1.0,
+            stand_share: 0.0,
+            stand_kg_m: 0.0,
+            ambient_mean_m_s: 0.0,
+            delay_s: 0.0,
             winding_resistance_ohm: rig.motor.winding_resistance_ohm.map(|q| q.value),
             amplifier: rig.amplifier.kind,
             amplifier_lag_s: rig.amplifier.time_constant_s.value,
@@ -186,43 +227,38 @@ impl ControlModel {
             flow_rate_hz: s.flow_rate_hz,
             swirl: None,
             period_s,
-            map: StaticMap { thrust_n_s2: 1.0, torque_n_m_s2: 1.0, flow_m: 0.0 },
+            map: StaticMap { thrust_n_s2: 1.0, torque_n_m_s2: 1.0, flow_m: 0.0, astern: [1.0; 3] },
             speed_max_rad_s: 0.0,
             thrust_max_n: 0.0,
             step_max_s: 1e-3,
         };
-        rig.effects.iter().for_each(|known| model.take_in(known));
         model.refresh();
+        model.set_envelope();
+        known::design(&mut model, rig);
         model.set_envelope();
         Ok(model)
     }
 
-    /// Takes in physics that the rig is known to have, as far as laws and observers are designed from it.
-    fn take_in(&mut self, known: &KnownEffect) {
-        match known.effect {
-            "coulomb_friction" => self.coulomb_friction_n_m += known.value("coulomb_torque_n_m"),
-            "direction_dependent_friction" => {
-                let both = |a, b| 0.5 * (known.value(a) + known.value(b));
-                self.coulomb_friction_n_m += both("dry_ahead_n_m", "dry_astern_n_m");
-                self.viscous_friction_nm_s += both("viscous_ahead_nm_s", "viscous_astern_nm_s");
-            }
-            "viscous_friction" => self.viscous_friction_nm_s += known.value("viscous_friction_nm_s"),
-            "entrained_water_inertia" => self.inertia_kg_m2 += known.value("entrained_inertia_kg_m2"),
-            "rotor_inertia_error" => self.inertia_kg_m2 *= 1.0 + known.value("inertia_error"),
-            "inertia_added_mass_error" => self.added_mass_kg *= 1.0 + known.value("added_mass_error"),
-            "amplifier_lag" => self.amplifier_lag_s += known.value("extra_lag_s").max(0.0),
-            "water_density" => {
-                let factor = 1.0 + known.value("density_error");
-                self.blade.density_kg_m3 *= factor;
-                self.added_mass_kg *= factor;
-                self.duct_water_kg *= factor;
-            }
-            "rotational_flow" if known.value("swirl_yield") > 0.0 => {
-                let drag = 1.0 / known.value("swirl_yield");
-                self.swirl = Some(Swirl { drag, inertia: drag * known.value("swirl_lag_ratio") });
-            }
-            // The rest acts where no law looks: in the drive's limits, the sensors, off the design point.
-            _ => {}
+    /// The rig's sizes in use, from which effects take theirs.
+    pub fn scale(&self, rig: &Rig, duration_s: f64) -> Scale {
+        Scale {
+            shaft_speed_rad_s: self.speed_max_rad_s,
+            torque_n_m: self.torque_constant_nm_a * self.current_limit_a,
+            thrust_n: self.thrust_max_n,
+            flow_m_s: self.map.flow_m * self.speed_max_rad_s,
+            current_a: self.current_limit_a,
+            command: match self.amplifier {
+                AmplifierKind::Current => self.current_limit_a,
+                AmplifierKind::Voltage => {
+                    self.supply_v.unwrap_or(self.torque_constant_nm_a * self.speed_max_rad_s)
+                }
+                AmplifierKind::Speed => self.speed_max_rad_s,
+            },
+            supply_v: self.supply_v.unwrap_or(0.0),
+            winding_resistance_ohm: rig.motor.winding_resistance_ohm.map_or(0.0, |r| r.value),
+            inertia_kg_m2: self.inertia_kg_m2,
+            tick_s: self.period_s,
+            duration_s,
         }
     }
 
@@ -282,15 +318,32 @@ impl ControlModel {
         self.step_max_s = (0.4 / (fast * self.speed_max_rad_s)).min(2.5e-3);
     }
 
-    /// Steady state in still water. Everything is quadratic in speed, so one ratio `vp / ut` (and
-    /// one of swirl) holds at every level; found by bisection between no flow and the pitch angle.
+    /// Steady state in still water, ahead and astern.
     fn solve_static_map(&self) -> StaticMap {
+        let ahead = self.solve_side(1.0);
+        if self.foil.is_none() && self.flux_astern == 1.0 {
+            return ahead;
+        }
+        let astern = self.solve_side(-1.0);
+        StaticMap {
+            astern: [
+                astern.thrust_n_s2 / ahead.thrust_n_s2,
+                astern.torque_n_m_s2 / ahead.torque_n_m_s2,
+                astern.flow_m / ahead.flow_m,
+            ],
+            ..ahead
+        }
+    }
+
+    /// One side of it. Everything is quadratic in speed, so one ratio `vp / ut` (and
+    /// one of swirl) holds at every level; found by bisection between no flow and the pitch angle.
+    fn solve_side(&self, side: f64) -> StaticMap {
         let lever = self.blade.lever_m();
-        let flux = self.flux_coefficient * self.blade.density_kg_m3 * self.blade.area_m2();
+        let flux = self.flux_kg_m(side);
         let surplus = |ratio: f64| {
-            let swirl = self.steady_swirl(1.0, ratio);
-            let load = self.row.load(1.0 - swirl, ratio);
-            (load.thrust_n - flux * ratio * ratio, load)
+            let swirl = self.steady_swirl(side, side * ratio);
+            let load = self.row_load(side - swirl, side * ratio);
+            (side * load.thrust_n - flux * ratio * ratio, load)
         };
         let (mut low, mut high) = (0.0, self.blade.pitch_rad.tan());
         for _ in 0..60 {
@@ -300,10 +353,27 @@ impl ControlModel {
         let ratio = 0.5 * (low + high);
         let load = surplus(ratio).1;
         StaticMap {
-            thrust_n_s2: (load.thrust_n * lever * lever).max(1e-12),
-            torque_n_m_s2: (load.torque_n_m * lever * lever).max(1e-15),
+            thrust_n_s2: (side * load.thrust_n * lever * lever).max(1e-12),
+            torque_n_m_s2: (side * load.torque_n_m * lever * lever).max(1e-15),
             flow_m: ratio * lever,
+            astern: [1.0; 3],
         }
+    }
+
+    /// Outflow of momentum `dbeta rho a` for the sign of a flow, kg/m.
+    pub fn flux_kg_m(&self, flow_m_s: f64) -> f64 {
+        let side = if flow_m_s < 0.0 { self.flux_astern } else { 1.0 };
+        side * self.flux_coefficient * self.blade.density_kg_m3 * self.blade.area_m2()
+    }
+
+    /// Thrust of the blades that makes the stand feel a thrust in an axial flow, N.
+    pub fn blade_thrust_n(&self, net_n: f64, flow_m_s: f64) -> f64 {
+        (net_n - self.stand_kg_m * flow_m_s * flow_m_s.abs()) / (1.0 + self.stand_share)
+    }
+
+    /// What the stand feels of the blades' thrust in an axial flow, N.
+    pub fn net_thrust_n(&self, blade_n: f64, flow_m_s: f64) -> f64 {
+        blade_n * (1.0 + self.stand_share) + self.stand_kg_m * flow_m_s * flow_m_s.abs()
     }
 
     /// Swirl speed that the blades' torque keeps up, m/s: `Q(ut - us, vp)/re = dbr rho a |vp| us`.
@@ -313,7 +383,7 @@ impl ControlModel {
         let (mut low, mut high) = (tangential_m_s.min(0.0), tangential_m_s.max(0.0));
         for _ in 0..30 {
             let us = 0.5 * (low + high);
-            let q = self.row.load(tangential_m_s - us, axial_m_s).torque_n_m;
+            let q = self.row_load(tangential_m_s - us, axial_m_s).torque_n_m;
             if law.acceleration(q, axial_m_s, us, 0.0) > 0.0 { low = us } else { high = us }
         }
         0.5 * (low + high)
@@ -322,11 +392,20 @@ impl ControlModel {
     /// Friction torque at a shaft speed, N m; the sign is smoothed over half a percent of top speed.
     pub fn friction_n_m(&self, speed_rad_s: f64) -> f64 {
         let viscous = self.viscous_friction_nm_s * speed_rad_s;
-        if self.coulomb_friction_n_m == 0.0 {
+        if self.coulomb_friction_n_m == 0.0 && self.known_friction.is_none() {
             return viscous;
         }
-        let knee = 0.005 * self.speed_max_rad_s;
-        viscous + self.coulomb_friction_n_m * speed_rad_s / (speed_rad_s.abs() + knee)
+        viscous + self.coulomb_friction_n_m * self.turning(speed_rad_s) + self.known_friction_n_m(speed_rad_s)
+    }
+
+    /// Friction beyond the viscous that the rig is known to have, N m.
+    pub fn known_friction_n_m(&self, speed_rad_s: f64) -> f64 {
+        self.known_friction.map_or(0.0, |curve| curve.at_n_m(speed_rad_s, self.turning(speed_rad_s)))
+    }
+
+    /// The sign of a shaft speed, smoothed over half a percent of top speed.
+    pub fn turning(&self, speed_rad_s: f64) -> f64 {
+        speed_rad_s / (speed_rad_s.abs() + 0.005 * self.speed_max_rad_s)
     }
 
     /// Which way the shaft turns, -1 to 1: smoothed over a hundredth of top speed.
@@ -341,7 +420,34 @@ impl ControlModel {
 
     /// Thrust and torque at a shaft speed, flow and swirl.
     pub fn load(&self, speed_rad_s: f64, flow_m_s: f64, swirl_m_s: f64) -> BladeLoad {
-        self.row.load(self.row.lever_m * speed_rad_s - swirl_m_s, flow_m_s)
+        self.row_load(self.row.lever_m * speed_rad_s - swirl_m_s, flow_m_s)
+    }
+
+    #[inline]
+    fn row_load(&self, tangential_m_s: f64, axial_m_s: f64) -> BladeLoad {
+        match &self.foil {
+            None => self.row.load(tangential_m_s, axial_m_s),
+            Some(curve) => curve.load(&self.row, Inflow { tangential_m_s, axial_m_s }),
+        }
+    }
+
+    /// Slopes of blades with a curve of their own, by differences.
+    #[cold]
+    fn differences(&self, ut: f64, vp: f64) -> Slopes {
+        let h = 1e-4 * ut.hypot(vp);
+        let load = |ut, vp| self.row_load(ut, vp);
+        let (now, by_ut, by_vp) =
+            (load(ut, vp), [load(ut - h, vp), load(ut + h, vp)], [load(ut, vp - h), load(ut, vp + h)]);
+        let thrust = |of: [BladeLoad; 2]| 0.5 * (of[1].thrust_n - of[0].thrust_n) / h;
+        let torque = |of: [BladeLoad; 2]| 0.5 * (of[1].torque_n_m - of[0].torque_n_m) / h;
+        Slopes {
+            thrust_n: now.thrust_n,
+            torque_n_m: now.torque_n_m,
+            thrust_by_tangential: thrust(by_ut),
+            thrust_by_axial: thrust(by_vp),
+            torque_by_tangential: torque(by_ut),
+            torque_by_axial: torque(by_vp),
+        }
     }
 
     /// Thrust and torque with their slopes, from differentiating the singularity-free form.
@@ -350,6 +456,9 @@ impl ControlModel {
         let v2 = ut * ut + vp * vp;
         if v2 < 1e-18 {
             return Slopes::default();
+        }
+        if self.foil.is_some() {
+            return self.differences(ut, vp);
         }
         // One division: every slope of every tick passes here.
         let by_v = 1.0 / v2.sqrt();
@@ -378,7 +487,7 @@ impl ControlModel {
 
     /// Acceleration of the axial flow, m/s^2: (6a) with thrust and ambient flow.
     pub fn flow_acceleration(&self, thrust_n: f64, flow_m_s: f64, ambient_m_s: f64) -> f64 {
-        let flux = self.flux_coefficient * self.blade.density_kg_m3 * self.blade.area_m2();
+        let flux = self.flux_kg_m(flow_m_s);
         (thrust_n - flux * (flow_m_s - ambient_m_s) * flow_m_s.abs()) / self.added_mass_kg
     }
 
@@ -465,9 +574,9 @@ impl ControlModel {
     }
 
     /// Lags between a torque command and a measured speed besides the shaft itself, s: drive,
-    /// speed filter, and one and a half periods of hold and differencing.
+    /// speed filter, and one and a half periods of hold and differencing with the drive's dead time.
     pub fn loop_lags_s(&self) -> [f64; 3] {
-        [self.amplifier_lag_s, self.speed_filter_s, 1.5 * self.period_s]
+        [self.amplifier_lag_s, self.speed_filter_s, 1.5 * self.period_s + self.delay_s]
     }
 
     /// Crossover that a speed loop may have for a phase margin, rad/s, and the gain that gives it,
@@ -583,7 +692,7 @@ flow_rate_hz = 20
         };
         let friction = "[[effects]]\neffect = \"coulomb_friction\"\ncoulomb_torque_n_m = 0.3\n";
         let model = known(friction);
-        assert_eq!(model.friction_n_m(60.0), 0.3 * 60.0 / (60.0 + 0.005 * model.speed_max_rad_s));
+        assert!((model.friction_n_m(60.0) - 0.3 * model.turning(60.0)).abs() < 1e-9);
         let swirl = "[[effects]]\neffect = \"rotational_flow\"\nswirl_yield = 0.5\nswirl_lag_ratio = 0.25\n";
         assert_eq!(known(swirl).swirl, Some(Swirl { drag: 2.0, inertia: 0.5 }));
         assert!(known(swirl).map.thrust_n_s2 < stand().map.thrust_n_s2);

@@ -1,5 +1,7 @@
 //! What goes into a controller and what comes out of it.
 
+use kort_thruster::rig::AmplifierKind;
+
 /// One set of measurements. `None` means "not measured now": not fitted, not sampled at this
 /// tick, or declared invalid by the sensor checks upstream. A held value may be repeated.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -16,6 +18,8 @@ pub struct Measurement {
     pub ambient_m_s: Option<f64>,
     /// Supply voltage, V.
     pub supply_v: Option<f64>,
+    /// Shaft angle, rad; only effects that follow it ask for it.
+    pub shaft_angle_rad: Option<f64>,
 }
 
 impl Measurement {
@@ -31,6 +35,7 @@ impl Measurement {
             flow_m_s: keep(self.flow_m_s, 30.0),
             ambient_m_s: keep(self.ambient_m_s, 15.0),
             supply_v: keep(self.supply_v, 1e5).filter(|v| *v > 0.0),
+            shaft_angle_rad: self.shaft_angle_rad.filter(|x| x.is_finite()),
         }
     }
 }
@@ -59,6 +64,18 @@ pub struct DriveCommand {
     pub speed_rad_s: Option<f64>,
 }
 
+impl DriveCommand {
+    /// No torque.
+    pub fn off(kind: AmplifierKind) -> Self {
+        let zero = |of| (kind == of).then_some(0.0);
+        Self {
+            current_a: 0.0,
+            voltage_v: zero(AmplifierKind::Voltage),
+            speed_rad_s: zero(AmplifierKind::Speed),
+        }
+    }
+}
+
 /// An estimated value and its standard error, in the value's unit. An infinite standard error
 /// means that the observer has no measure of its own doubt, or that the value is not observable.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -84,12 +101,14 @@ pub struct Estimate {
     pub flow_m_s: Estimated,
     /// Ambient axial flow, m/s.
     pub ambient_m_s: Estimated,
-    /// Thrust, N.
+    /// Thrust, N: what the stand or hull feels.
     pub thrust_n: Estimated,
     /// Load torque on the shaft that the model does not explain, N m; positive opposes ahead.
     pub load_torque_n_m: Estimated,
     /// Swirl speed of the water at 0.7 radius, m/s.
     pub swirl_m_s: Estimated,
+    /// Torque of the blades by the model, N m; positive opposes ahead.
+    pub blade_torque_n_m: f64,
     /// Measurements rejected by the innovation gate since start.
     pub gated: u64,
 }

@@ -20,13 +20,16 @@ fn number() -> impl Strategy<Value = f64> {
 
 fn measurement() -> impl Strategy<Value = Measurement> {
     let maybe = || proptest::option::weighted(0.8, number());
-    (maybe(), maybe(), maybe(), maybe(), maybe(), maybe()).prop_map(|(a, b, c, d, e, f)| Measurement {
-        shaft_speed_rad_s: a,
-        current_a: b,
-        thrust_n: c,
-        flow_m_s: d,
-        ambient_m_s: e,
-        supply_v: f,
+    (maybe(), maybe(), maybe(), maybe(), maybe(), maybe(), maybe()).prop_map(|(a, b, c, d, e, f, g)| {
+        Measurement {
+            shaft_speed_rad_s: a,
+            current_a: b,
+            thrust_n: c,
+            flow_m_s: d,
+            ambient_m_s: e,
+            supply_v: f,
+            shaft_angle_rad: g,
+        }
     })
 }
 

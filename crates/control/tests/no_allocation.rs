@@ -9,6 +9,7 @@ use common::rigs;
 use kort_control::{
     Controller, ControllerConfig, EstimatorKind, LawKind, Measurement, ObserverKind, Reference,
 };
+use kort_thruster::rig::Rig;
 
 struct Counting;
 
@@ -37,14 +38,45 @@ fn the_counter_counts() {
     assert!(COUNT.with(Cell::get) > before);
 }
 
+/// One effect for each way of using one: friction, angle, slow state, command, delay, supply, sensors, blades.
+const EFFECTS: &str = r#"
+[[effects]]
+effect = "coulomb_friction"
+coulomb_torque_n_m = 0.3
+[[effects]]
+effect = "position_dependent_friction"
+mean_friction_n_m = 0.1
+[[effects]]
+effect = "command_dead_band"
+half_width = 0.2
+[[effects]]
+effect = "transport_delay"
+delay_s = 0.02
+[[effects]]
+effect = "thrust_sensor_lag"
+thrust_lag_s = 0.02
+[[effects]]
+effect = "thrust_bias_gain_hysteresis"
+gain_error = 0.05
+[[effects]]
+effect = "forward_reverse_asymmetry"
+reverse_lift_error = -0.1
+"#;
+
 #[test]
 fn no_tick_allocates() {
-    let rig = rigs().swap_remove(0);
+    let plain = rigs().swap_remove(0);
+    for rig in [Rig::from_toml(&format!("{}{EFFECTS}", common::STAND)).unwrap(), plain] {
+        no_tick_allocates_on(&rig);
+    }
+}
+
+fn no_tick_allocates_on(rig: &Rig) {
     for law in LawKind::ALL {
         for observer in ObserverKind::ALL {
             for estimator in EstimatorKind::ALL {
                 let config = ControllerConfig { law, observer, estimator, ..Default::default() };
-                let mut c = Controller::new(&rig, &config, 0.001).unwrap();
+                let mut c = Controller::new(rig, &config, 0.001).unwrap();
                 let other = ControllerConfig { law: LawKind::StaticMap, ..config };
                 let before = COUNT.with(Cell::get);
                 for k in 0..300 {
@@ -56,6 +88,7 @@ fn no_tick_allocates() {
                         flow_m_s: Some(0.02 * x),
                         ambient_m_s: None,
                         supply_v: Some(120.0),
+                        shaft_angle_rad: Some(x),
                     };
                     let reference = match k % 100 {
                         0..40 => Reference::Thrust(50.0),

@@ -130,7 +130,7 @@ impl Told {
         Sample {
             time_s: moment.time_s,
             reference_n: moment.reference_n,
-            thrust_n: truth.thrust_n,
+            thrust_n: self.plant.net_thrust_n(),
             shaft_speed_rad_s: truth.shaft_speed_rad_s,
             current_a: truth.current_a,
             flow_m_s: truth.axial_m_s,

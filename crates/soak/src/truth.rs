@@ -71,19 +71,7 @@ const EFFECT_STATES: usize = 8;
 /// # Errors
 /// Words that name the effect, its parameter, the value and what is allowed.
 pub fn effects(scenario: &Scenario, rig: &Rig, model: &ControlModel) -> Result<Vec<Hooked>, String> {
-    let scale = Scale {
-        shaft_speed_rad_s: model.speed_max_rad_s,
-        torque_n_m: model.torque_constant_nm_a * model.current_limit_a,
-        thrust_n: model.thrust_max_n,
-        flow_m_s: model.map.flow_m * model.speed_max_rad_s,
-        current_a: model.current_limit_a,
-        command: model.current_limit_a,
-        supply_v: model.supply_v.unwrap_or(0.0),
-        winding_resistance_ohm: rig.motor.winding_resistance_ohm.map_or(0.0, |r| r.value),
-        inertia_kg_m2: model.inertia_kg_m2,
-        tick_s: model.period_s,
-        duration_s: scenario.duration_s,
-    };
+    let scale = model.scale(rig, scenario.duration_s);
     let parameters = Parameters::stated(rig);
     let context = Context { parameters: &parameters, rig, tick_s: model.period_s };
     let mut states = 0;

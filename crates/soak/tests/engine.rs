@@ -33,6 +33,7 @@ impl Chain for Direct {
                 flow_m_s: known(measured.flow_m_s),
                 ambient_m_s: known(measured.ambient_m_s),
                 supply_v: known(measured.supply_v),
+                shaft_angle_rad: known(measured.shaft_angle_rad),
             };
             self.output = self.controller.tick(&measured, Reference::Thrust(thrust_n), self.period_s);
             let told = self.output.command;

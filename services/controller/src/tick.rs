@@ -32,7 +32,7 @@ const SERVO_PERIODS: u64 = 10;
 const READING_LIFE_NS: u64 = 250_000_000;
 
 /// State of the controller between setpoint and law. Starts at zero.
-#[derive(Clone, Copy, Debug)]
+#[derive(Debug)]
 pub struct Tick {
     controller: Controller,
     config: ControllerConfig,
@@ -500,6 +500,7 @@ impl Tick {
             flow_m_s: there(m.flow_m_s),
             ambient_m_s: there(m.ambient_m_s),
             supply_v: there(m.supply_v),
+            shaft_angle_rad: there(m.shaft_angle_rad),
         }
     }
 

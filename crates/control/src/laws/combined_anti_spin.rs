@@ -108,7 +108,7 @@ impl CombinedAntiSpin {
     /// Detection with hysteresis and the cap's release.
     fn watch(&mut self, model: &ControlModel, speed: f64, target: f64, share: f64, dt_s: f64) {
         let options = &self.options;
-        let expected = model.map.torque_n_m_s2 * speed * speed.abs();
+        let expected = model.map.torque_n_m(speed);
         let loss = if share > 0.15 { self.load.torque_n_m / expected } else { 1.0 };
         self.lost_s = if loss < options.loss_threshold && speed.abs() > target.abs() {
             self.lost_s + dt_s

@@ -53,7 +53,7 @@ impl Model2Inversion {
             self.matched.reset(speed);
             input.thrust_n
         });
-        let arrives_s = 1.0 / self.lead.pace().shaft_per_s;
+        let arrives_s = 1.0 / self.lead.pace().shaft_per_s + model.delay_s;
         let target = self.aim.at(model, estimate, input.thrust_n, arrives_s);
         let mut limits = LimitSet::default();
         if target.capped {

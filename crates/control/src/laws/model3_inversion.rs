@@ -33,7 +33,7 @@ impl Model3Inversion {
     /// Torque of the servo on the inverted speed.
     pub fn tick(&mut self, input: &LawInput) -> Demand {
         let model = input.model;
-        let arrives_s = 1.0 / self.servo.crossover_rad_s;
+        let arrives_s = 1.0 / self.servo.crossover_rad_s + model.delay_s;
         let target = self.aim.at(model, input.estimate, input.thrust_n, arrives_s);
         let mut limits = LimitSet::default();
         if target.capped {

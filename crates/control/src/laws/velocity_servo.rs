@@ -37,8 +37,7 @@ impl VelocityServo {
     /// Torque for a speed asked for directly, rad/s.
     pub fn tick_speed(&mut self, target_rad_s: f64, input: &LawInput) -> Demand {
         let map = &input.model.map;
-        let feedforward =
-            map.torque_n_m_s2 * target_rad_s * target_rad_s.abs() + input.model.friction_n_m(target_rad_s);
+        let feedforward = map.torque_n_m(target_rad_s) + input.model.friction_n_m(target_rad_s);
         let torque = self.servo.tick(feedforward, target_rad_s, input.speed_rad_s(), input.dt_s);
         Demand { torque_n_m: torque, speed_rad_s: target_rad_s, limits: LimitSet::default() }
     }

@@ -98,7 +98,8 @@ impl Noise {
             water.speed_rad_s,
             water.flow_m_s,
             water.swirl_m_s,
-            water.ambient_m_s * (1.0 - (dt / self.ambient_time_s).min(1.0)),
+            model.ambient_mean_m_s
+                + (water.ambient_m_s - model.ambient_mean_m_s) * (1.0 - (dt / self.ambient_time_s).min(1.0)),
             water.load_n_m * (1.0 - (dt / self.load_time_s).min(1.0)),
             keep * x[FILTERED] + (1.0 - keep) * mean_speed,
             water.blade_load_n_m * (1.0 - (dt / self.blade_time_s).min(1.0)),
@@ -193,7 +194,8 @@ impl Belief {
             self.started = true;
             self.x[SWIRL] = 0.0;
             (self.x[SPEED], self.x[FILTERED]) = (speed, speed);
-            self.x[FLOW] = input.model.map.flow_m * speed;
+            self.x[FLOW] = input.model.map.flow_m_s(speed);
+            self.x[AMBIENT] = input.model.ambient_mean_m_s;
         }
     }
 
@@ -320,6 +322,7 @@ impl Belief {
             thrust_n: Estimated { value: s.thrust_n, std_error: thrust_var.sqrt() },
             load_torque_n_m: self.load(model),
             swirl_m_s: of(SWIRL),
+            blade_torque_n_m: s.torque_n_m,
             gated: self.gated,
         }
     }

@@ -54,7 +54,8 @@ impl Luenberger {
         {
             self.started = true;
             (self.water.speed_rad_s, self.filtered_rad_s) = (speed, speed);
-            self.water.flow_m_s = model.map.flow_m * speed;
+            self.water.flow_m_s = model.map.flow_m_s(speed);
+            self.water.ambient_m_s = model.ambient_mean_m_s;
         }
         let before = self.water.speed_rad_s;
         self.water = self.water.step(model, model.torque_constant_nm_a * input.current_a, dt);
@@ -106,7 +107,8 @@ impl Luenberger {
             Some(ambient) => self.water.ambient_m_s = ambient,
             None => {
                 let forget = dt / self.options.ambient_time_s.max(dt);
-                self.water.ambient_m_s += 0.5 * pull * dt - self.water.ambient_m_s * forget;
+                self.water.ambient_m_s +=
+                    0.5 * pull * dt - (self.water.ambient_m_s - model.ambient_mean_m_s) * forget;
             }
         }
     }

@@ -281,13 +281,15 @@ impl Water {
     /// An estimate without a measure of its doubt.
     fn estimate(&self, model: &ControlModel) -> Estimate {
         let unsure = |value| Estimated { value, std_error: f64::INFINITY };
+        let load = model.load(self.speed_rad_s, self.flow_m_s, self.swirl_m_s);
         Estimate {
             shaft_speed_rad_s: unsure(self.speed_rad_s),
             flow_m_s: unsure(self.flow_m_s),
             ambient_m_s: unsure(self.ambient_m_s),
-            thrust_n: unsure(model.load(self.speed_rad_s, self.flow_m_s, self.swirl_m_s).thrust_n),
+            thrust_n: unsure(load.thrust_n),
             load_torque_n_m: unsure(self.unexplained_n_m(model)),
             swirl_m_s: unsure(self.swirl_m_s),
+            blade_torque_n_m: load.torque_n_m,
             gated: 0,
         }
     }

@@ -31,7 +31,8 @@ impl OpenLoop {
             None => self.water.step(model, model.torque_constant_nm_a * input.current_a, input.dt_s),
         };
         // Within the box that a step leaves the rest in.
-        self.water.ambient_m_s = input.measured.ambient_m_s.unwrap_or(0.0).clamp(-4.0, 4.0);
+        self.water.ambient_m_s =
+            input.measured.ambient_m_s.unwrap_or(model.ambient_mean_m_s).clamp(-4.0, 4.0);
         self.water.estimate(model)
     }
 }

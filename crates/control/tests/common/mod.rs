@@ -127,6 +127,7 @@ impl Loop {
             flow_m_s: self.flow_meter.then_some(s.flow_m_s),
             ambient_m_s: None,
             supply_v: s.supply_v.is_finite().then_some(s.supply_v),
+            shaft_angle_rad: Some(s.shaft_angle_rad),
         }
     }
 

@@ -37,6 +37,11 @@ impl<T: Real> Plant<T> {
         if self.sense_hooks.is_empty() { self.unhooked_sensed() } else { self.sensed }
     }
 
+    /// Thrust as the stand or hull feels it now, N: the blades', and what acts beside them.
+    pub fn net_thrust_n(&self) -> T {
+        self.filters.last_thrust_n
+    }
+
     /// The measuring chain, once a tick.
     pub(super) fn observe(&mut self, tick: &Tick, balance: &Balance<T>, filter: bool) {
         let dt = self.tick_s;

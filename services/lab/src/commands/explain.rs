@@ -8,6 +8,7 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use kort_control::About;
+use kort_control::known::uses::{self, Use};
 use kort_thruster::effects::{self, ALL, Descriptor, Scale};
 use serde::Serialize;
 
@@ -130,6 +131,10 @@ struct Entry {
     separated_by: &'static str,
     reference: &'static str,
     parameters: Vec<Parameter>,
+    /// What laws and observers do with it where a rig states it: a sentence each.
+    used_for: Vec<&'static str>,
+    /// Why none of them can use it, if so.
+    not_used: Option<&'static str>,
 }
 
 #[derive(Serialize)]
@@ -141,9 +146,12 @@ struct Parameter {
 }
 
 impl Entry {
-    fn of(effect: &Descriptor) -> Self {
+    fn of(effect: &'static Descriptor) -> Self {
         let role = |shape| if shape { "shape" } else { "strength" };
+        let usage = uses::of_effect(effect);
         Self {
+            used_for: usage.uses.into_iter().map(Use::words).collect(),
+            not_used: usage.left,
             effect: effect.id,
             path: effect.path.name(),
             what: effect.what,
@@ -169,7 +177,7 @@ impl Entry {
     }
 
     /// Headings and texts, in the order of reading.
-    fn sections(&self) -> [(&'static str, String); 7] {
+    fn sections(&self) -> [(&'static str, String); 8] {
         [
             ("What it is", self.what.into()),
             ("Equation", self.equation.into()),
@@ -177,9 +185,25 @@ impl Entry {
             ("Confused with", self.confused_with.join(", ")),
             ("Separated by", self.separated_by.into()),
             ("Parameters", self.parameter_list()),
+            ("Known in a rig, used for", self.usage()),
             ("Reference", self.reference.into()),
         ]
     }
+
+    /// What laws and observers do with it.
+    fn usage(&self) -> String {
+        match self.not_used {
+            Some(why) => format!("Nothing: {why}."),
+            None => self.used_for.iter().map(|words| sentence(words)).collect::<Vec<_>>().join(" "),
+        }
+    }
+}
+
+/// Words with a capital and a full stop.
+fn sentence(words: &str) -> String {
+    let mut letters = words.chars();
+    let first = letters.next().map(|c| c.to_uppercase().collect::<String>()).unwrap_or_default();
+    format!("{first}{}.", letters.as_str())
 }
 
 fn table(effects: &[&Descriptor]) -> String {
@@ -205,7 +229,7 @@ fn in_full(entry: &Entry) -> String {
     text
 }
 
-fn markdown(effects: &[&Descriptor]) -> String {
+fn markdown(effects: &[&'static Descriptor]) -> String {
     let mut text = format!(
         "# Physics a model may leave out\n\n\
          Written by `kort explain --markdown` from `crates/thruster/src/effects/`; do not edit here.\n\

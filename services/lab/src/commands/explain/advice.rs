@@ -3,6 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
+use kort_control::known::uses::{self, Usage};
 use kort_control::{Advice, TimeScales, advise};
 use serde_json::{Value, json};
 
@@ -21,12 +22,21 @@ pub fn run(wanted: &Path, json: bool) -> Result<Outcome, Failure> {
     let rig = files::read_rig(wanted)?;
     let period_s = rig.sensors.control_rate_hz.map_or(PERIOD_S, |rate| 1.0 / rate);
     let advice = advise(&rig, period_s).map_err(|e| Failure::in_file(wanted, e))?;
+    let known = uses::of_rig(&rig, period_s).map_err(|e| Failure::in_file(wanted, e))?;
     if json {
-        print_json(&document(&rig.name, period_s, &advice))?;
+        print_json(&document(&rig.name, period_s, &advice, &known))?;
     } else {
-        print(&text(&rig.name, period_s, &advice));
+        print(&text(&rig.name, period_s, &advice, &known));
     }
     Ok(Outcome::Done)
+}
+
+/// What a known effect of the rig is used for, in words.
+fn words(usage: &Usage) -> String {
+    match usage.left {
+        Some(why) => format!("NOT USED: {why}"),
+        None => usage.uses.iter().map(|u| u.words()).collect::<Vec<_>>().join("; "),
+    }
 }
 
 /// The time scales in words, with their values in s.
@@ -41,7 +51,7 @@ fn scales(s: &TimeScales) -> [(&'static str, &'static str, f64); 6] {
     ]
 }
 
-fn text(rig: &str, period_s: f64, advice: &Advice) -> String {
+fn text(rig: &str, period_s: f64, advice: &Advice, known: &[Usage]) -> String {
     let config = &advice.config;
     let mut out = format!("{rig}: controller by default, at a control period of {} ms\n\n", 1e3 * period_s);
     for (_, words, value) in scales(&advice.scales) {
@@ -54,10 +64,15 @@ fn text(rig: &str, period_s: f64, advice: &Advice) -> String {
         out += &textwrap::fill(&line, textwrap::Options::new(WIDTH).subsequent_indent("  "));
         out.push('\n');
     }
+    for usage in known {
+        let line = format!("known {}: {}.", usage.effect, words(usage));
+        out += &textwrap::fill(&line, textwrap::Options::new(WIDTH).subsequent_indent("  "));
+        out.push('\n');
+    }
     out + "\nThe rule: docs/control.md, \"The default\". Held against the plain servo: kort soak soak-towed --rig RIG \\\n  --controllers velocity_servo,default,drive_limits\n"
 }
 
-fn document(rig: &str, period_s: f64, advice: &Advice) -> Value {
+fn document(rig: &str, period_s: f64, advice: &Advice, known: &[Usage]) -> Value {
     let scales: serde_json::Map<String, Value> =
         scales(&advice.scales).iter().map(|(name, _, value)| ((*name).into(), json!(value))).collect();
     let [law, observer, estimator] = &advice.reasons;
@@ -68,5 +83,9 @@ fn document(rig: &str, period_s: f64, advice: &Advice) -> Value {
         "controller": advice.config,
         "time_scales": scales,
         "reasons": { "law": law, "observer": observer, "estimator": estimator },
+        "known_effects": known
+            .iter()
+            .map(|u| json!({ "effect": u.effect, "used": u.left.is_none(), "how": words(u) }))
+            .collect::<Vec<_>>(),
     })
 }

@@ -1,0 +1,152 @@
+//! What a rig is known to have makes thrust better under laws that are told of it, on thrusters of several kinds.
+
+mod common;
+
+use common::{Loop, rigs};
+use kort_control::{Controller, ControllerConfig, LawKind, Reference};
+use kort_thruster::effects;
+use kort_thruster::rig::{KnownEffect, Quantity, Rig};
+
+const DT: f64 = 1e-3;
+
+/// An effect with some of its values as multiples of where a fit starts.
+fn known(rig: &Rig, id: &str, sizes: &[(&str, f64)]) -> KnownEffect {
+    let model = kort_control::ControlModel::from_rig(rig, DT).unwrap();
+    let specs = (effects::find(id).unwrap().parameters)(&model.scale(rig, 60.0));
+    let size = |name: &str| sizes.iter().find(|(n, _)| *n == name).map(|(_, factor)| *factor);
+    let value = |s: &effects::Spec| match size(s.name) {
+        Some(factor) => factor * s.start,
+        None if s.shape => s.mean,
+        None => 0.0,
+    };
+    KnownEffect {
+        effect: effects::find(id).unwrap().id,
+        parameters: specs.iter().map(|s| (s.name, Quantity::exact(value(s)))).collect(),
+    }
+}
+
+/// Thrust error, share of the largest, of a plant that has the effects under a controller that is told of some.
+fn error(rig: &Rig, has: &[KnownEffect], told: &[KnownEffect], law: LawKind) -> f64 {
+    let with = |effects: &[KnownEffect]| Rig { effects: effects.to_vec(), ..rig.clone() };
+    let config = ControllerConfig::with_law(law);
+    let mut l = Loop::new(&with(has), &config, DT);
+    l.controller = Controller::new(&with(told), &config, DT).unwrap();
+    let full = kort_control::ControlModel::from_rig(rig, DT).unwrap().thrust_max_n;
+    let (mut sum, mut n) = (0.0, 0.0);
+    for share in [0.5, 0.15, -0.3, -0.6, 0.05, 0.7, 0.3] {
+        for k in 0..1200 {
+            l.tick(Reference::Thrust(share * full));
+            if k > 100 {
+                sum += (l.plant.net_thrust_n() / full - share).powi(2);
+                n += 1.0;
+            }
+        }
+    }
+    f64::sqrt(sum / n)
+}
+
+fn named(name: &str) -> Rig {
+    rigs().into_iter().find(|r| r.name.contains(name) || r.name == name).unwrap_or_else(|| panic!("{name}"))
+}
+
+#[test]
+fn a_law_that_knows_an_effect_is_better_than_one_that_does_not() {
+    let cases: &[(&str, &[(&str, f64)], LawKind, f64)] = &[
+        ("coulomb_friction", &[("coulomb_torque_n_m", 3.0)], LawKind::TorqueControl, 0.6),
+        ("windage_drag", &[("windage_nm_s2", 3.0)], LawKind::TorqueControl, 0.6),
+        ("torque_constant_saturation", &[("saturation_per_a2", 4.0)], LawKind::TorqueControl, 0.6),
+        (
+            "forward_reverse_asymmetry",
+            &[("reverse_lift_error", 3.0), ("reverse_drag_error", 3.0)],
+            LawKind::VelocityServo,
+            0.7,
+        ),
+        ("duct_loss", &[("duct_thrust", 3.0)], LawKind::Model2Inversion, 0.7),
+        ("thrust_deduction_interaction", &[("deduction", 5.0)], LawKind::VelocityServo, 0.6),
+        (
+            "thrust_bias_gain_hysteresis",
+            &[("gain_error", 3.0), ("bias_n", 3.0)],
+            LawKind::TrimmedModel2Inversion,
+            0.7,
+        ),
+        ("water_density", &[("density_error", 4.0)], LawKind::VelocityServo, 0.7),
+    ];
+    let mut said = String::new();
+    let mut worse = String::new();
+    for rig in [Rig::from_toml(common::STAND).unwrap(), named("t200"), named("t500"), named("tunnel")] {
+        for (id, sizes, law, most) in cases {
+            let effect = [known(&rig, id, sizes)];
+            let (without, with) = (error(&rig, &effect, &[], *law), error(&rig, &effect, &effect, *law));
+            let line = format!("{} {id} {}: {without:.4} -> {with:.4}\n", rig.name, law.name());
+            // What hardly shows cannot be taken away.
+            let clean = error(&rig, &[], &[], *law);
+            let excess = |e: f64| (e * e - clean * clean).max(0.0).sqrt();
+            if excess(without) > 0.3 * clean.max(0.005) && excess(with) > most * excess(without) {
+                worse += &format!("clean {clean:.4} {line}");
+            }
+            said += &line;
+        }
+    }
+    println!("{said}");
+    assert!(worse.is_empty(), "{worse}");
+}
+
+#[test]
+fn a_dead_band_and_a_curve_of_the_command_are_undone_on_current_and_voltage_drives() {
+    for rig in [Rig::from_toml(common::STAND).unwrap(), named("t200"), named("speed")] {
+        for (id, sizes) in [
+            ("command_dead_band", &[("half_width", 2.0)][..]),
+            (
+                "command_curve",
+                &[("second_degree_share", 3.0), ("third_degree_share", 2.0), ("full_command", 1.0)],
+            ),
+        ] {
+            let effect = [known(&rig, id, sizes)];
+            let law = LawKind::StaticMap;
+            let (without, with, clean) = (
+                error(&rig, &effect, &[], law),
+                error(&rig, &effect, &effect, law),
+                error(&rig, &[], &[], law),
+            );
+            println!("{} {id}: {without:.4} -> {with:.4}, clean {clean:.4}", rig.name);
+            assert!(
+                with < 1.1 * clean + 0.2 * (without - clean).max(0.0),
+                "{} {id}: {without} {with} {clean}",
+                rig.name
+            );
+        }
+    }
+}
+
+#[test]
+fn a_late_drive_and_late_sensors_leave_the_loop_stable() {
+    for rig in [Rig::from_toml(common::STAND).unwrap(), named("t200")] {
+        for (id, sizes) in [
+            ("transport_delay", &[("delay_s", 10.0)][..]),
+            ("amplifier_lag", &[("extra_lag_s", 4.0)]),
+            ("thrust_sensor_lag", &[("thrust_lag_s", 3.0)]),
+        ] {
+            let effect = [known(&rig, id, sizes)];
+            for law in [LawKind::Model2Inversion, LawKind::VelocityServo] {
+                let (without, with) = (error(&rig, &effect, &[], law), error(&rig, &effect, &effect, law));
+                println!("{} {id} {}: {without:.4} -> {with:.4}", rig.name, law.name());
+                // A known lag makes the led shaft a little more careful.
+                assert!(with < 1.05 * without + 1e-3, "{} {id} {}: {without} {with}", rig.name, law.name());
+            }
+        }
+    }
+}
+
+#[test]
+fn a_rigs_revision_is_taken_over_without_a_jump() {
+    let rig = Rig::from_toml(common::STAND).unwrap();
+    let effect = known(&rig, "coulomb_friction", &[("coulomb_torque_n_m", 3.0)]);
+    let config = ControllerConfig::with_law(LawKind::Model2Inversion);
+    let mut l = Loop::new(&rig, &config, DT);
+    let before = l.run(Reference::Thrust(60.0), 2.0).command.current_a;
+    let revised = Rig { effects: vec![effect], ..rig };
+    l.controller = l.controller.revised(&revised, DT).unwrap();
+    let after = l.tick(Reference::Thrust(60.0)).command.current_a;
+    assert!((after - before).abs() < 0.02 * 9.0, "{before} {after}");
+    assert!((l.run(Reference::Thrust(60.0), 2.0).estimate.thrust_n.value - 60.0).abs() < 3.0);
+}
