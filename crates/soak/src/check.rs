@@ -82,6 +82,9 @@ impl Scenario {
                 )?;
             }
         }
+        if let Some(hidden) = &self.hidden {
+            hidden.check()?;
+        }
         self.check_events(&within)
     }
 

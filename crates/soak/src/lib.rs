@@ -13,7 +13,9 @@ mod check;
 mod comparison;
 mod disc;
 mod faults;
+pub mod hidden;
 pub mod limits;
+mod log;
 mod reference;
 mod run;
 mod scenario;
@@ -28,8 +30,10 @@ mod verdict;
 pub use chain::{Chain, Driven};
 pub use comparison::{AGAINST_PLAIN, LawResult, OF_PLAIN, PLAIN, ScenarioResult};
 pub use disc::Disc;
+pub use hidden::{Drawn, Hidden};
+pub use log::Log;
 pub use reference::{Player, Replayed};
-pub use run::{Knows, Prepared, Progress, run, stream};
+pub use run::{Knows, Prepared, Progress, run, run_logged, stream};
 pub use scenario::{
     Ambient, Change, Channel, Depth, EffectSpec, Fitted, Lie, NEVER_WORSE, Noise, ProcessFault,
     ProcessFaultKind, Sag, Scenario, Segment, SensorFault, Truth,

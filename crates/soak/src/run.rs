@@ -9,6 +9,7 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::chain::Chain;
 use crate::faults::{Faults, Process};
+use crate::log::Log;
 use crate::reference::Replayed;
 use crate::scenario::Scenario;
 use crate::score::{Outcome, Sample, Tally};
@@ -31,10 +32,12 @@ pub struct Prepared<'a> {
 }
 
 /// What the controller is told of the thruster.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Knows {
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Knows<'a> {
     /// What the rig states.
     Stated,
+    /// What another description of the rig states.
+    Rig(&'a Rig),
     /// What is true after the last change of the scenario, which is then true from the start.
     Truth,
 }
@@ -53,7 +56,21 @@ pub fn run<C: Chain>(
     knows: Knows,
     progress: Progress,
 ) -> Result<Outcome, ModelError> {
-    Bench::<C>::new(prepared, config, seed, knows)?.run(progress)
+    Bench::<C>::new(prepared, config, seed, knows)?.run(progress, None)
+}
+
+/// Runs, scores, and keeps a recording.
+///
+/// # Errors
+/// [`ModelError`] if no controller can be designed for the rig.
+pub fn run_logged<C: Chain>(
+    prepared: &Prepared,
+    config: &ControllerConfig,
+    seed: u64,
+    knows: Knows,
+    log: &mut Log,
+) -> Result<Outcome, ModelError> {
+    Bench::<C>::new(prepared, config, seed, knows)?.run(&|_, _, _| (), Some(log))
 }
 
 /// A stream of random numbers of its own for each purpose, so that a law that draws none changes
@@ -70,7 +87,7 @@ struct Bench<'a, C> {
     chain: C,
     plant: Plant,
     truth: Parameters,
-    knows: Knows,
+    knows: Knows<'a>,
     seed: u64,
     sensors: Sensors<'a>,
     faults: Faults<'a>,
@@ -81,13 +98,14 @@ impl<'a, C: Chain> Bench<'a, C> {
         prepared: &'a Prepared<'a>,
         config: &ControllerConfig,
         seed: u64,
-        knows: Knows,
+        knows: Knows<'a>,
     ) -> Result<Self, ModelError> {
         let scenario = prepared.scenario;
         let dt = 1.0 / scenario.control_rate_hz;
         let mut parameters = truth::parameters(prepared, seed);
         let chain = match knows {
             Knows::Stated => C::start(prepared.rig, config, dt)?,
+            Knows::Rig(rig) => C::start(rig, config, dt)?,
             Knows::Truth => {
                 for change in &scenario.truth.change {
                     truth::change(&mut parameters, &change.factors);
@@ -108,12 +126,12 @@ impl<'a, C: Chain> Bench<'a, C> {
         })
     }
 
-    fn run(mut self, progress: Progress) -> Result<Outcome, ModelError> {
+    fn run(mut self, progress: Progress, mut log: Option<&mut Log>) -> Result<Outcome, ModelError> {
         let (prepared, scenario) = (self.prepared, self.prepared.scenario);
         let mut script = Script::new(prepared, self.seed);
         let mut tally = Tally::new(self.dt, prepared.rig, prepared.thrust_max_n, scenario.settle_s);
         let ticks = (scenario.duration_s / self.dt).round() as u64;
-        let changes = if self.knows == Knows::Stated { scenario.truth.change.as_slice() } else { &[] };
+        let changes = if self.knows == Knows::Truth { &[] } else { scenario.truth.change.as_slice() };
         let mut changes = changes.iter().peekable();
         let report_every = (ticks / 200).max(1);
         for k in 0..ticks {
@@ -122,7 +140,7 @@ impl<'a, C: Chain> Bench<'a, C> {
                 truth::change(&mut self.truth, &change.factors);
                 self.plant = truth::changed(prepared, &self.truth, &self.plant, self.dt);
             }
-            tally.tick(&self.tick(&moment));
+            tally.tick(&self.tick(&moment, log.as_deref_mut()));
             if k % report_every == 0 {
                 progress(k as f64 / ticks as f64, tally.rms_n(), tally.energy_j());
             }
@@ -140,7 +158,7 @@ impl<'a, C: Chain> Bench<'a, C> {
         Ok(tally.finish(&extra))
     }
 
-    fn tick(&mut self, moment: &Moment) -> Sample {
+    fn tick(&mut self, moment: &Moment, log: Option<&mut Log>) -> Sample {
         let time = moment.time_s;
         let process = self.faults.controller(time);
         if process == Process::Restarted {
@@ -149,12 +167,15 @@ impl<'a, C: Chain> Bench<'a, C> {
         let (faults, sensed) = (&mut self.faults, self.plant.sensed());
         let measured = self.sensors.measure(time, &sensed, &moment.sea, |until_s| faults.inject(until_s));
         let driven = self.chain.tick(&measured, moment.reference_n, process == Process::Alive);
+        if let Some(log) = log {
+            log.tick(time, &measured, driven.command);
+        }
         self.plant.step(&moment.drive(driven.command));
         let truth = *self.plant.truth();
         let sample = Sample {
             time_s: time,
             reference_n: moment.reference_n,
-            thrust_n: truth.thrust_n,
+            thrust_n: self.plant.net_thrust_n(),
             shaft_speed_rad_s: truth.shaft_speed_rad_s,
             current_a: truth.current_a,
             flow_m_s: truth.axial_m_s,

@@ -11,6 +11,8 @@ use kort_thruster::models::ModelName;
 use kort_thruster::parameters::Parameter;
 use serde::Deserialize;
 
+use crate::hidden::Hidden;
+
 /// A default law is never worse than the plain one by more than this factor.
 pub const NEVER_WORSE: f64 = 1.02;
 
@@ -59,6 +61,8 @@ pub struct Scenario {
     /// Physics that the controllers' model leaves out.
     #[serde(default, rename = "effect")]
     pub effects: Vec<EffectSpec>,
+    /// What `kort soak --adopt` hides in the plant, by seed.
+    pub hidden: Option<Hidden>,
     /// References, one after the other, again from the start when through.
     #[serde(rename = "reference")]
     pub references: Vec<Segment>,

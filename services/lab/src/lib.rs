@@ -3,6 +3,7 @@
 //! [`Command`] is what the program `kort` shows of it; [`run`] does one. To add a subcommand:
 //! a file in `commands/` with `Args` and `run`, and a line in [`Command`].
 
+mod believed;
 pub mod check;
 pub mod commands;
 pub mod failure;

@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use clap::Args;
 use kort_diagnose::diagnose::{Options, diagnose};
 
-use kort_diagnose::report::{ParameterReport, Report};
-use kort_thruster::rig::{FoundEffect, Quantity, Rig};
+use kort_thruster::rig::Rig;
 
+use crate::believed::believed;
 use crate::failure::{Failure, Outcome, print, print_json, write_text};
 use crate::input::Input;
 use crate::{progress, render};
@@ -72,24 +72,4 @@ impl Diagnose {
         }
         Ok(Outcome::with_loss(loaded.lossy))
     }
-}
-
-/// Least probability with which a name belongs to the rig from now on.
-const BELIEVED: f64 = 0.7;
-
-/// Findings that a rig can take over, with twice the standard error as tolerance.
-fn believed(report: &Report) -> Vec<FoundEffect<'_>> {
-    let of = |p: &'_ ParameterReport| Quantity {
-        value: p.value,
-        tol: Some((2.0 * p.std_error / p.value).abs()).filter(|t| t.is_finite() && *t > 0.0),
-    };
-    report
-        .findings
-        .iter()
-        .filter(|f| f.probability >= BELIEVED && f.confounded_with.is_empty())
-        .map(|f| FoundEffect {
-            effect: &f.effect,
-            parameters: f.parameters.iter().map(|p| (p.name.as_str(), of(p))).collect(),
-        })
-        .collect()
 }

@@ -17,7 +17,7 @@ const LONG_S: f64 = 3600.0;
 /// Virtual time by default; --live drives a running service through the same script in real time.
 #[derive(Debug, ClapArgs)]
 #[command(
-    after_help = "Example:\n  kort soak config/scenarios/soak-towed.toml --controllers velocity_servo,model2_inversion --seeds 4 --html soak.html\n  kort soak soak-towed --rig my-rig.toml --controllers velocity_servo,default,drive_limits\n  kort soak all --rig all --seed 901 --markdown docs/control.md"
+    after_help = "Example:\n  kort soak config/scenarios/soak-towed.toml --controllers velocity_servo,model2_inversion --seeds 4 --html soak.html\n  kort soak soak-towed --rig my-rig.toml --controllers velocity_servo,default,drive_limits\n  kort soak all --rig all --seed 901 --markdown docs/control.md\n  kort soak soak-closed-loop --adopt --seeds 4 --html adoption.html"
 )]
 pub struct Args {
     /// Scenarios: files, or names of shipped ones; `all` for every one of less than an hour
@@ -50,6 +50,9 @@ pub struct Args {
     /// drive_limits unless --controllers says otherwise
     #[arg(long, value_name = "FILE", conflicts_with = "live")]
     markdown: Option<PathBuf>,
+    /// Hide effects in the plant by seed, diagnose the first run, adopt what is believed as [[effects]], run again
+    #[arg(long, conflicts_with = "live")]
+    adopt: bool,
     /// Drive a running service, for example http://127.0.0.1:8080, in real time
     #[arg(long, value_name = "URL")]
     live: Option<String>,
@@ -77,6 +80,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let watch = Watch { metrics: metrics.as_ref() };
     let report = match &args.live {
         Some(url) => soak::live(&loaded, url, &args.thruster, args.seed, &watch).map_err(Failure::failed)?,
+        None if args.adopt => soak::adopt(&loaded, args.seed, args.jobs, &watch).map_err(Failure::failed)?,
         None => soak::soak(&loaded, args.seed, args.jobs, &watch).map_err(Failure::failed)?,
     };
     if let Some(file) = &args.html {
@@ -111,8 +115,8 @@ fn load(args: &Args) -> Result<Vec<Loaded>, SoakError> {
     let table = ["velocity_servo", soak::DEFAULT, kort_soak::limits::NAME].map(str::to_owned);
     let controllers = match (&args.controllers, &args.markdown) {
         (Some(controllers), _) => Some(controllers.as_slice()),
-        (None, Some(_)) => Some(table.as_slice()),
-        (None, None) => None,
+        (None, Some(_)) if !args.adopt => Some(table.as_slice()),
+        (None, _) => None,
     };
     let mut loaded = Vec::new();
     for scenario in &scenarios {

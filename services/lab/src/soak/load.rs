@@ -65,6 +65,22 @@ pub enum SoakError {
         /// What is wrong.
         source: ModelError,
     },
+    /// Nothing to adopt.
+    #[error(
+        "scenario `{scenario}` hides nothing, or compares no law: nothing to adopt\nhint: --adopt needs [hidden] in the scenario, as soak-closed-loop has it, and a law among its controllers"
+    )]
+    HidesNothing {
+        /// The scenario.
+        scenario: String,
+    },
+    /// The first run's recording cannot be diagnosed.
+    #[error("scenario `{scenario}`: its recording cannot be diagnosed: {message}")]
+    Diagnosis {
+        /// The scenario.
+        scenario: String,
+        /// What is wrong.
+        message: String,
+    },
     /// The thread pool.
     #[error("no threads: {0}\nhint: a smaller --jobs")]
     Threads(#[from] rayon::ThreadPoolBuildError),
@@ -88,6 +104,8 @@ pub struct Loaded {
     pub scenario: Scenario,
     /// The rig as stated.
     pub rig: Rig,
+    /// The text that states it.
+    pub rig_text: String,
     /// The effects at work.
     pub effects: Vec<Hooked>,
     /// Recordings to replay, by segment.
@@ -129,7 +147,7 @@ pub struct Instead<'a> {
 /// # Errors
 /// [`SoakError`] names the file, the key and what is allowed.
 pub fn load(path: &Path, instead: &Instead) -> Result<Loaded, SoakError> {
-    let (scenario, rig) = read(path, instead.rig)?;
+    let (scenario, rig, rig_text) = read(path, instead.rig)?;
     let period_s = 1.0 / scenario.control_rate_hz;
     let model = ControlModel::from_rig(&rig, period_s)
         .map_err(|source| SoakError::Model { file: path.display().to_string(), source })?;
@@ -158,28 +176,42 @@ pub fn load(path: &Path, instead: &Instead) -> Result<Loaded, SoakError> {
         .map(|s| replay(s, folder, model.thrust_max_n))
         .collect::<Result<_, _>>()?;
     let seeds = instead.seeds.unwrap_or(scenario.seeds);
-    Ok(Loaded { scenario, rig, effects, replayed, thrust_max_n: model.thrust_max_n, controllers, seeds })
+    Ok(Loaded {
+        scenario,
+        rig,
+        rig_text,
+        effects,
+        replayed,
+        thrust_max_n: model.thrust_max_n,
+        controllers,
+        seeds,
+    })
 }
 
-/// A scenario, and its rig or another.
-fn read(path: &Path, rig: Option<&Path>) -> Result<(Scenario, Rig), SoakError> {
+/// A scenario, and its rig or another, with the rig's text.
+fn read(path: &Path, rig: Option<&Path>) -> Result<(Scenario, Rig, String), SoakError> {
     let text = files::soak_scenario_text(path)?;
     let error = |path: &Path, message: String| ScenarioError { file: path.display().to_string(), message };
     let scenario = Scenario::from_toml(&text).map_err(|message| error(path, message))?;
+    let by_name = |name: &Path| -> Result<(Rig, String), SoakError> {
+        let text = files::rig_text(name)?;
+        Ok((Rig::from_toml(&text).map_err(|e| error(name, e.to_string()))?, text))
+    };
     if let Some(rig) = rig {
-        return Ok((scenario, files::read_rig(rig)?));
+        let (rig, text) = by_name(rig)?;
+        return Ok((scenario, rig, text));
     }
     if !path.is_file() {
         // A scenario by name goes with a rig by name.
-        let rig = files::read_rig(Path::new(scenario.rig.file_stem().unwrap_or_default()))?;
-        return Ok((scenario, rig));
+        let (rig, text) = by_name(Path::new(scenario.rig.file_stem().unwrap_or_default()))?;
+        return Ok((scenario, rig, text));
     }
     let rig = path.parent().unwrap_or(Path::new(".")).join(&scenario.rig);
     let text = std::fs::read_to_string(&rig).map_err(|e| {
         error(&rig, format!("{e}\nhint: `rig` in {} is taken relative to that file", path.display()))
     })?;
-    let rig = Rig::from_toml(&text).map_err(|e| error(&rig, e.to_string()))?;
-    Ok((scenario, rig))
+    let parsed = Rig::from_toml(&text).map_err(|e| error(&rig, e.to_string()))?;
+    Ok((scenario, parsed, text))
 }
 
 /// A controller by name: a path, a file beside the scenario or under `config/`, or a bare law.

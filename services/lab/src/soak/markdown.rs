@@ -5,12 +5,16 @@ use std::path::Path;
 
 use kort_soak::{LawResult, NEVER_WORSE, ScenarioResult, limits};
 
+use super::adoption;
 use super::load::DEFAULT;
 use super::report::Report;
 use crate::failure::{Failure, read_text, write_text};
 
-const BEGIN: &str = "<!-- kort soak: begin -->";
-const END: &str = "<!-- kort soak: end -->";
+/// Marks of the comparison's table, and of the adoption's.
+const MARKS: [[&str; 2]; 2] = [
+    ["<!-- kort soak: begin -->", "<!-- kort soak: end -->"],
+    ["<!-- kort soak --adopt: begin -->", "<!-- kort soak --adopt: end -->"],
+];
 
 /// Replaces what stands between the marks of a page.
 ///
@@ -18,13 +22,17 @@ const END: &str = "<!-- kort soak: end -->";
 /// The page cannot be read or written, or lacks the marks.
 pub fn put_into(path: &Path, report: &Report, seed: u64) -> Result<(), Failure> {
     let page = read_text(path)?;
-    let (Some(begin), Some(end)) = (page.find(BEGIN), page.find(END)) else {
+    let ([begin_mark, end_mark], table) = match &report.adoption {
+        None => (MARKS[0], table(report, seed)),
+        Some(all) => (MARKS[1], adoption::markdown(all, seed)),
+    };
+    let (Some(begin), Some(end)) = (page.find(begin_mark), page.find(end_mark)) else {
         return Err(Failure::input(format!(
-            "{}: lacks the marks between which the table goes\nhint: write {BEGIN} and {END} on lines of their own",
+            "{}: lacks the marks between which the table goes\nhint: write {begin_mark} and {end_mark} on lines of their own",
             path.display()
         )));
     };
-    write_text(path, &format!("{}{BEGIN}\n{}{}", &page[..begin], table(report, seed), &page[end..]))
+    write_text(path, &format!("{}{begin_mark}\n{table}{}", &page[..begin], &page[end..]))
 }
 
 /// Rigs down, scenarios across; in each cell the default law and what the drive's limits leave, both over the

@@ -1,6 +1,8 @@
 //! `kort soak`: the engine of `kort-soak` with the production ticks, on all cores or against a
 //! running service, and what is shown of it.
 
+mod adopt;
+mod adoption;
 mod chain;
 mod live;
 mod load;
@@ -14,6 +16,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use kort_soak::{Knows, LawResult, Outcome, ScenarioResult};
 use rayon::prelude::*;
 
+pub use adopt::adopt;
+pub use adoption::Adoption;
 use chain::ProductionChain;
 pub use live::{LiveError, live};
 pub use load::{Contestant, DEFAULT, Instead, Loaded, SoakError, load};

@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use kort_soak::{LawResult, OF_PLAIN, Point, SCORES, ScenarioResult, Score};
 
-use super::Report;
+use super::{Report, adoption};
 use crate::render::{Chart, Mark, Page, Series, facts, note, number, table};
 
 /// The page.
@@ -18,6 +18,9 @@ pub fn page(report: &Report) -> String {
     );
     for s in &report.scenarios {
         page.section(&format!("{} on {}", s.name, s.rig), scenario(s));
+    }
+    if let Some(all) = &report.adoption {
+        page.section("Adoption", adoption::section(all));
     }
     let words: Vec<(&str, String)> = SCORES.iter().map(|(n, w)| (*n, (*w).to_owned())).collect();
     page.section("What the scores are", facts(&words));

@@ -5,6 +5,8 @@ use std::fmt::Write;
 use kort_soak::{AGAINST_PLAIN, OF_PLAIN, ScenarioResult, Score};
 use serde_json::{Map, Value, json};
 
+use super::adoption::{self, Adoption};
+
 /// Columns of the text: score, heading, digits.
 const COLUMNS: [(&str, &str, usize); 18] = [
     ("thrust_rms_n", "RMS N", 2),
@@ -36,12 +38,19 @@ pub struct Report {
     pub virtual_seconds: f64,
     /// Scenario by scenario.
     pub scenarios: Vec<ScenarioResult>,
+    /// What adopting diagnoses did, where that was asked for.
+    pub adoption: Option<Vec<Adoption>>,
 }
 
 impl Report {
     /// All of it.
     pub fn new(seconds: f64, virtual_seconds: f64, scenarios: Vec<ScenarioResult>) -> Self {
-        Self { seconds, virtual_seconds, scenarios }
+        Self { seconds, virtual_seconds, scenarios, adoption: None }
+    }
+
+    /// With what adopting diagnoses did.
+    pub fn with_adoption(self, adoption: Vec<Adoption>) -> Self {
+        Self { adoption: Some(adoption), ..self }
     }
 
     /// As of the contracts.
@@ -77,12 +86,16 @@ impl Report {
                 json!({ "name": s.name, "rig": s.rig, "what": s.what, "thrust_max_n": s.thrust_max_n, "laws": laws, "verdict": s.verdict })
             })
             .collect();
-        json!({
+        let mut document = json!({
             "schema": "kort.soak/1",
             "seconds": self.seconds,
             "virtual_seconds": self.virtual_seconds,
             "scenarios": scenarios,
-        })
+        });
+        if let Some(adoption) = &self.adoption {
+            document["adoption"] = json!(adoption);
+        }
+        document
     }
 
     /// Tables for a terminal.
@@ -115,6 +128,9 @@ impl Report {
                 let _ = writeln!(out, "{}", if l.efficient(&s.laws) { "  *" } else { "" });
             }
             let _ = writeln!(out, "  {}\n", s.verdict);
+        }
+        if let Some(all) = &self.adoption {
+            let _ = writeln!(out, "{}", adoption::text(all));
         }
         let _ = writeln!(
             out,
