@@ -47,6 +47,8 @@ pub enum EventKind {
     FaultsCleared,
     /// A fault was latched: a stop that nobody asked for, if the drive was armed.
     Tripped,
+    /// A path of the thruster is off against its rig description, or is well again.
+    Mismatch,
     /// A process of the service started.
     ProcessStarted,
     /// A process of the service ended, unasked.

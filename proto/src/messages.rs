@@ -362,12 +362,20 @@ message! { "kort.ControllerState",
         laws: [Text<32>; LAWS],
         /// How many are used.
         law_count: u32,
-        /// Spare, zero.
-        reserved: u32,
+        /// Path that is off against the rig as stated, from 1 in the order of [`PATHS`]; zero without an alarm.
+        mismatch_path: u32,
+        /// How near each path is to an alarm, in the order of [`PATHS`]: 1 and above is one; NaN while it is learnt what
+        /// is usual.
+        mismatch_level: [f64; 5],
+        /// Time since the mismatch began, s.
+        mismatch_since_s: f64,
         /// The loop's timing.
         timing: Timing,
     }
 }
+
+/// Paths of a thruster that a mismatch is told of, by their names in a diagnosis.
+pub const PATHS: [&str; 5] = ["drive", "shaft", "blade", "flow", "sensor"];
 
 message! { "kort.Request",
     /// Gateway (or supervisor) to servo and controller. Every process that the kind concerns

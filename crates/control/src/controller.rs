@@ -7,6 +7,7 @@ use crate::estimators::{Adapted, Estimator, EstimatorInput};
 use crate::known::Known;
 use crate::laws::{Law, LawInput, LawKind, RotationalFlowOptions};
 use crate::limits::{Bumpless, Limit, LimitSet, RateLimiter};
+use crate::mismatch::{Mismatch, Monitor, Seen};
 use crate::model::{ControlModel, ModelError, Swirl};
 use crate::observers::{Observer, ObserverInput};
 use crate::signals::{DriveCommand, Estimate, Measurement, Reference};
@@ -26,6 +27,8 @@ pub struct Output {
     pub speed_target_rad_s: f64,
 }
 
+/// Rate of false alarms that the monitor of mismatch is set to: one in thirty days of driving.
+pub const FALSE_ALARMS_PER_DAY: f64 = 1.0 / 30.0;
 /// Commands that are kept for a drive that answers late.
 const SENT: usize = 256;
 
@@ -50,6 +53,7 @@ pub struct Controller {
     /// Stands between the ideal plant of laws and observers and the one the rig is known to be.
     known: Known,
     stated_supply_v: Option<f64>,
+    monitor: Monitor,
     mode: Mode,
     thrust_rate: RateLimiter,
     current_rate: RateLimiter,
@@ -95,6 +99,7 @@ impl Controller {
             adapted: Adapted::default(),
             known: Known::new(rig, &nominal),
             stated_supply_v: rig.amplifier.supply_v,
+            monitor: Monitor::new(&nominal, FALSE_ALARMS_PER_DAY),
             mode: Mode::Off,
             thrust_rate: RateLimiter::default(),
             current_rate: RateLimiter::default(),
@@ -147,6 +152,11 @@ impl Controller {
     /// The adapted coefficients.
     pub fn adapted(&self) -> &Adapted {
         &self.adapted
+    }
+
+    /// Which path of the thruster is off against the rig as stated.
+    pub fn mismatch(&self) -> Mismatch {
+        self.monitor.mismatch()
     }
 
     /// Changes law, options, observer or estimator while running. The command goes on from where it
@@ -278,6 +288,7 @@ impl Controller {
     fn ideal(&mut self, raw: &Measurement, dt: f64) -> (Measurement, Option<f64>, f64) {
         let last = self.estimate;
         let mut measured = self.known.measured(raw, last.as_ref(), &self.model);
+        let shown_a = measured.current_a;
         let actual_a = self.drive_current(&measured, dt);
         if self.known.advance(&measured, last.as_ref(), actual_a, dt) {
             self.model.ambient_mean_m_s = self.known.ambient_m_s();
@@ -290,6 +301,13 @@ impl Controller {
         if let Some(reach) = self.known.reach(raw.supply_v, actual_a, speed) {
             measured.supply_v = Some(reach.supply_v).filter(|v| v.is_finite());
         }
+        self.monitor.tick(&Seen {
+            model: &self.nominal,
+            measured: &measured,
+            drive_a: shown_a.map(|shown| (self.reached_a(), shown)),
+            driving: self.mode != Mode::Off,
+            dt_s: dt,
+        });
         (measured, raw.supply_v, current_a)
     }
 
@@ -305,11 +323,16 @@ impl Controller {
         self.sent_a[self.newest] = current_a;
     }
 
+    /// What was asked of the drive and has reached it, A.
+    fn reached_a(&self) -> f64 {
+        let ago = ((self.model.delay_s / self.stated.period_s).round() as usize).min(SENT - 1);
+        self.sent_a[(self.newest + SENT - ago) % SENT]
+    }
+
     /// Motor current over the last period: measured, or the command that has reached the drive behind its lag.
     fn drive_current(&mut self, measured: &Measurement, dt: f64) -> f64 {
         let lag = self.model.amplifier_lag_s;
-        let ago = ((self.model.delay_s / self.stated.period_s).round() as usize).min(SENT - 1);
-        let reached = self.sent_a[(self.newest + SENT - ago) % SENT];
+        let reached = self.reached_a();
         self.drive_a += (reached - self.drive_a) * dt / (lag + dt);
         if let Some(current) = measured.current_a {
             self.drive_a = current;

@@ -130,8 +130,8 @@ fn a_late_drive_and_late_sensors_leave_the_loop_stable() {
             for law in [LawKind::Model2Inversion, LawKind::VelocityServo] {
                 let (without, with) = (error(&rig, &effect, &[], law), error(&rig, &effect, &effect, law));
                 println!("{} {id} {}: {without:.4} -> {with:.4}", rig.name, law.name());
-                // A known lag makes the led shaft a little more careful.
-                assert!(with < 1.05 * without + 1e-3, "{} {id} {}: {without} {with}", rig.name, law.name());
+                // A known lag or delay makes the loops more careful: where it takes nothing from thrust, that costs a little.
+                assert!(with < 1.15 * without + 1e-3, "{} {id} {}: {without} {with}", rig.name, law.name());
             }
         }
     }

@@ -10,7 +10,9 @@ use std::time::{Duration, Instant};
 
 use kort_proto::events::{Before, Event, EventKind};
 use kort_proto::faults::Fault;
-use kort_proto::messages::{Reply, Setpoint as SetpointMessage, SetpointKind, Telemetry, Trip};
+use kort_proto::messages::{
+    ControllerState, PATHS, Reply, Setpoint as SetpointMessage, SetpointKind, Telemetry, Trip,
+};
 use kort_proto::signals::{Kind, SIGNALS};
 use kort_proto::transport::{Deployment, GatewayPorts, Ticker, TransportError, monotonic_ns, realtime};
 
@@ -99,6 +101,8 @@ struct Bridge {
     held: Held,
     /// Latched faults of servo and controller as last heard; none before the first word.
     latched: [Option<u64>; 2],
+    /// Path that was off at the last look, as in the controller's state.
+    mismatch_path: u32,
     /// What the thruster did when it was last heard armed.
     before: Option<Before>,
 }
@@ -154,6 +158,7 @@ impl Bridge {
             last_servo_sequence: (0, 0),
             held: Held::default(),
             latched: [None; 2],
+            mismatch_path: 0,
             before: None,
         }
     }
@@ -257,6 +262,24 @@ impl Bridge {
         }
     }
 
+    /// A path that is off goes to the event log when it is found, when it turns out to be another, and when all is well.
+    fn tell_mismatch(&mut self, state: &ControllerState) {
+        let before = std::mem::replace(&mut self.mismatch_path, state.mismatch_path);
+        if before == state.mismatch_path {
+            return;
+        }
+        let detail = match PATHS.get((state.mismatch_path as usize).wrapping_sub(1)) {
+            Some(path) => {
+                format!(
+                    "the {path} path is off against the rig as stated since {:.0} s",
+                    state.mismatch_since_s
+                )
+            }
+            None => "the thruster agrees with the rig as stated again".to_owned(),
+        };
+        self.link.events.tell(EventKind::Mismatch, Some(&self.link.thruster.id), "controller", detail);
+    }
+
     fn receive(&mut self, ports: &GatewayPorts, recorder: &Recorder, now: Instant) {
         let mut last: Option<Telemetry> = None;
         while let Some(telemetry) = ports.telemetry.next() {
@@ -281,6 +304,7 @@ impl Bridge {
         if let Some(state) = &state {
             self.link.tally.controller(state);
             self.tell_tripped(1, state.faults, None);
+            self.tell_mismatch(state);
         }
         let thruster = &self.link.thruster;
         if last.is_some() || state.is_some() {

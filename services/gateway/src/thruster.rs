@@ -21,8 +21,8 @@ use crate::lease::{Lease, Wanted};
 use crate::problem::{Kind, Problem};
 use crate::routes::{ControllerRequest, ControllerView, LawParameter};
 use crate::view::{
-    BeforeView, Estimated, FaultView, LeaseView, LimitView, ParameterEstimate, Setpoint, SetpointRange,
-    ThrusterState, Values,
+    BeforeView, Estimated, FaultView, LeaseView, LimitView, MismatchView, ParameterEstimate, Setpoint,
+    SetpointRange, ThrusterState, Values,
 };
 
 /// Servo and controller answer a request within this time, or are taken to be away.
@@ -340,6 +340,7 @@ impl Thruster {
                 values: Values::of_estimates(&controller.map(|c| c.estimates).unwrap_or_default()),
                 parameters: controller.map(estimates).unwrap_or_default(),
             },
+            mismatch: controller.map(MismatchView::of),
             faults: Fault::in_set(heard.shown_faults(now)).map(|fault| self.fault_view(fault)).collect(),
             limits: Limit::in_set(heard.limits(now))
                 .map(|limit| LimitView {

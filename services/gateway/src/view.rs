@@ -1,5 +1,6 @@
 //! What the interface shows of a thruster: the JSON documents and their schemas.
 
+use kort_proto::messages::{ControllerState, PATHS};
 use kort_proto::signals::{ESTIMATES, Estimates, Kind, SIGNALS, Signals};
 use serde::ser::SerializeMap;
 use serde::{Deserialize, Serialize, Serializer};
@@ -39,6 +40,8 @@ pub struct ThrusterState {
     pub measured: Values,
     /// What observer and estimator believe.
     pub estimated: Estimated,
+    /// Which path is off against the rig as stated; null while the controller is away.
+    pub mismatch: Option<MismatchView>,
     /// Latched faults.
     pub faults: Vec<FaultView>,
     /// Limits in force: no faults, they say what holds the thruster back now.
@@ -103,6 +106,40 @@ pub struct Estimated {
     pub values: Values,
     /// Estimated parameters.
     pub parameters: Vec<ParameterEstimate>,
+}
+
+/// Mismatch between the thruster and its rig description while it runs.
+#[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
+pub struct MismatchView {
+    /// How near each path is to an alarm: 1 and above is one; null while it is learnt what is usual.
+    pub paths: Vec<PathView>,
+    /// The path that is off: drive, shaft, blade, flow or sensor; null without an alarm.
+    #[schema(example = "shaft")]
+    pub alarm: Option<&'static str>,
+    /// Time since it began, s; null without an alarm.
+    pub since_s: Option<f64>,
+}
+
+/// A path and how near it is to an alarm.
+#[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
+pub struct PathView {
+    /// drive, shaft, blade, flow or sensor.
+    pub path: &'static str,
+    /// 1 and above is an alarm; null while it is learnt what is usual.
+    pub level: Option<f64>,
+}
+
+impl MismatchView {
+    /// As a controller tells it.
+    pub fn of(state: &ControllerState) -> Self {
+        let alarm = PATHS.get((state.mismatch_path as usize).wrapping_sub(1)).copied();
+        let level = |value: f64| Some(value).filter(|v| v.is_finite());
+        let paths = PATHS
+            .iter()
+            .zip(state.mismatch_level)
+            .map(|(path, value)| PathView { path, level: level(value) });
+        Self { paths: paths.collect(), alarm, since_s: alarm.map(|_| state.mismatch_since_s) }
+    }
 }
 
 /// An estimated parameter.

@@ -132,7 +132,12 @@ impl Loop {
     }
 
     pub fn tick(&mut self, reference: Reference) -> Output {
-        let output = self.controller.tick(&self.measured(), reference, self.dt);
+        self.tick_with(&self.measured(), reference)
+    }
+
+    /// One tick with what the controller is shown.
+    pub fn tick_with(&mut self, measured: &Measurement, reference: Reference) -> Output {
+        let output = self.controller.tick(measured, reference, self.dt);
         let command = match self.kind {
             AmplifierKind::Current => output.command.current_a,
             AmplifierKind::Voltage => output.command.voltage_v.unwrap(),

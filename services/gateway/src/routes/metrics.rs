@@ -9,7 +9,7 @@ use axum::http::header;
 use axum::response::IntoResponse;
 use kort_proto::faults::Fault;
 use kort_proto::limits::Limit;
-use kort_proto::messages::{LATENESS_BOUNDS_NS, Timing};
+use kort_proto::messages::{LATENESS_BOUNDS_NS, PATHS, Timing};
 use kort_proto::signals::Kind as SignalKind;
 use kort_proto::transport::Restarts;
 use prometheus::proto::{Bucket, Counter, Gauge, Histogram, LabelPair, Metric, MetricFamily, MetricType};
@@ -272,6 +272,25 @@ fn state(families: &mut Families, thruster: &Thruster, tally: &Tally) {
             &label,
             f64::from(state.estimator_frozen != 0),
         );
+        for (k, path) in PATHS.iter().enumerate() {
+            let labels = [("thruster", id), ("path", *path)];
+            let level = state.mismatch_level[k];
+            if level.is_finite() {
+                families.gauge(
+                    "mismatch_level_ratio",
+                    "How near a path is to an alarm of mismatch: 1 and above is one.",
+                    &labels,
+                    level,
+                );
+            }
+            let alarm = state.mismatch_path as usize == k + 1;
+            families.gauge(
+                "mismatch_alarm",
+                "Is this path off against the rig as stated?",
+                &labels,
+                f64::from(u8::from(alarm)),
+            );
+        }
         for parameter in state.parameters.iter().take(state.parameter_count as usize) {
             let labels =
                 [("thruster", id), ("parameter", parameter.name.as_str()), ("unit", parameter.unit.as_str())];

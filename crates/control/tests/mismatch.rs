@@ -1,0 +1,156 @@
+//! The monitor of mismatch in closed loop: an effect switched on in mid-run is found on its path, and a clean run
+//! gives no alarm.
+
+mod common;
+
+use common::{Loop, STAND};
+use kort_control::mismatch::{BLOCK_S, LEARNT, Path};
+use kort_control::{ControllerConfig, LawKind, Reference};
+use kort_thruster::effects;
+use kort_thruster::models::ModelName;
+use kort_thruster::parameters::{Parameter, Parameters};
+use kort_thruster::plant::Plant;
+use kort_thruster::rig::Rig;
+
+const DT: f64 = 2e-3;
+/// Within which an effect of a few percent is to be found, s.
+const WITHIN_S: f64 = 90.0;
+
+/// A thrust reference that wanders over levels and directions.
+fn reference(time_s: f64) -> Reference {
+    let levels = [0.4, 0.6, 0.3, 0.15, -0.2, -0.45, -0.6, -0.3, 0.2, 0.5];
+    let k = (time_s / 1.3) as usize;
+    Reference::Thrust(170.0 * levels[(k * 7 + k / 10) % levels.len()])
+}
+
+struct Watched {
+    l: Loop,
+    time_s: f64,
+    noise: u64,
+}
+
+impl Watched {
+    fn new() -> Self {
+        let rig = Rig::from_toml(STAND).unwrap();
+        let mut l = Loop::new(&rig, &ControllerConfig::with_law(LawKind::Model2Inversion), DT);
+        l.flow_meter = true;
+        Self { l, time_s: 0.0, noise: 1 }
+    }
+
+    fn normal(&mut self) -> f64 {
+        let mut sum = -6.0;
+        for _ in 0..12 {
+            self.noise =
+                self.noise.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            sum += (self.noise >> 11) as f64 / (1_u64 << 53) as f64;
+        }
+        sum
+    }
+
+    /// Runs with noise on every sensor, until an alarm or for a time.
+    fn run(&mut self, seconds: f64) -> Option<Path> {
+        for _ in 0..(seconds / DT) as usize {
+            let mut measured = self.l.measured();
+            let (a, b, c) = (self.normal(), self.normal(), self.normal());
+            measured.thrust_n = measured.thrust_n.map(|x| x + 2.0 * a);
+            measured.current_a = measured.current_a.map(|x| x + 0.02 * b);
+            measured.flow_m_s = measured.flow_m_s.map(|x| x * (1.0 + 0.1 * c));
+            self.l.tick_with(&measured, reference(self.time_s));
+            self.time_s += DT;
+            if let Some(path) = self.l.controller.mismatch().alarm {
+                return Some(path);
+            }
+        }
+        None
+    }
+
+    /// The plant goes on with an effect, or with other parameters.
+    fn switch(&mut self, effect: Option<(&str, &[(&str, f64)])>, factors: &[(Parameter, f64)]) {
+        let rig = Rig::from_toml(STAND).unwrap();
+        let mut p = Parameters::stated(&rig);
+        factors.iter().for_each(|(parameter, factor)| p.set(*parameter, p.get(*parameter) * factor));
+        let model = *self.l.controller.nominal();
+        let hooked = effect.map(|(id, sizes)| {
+            let descriptor = effects::find(id).unwrap();
+            let specs = (descriptor.parameters)(&model.scale(&rig, 600.0));
+            let size = |s: &effects::Spec| {
+                let given = sizes.iter().find(|(name, _)| *name == s.name).map(|(_, x)| *x);
+                given.unwrap_or(if s.shape { s.mean } else { 0.0 })
+            };
+            (descriptor, specs.iter().map(size).collect::<Vec<f64>>())
+        });
+        let list: Vec<_> = hooked.iter().map(|(d, v)| (*d, v.as_slice())).collect();
+        let now = *self.l.plant.truth();
+        self.l.plant = Plant::new(ModelName::Model2, &rig, &p, &list, DT).with_encoder_quantised(true);
+        let Self { l, time_s, .. } = self;
+        l.plant.start(*time_s, now.shaft_speed_rad_s, now.axial_m_s, now.current_a, now.shaft_angle_rad);
+    }
+}
+
+/// A clean run that has learnt what is usual.
+fn learnt() -> Watched {
+    let mut watched = Watched::new();
+    assert_eq!(watched.run(2.2 * f64::from(LEARNT) * BLOCK_S), None);
+    assert!(!watched.l.controller.mismatch().learning);
+    watched
+}
+
+#[test]
+fn an_effect_of_a_few_percent_is_found_on_its_path() {
+    let full_n_m = 9.0 * 1.25;
+    let cases: [(&str, Option<(&str, &[(&str, f64)])>, &[(Parameter, f64)], Path); 8] = [
+        (
+            "friction",
+            Some(("coulomb_friction", &[("coulomb_torque_n_m", 0.03 * full_n_m)])),
+            &[],
+            Path::Shaft,
+        ),
+        ("windage", Some(("windage_drag", &[("windage_nm_s2", 8e-5)])), &[], Path::Shaft),
+        (
+            "curve",
+            Some(("command_curve", &[("second_degree_share", 0.06), ("full_command", 9.0)])),
+            &[],
+            Path::Drive,
+        ),
+        ("dead band", Some(("command_dead_band", &[("half_width", 0.27)])), &[], Path::Drive),
+        ("lift", None, &[(Parameter::LiftMax, 0.95)], Path::Blade),
+        ("outflow", None, &[(Parameter::FluxCoefficient, 1.2)], Path::Flow),
+        ("gain", Some(("thrust_bias_gain_hysteresis", &[("gain_error", 0.03)])), &[], Path::Sensor),
+        ("bias", Some(("thrust_bias_gain_hysteresis", &[("bias_n", 0.03 * 175.0)])), &[], Path::Sensor),
+    ];
+    let found = std::thread::scope(|threads| {
+        let running: Vec<_> = cases
+            .iter()
+            .map(|(name, effect, factors, path)| {
+                threads.spawn(move || {
+                    let mut watched = learnt();
+                    watched.switch(*effect, factors);
+                    let began = watched.time_s;
+                    let alarm = watched.run(WITHIN_S);
+                    let after = watched.time_s - began;
+                    let mut settled = watched.l.controller.mismatch();
+                    for _ in 0..(30.0 / DT) as usize {
+                        let measured = watched.l.measured();
+                        watched.l.tick_with(&measured, reference(watched.time_s));
+                        watched.time_s += DT;
+                        settled = watched.l.controller.mismatch();
+                    }
+                    (*name, *path, alarm, after, settled)
+                })
+            })
+            .collect();
+        running.into_iter().map(|t| t.join().unwrap()).collect::<Vec<_>>()
+    });
+    for (name, path, alarm, after, settled) in &found {
+        println!("{name}: {alarm:?} after {after:.0} s, then {:?} {:?}", settled.alarm, settled.level);
+        assert!(alarm.is_some(), "{name}: no alarm within {WITHIN_S} s: {settled:?}");
+        assert_eq!((*alarm, settled.alarm), (Some(*path), Some(*path)), "{name}: {settled:?}");
+        assert!(settled.since_s > 30.0 && settled.since_s < after + 35.0, "{name}: {settled:?}");
+    }
+}
+
+#[test]
+fn a_clean_run_gives_no_alarm() {
+    let mut watched = learnt();
+    assert_eq!(watched.run(1500.0), None, "{:?}", watched.l.controller.mismatch());
+}
