@@ -15,8 +15,13 @@
 //!
 //! An ambient flow that changes and is not measured is off the model's path too, and shows as `flow`.
 
+mod cusum;
+
 use crate::model::ControlModel;
 use crate::signals::Measurement;
+
+pub use cusum::threshold;
+use cusum::{Cusum, Usual};
 
 /// Where a mismatch is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,12 +58,6 @@ impl Path {
 pub const BLOCK_S: f64 = 2.0;
 /// Blocks that mean and spread are learnt from: five minutes of driving.
 pub const LEARNT: u32 = 150;
-/// Reference value of the CUSUM, standard deviations.
-const REFERENCE: f64 = 0.75;
-/// A block counts for no more than this, standard deviations: one bad block is no mismatch.
-const CLIP: f64 = 4.0;
-/// Least spread of a share: what nobody would call a mismatch.
-const LEAST: f64 = 0.001;
 /// Excitation, share of full squared, below which a block says nothing.
 const EXCITED: f64 = 0.01;
 
@@ -100,56 +99,6 @@ struct Sums {
     bias: [f64; 2],
 }
 
-/// Mean and squared deviations of a residual while learning (Welford 1962).
-#[derive(Clone, Copy, Debug, Default)]
-struct Usual {
-    n: u32,
-    mean: f64,
-    squares: f64,
-}
-
-impl Usual {
-    fn take(&mut self, x: f64) {
-        self.n += 1;
-        let off = x - self.mean;
-        self.mean += off / f64::from(self.n);
-        self.squares += off * (x - self.mean);
-    }
-
-    fn standardised(&self, x: f64) -> Option<f64> {
-        (self.n >= LEARNT).then(|| {
-            let spread = (self.squares / f64::from(self.n - 1)).sqrt().max(LEAST);
-            ((x - self.mean) / spread).clamp(-CLIP, CLIP)
-        })
-    }
-
-    fn spread(&self) -> f64 {
-        (self.squares / f64::from(self.n.max(2) - 1)).sqrt().max(LEAST)
-    }
-}
-
-/// Two-sided CUSUM with the time since it last stood at zero.
-#[derive(Clone, Copy, Debug, Default)]
-struct Cusum {
-    sums: [f64; 2],
-    since_s: [f64; 2],
-}
-
-impl Cusum {
-    fn take(&mut self, z: f64, most: f64, block_s: f64) {
-        for (side, sign) in [(0, 1.0), (1, -1.0)] {
-            let sum = self.sums[side] + sign * z - REFERENCE;
-            self.sums[side] = sum.clamp(0.0, most);
-            self.since_s[side] = if sum <= 0.0 { 0.0 } else { self.since_s[side] + block_s };
-        }
-    }
-
-    fn level(&self) -> (f64, f64) {
-        let side = usize::from(self.sums[1] > self.sums[0]);
-        (self.sums[side], self.since_s[side])
-    }
-}
-
 /// The running monitor. Plain data: no allocation, a bounded time a tick.
 #[derive(Clone, Copy, Debug)]
 pub struct Monitor {
@@ -183,23 +132,6 @@ pub struct Seen<'a> {
     pub dt_s: f64,
 }
 
-/// The threshold, standard deviations, at which all CUSUMs together give that many false alarms a day.
-pub fn threshold(alarms_per_day: f64) -> f64 {
-    let blocks_per_day = 86_400.0 / BLOCK_S;
-    let run = 2.0 * FAULTS as f64 * blocks_per_day / alarms_per_day;
-    let d = REFERENCE - 2.0 / f64::from(LEARNT).sqrt();
-    let length = |h: f64| {
-        let b = h + 1.166;
-        ((2.0 * d * b).exp() - 2.0 * d * b - 1.0) / (2.0 * d * d)
-    };
-    let (mut low, mut high) = (0.0, 60.0);
-    for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        if length(middle) < run { low = middle } else { high = middle }
-    }
-    high
-}
-
 /// Relative change of torque, thrust and flow at a given shaft speed for a relative change of a coefficient, in still water.
 fn sensitivity(model: &ControlModel, change: impl Fn(&mut ControlModel, f64)) -> [f64; RESIDUALS] {
     let by = 0.02;
@@ -221,7 +153,7 @@ impl Monitor {
         let blade = |m: &mut ControlModel, by: f64| m.blade.lift_max *= by;
         let outflow = |m: &mut ControlModel, by: f64| m.flux_coefficient *= by;
         Self {
-            threshold: threshold(alarms_per_day),
+            threshold: threshold(alarms_per_day, FAULTS),
             sums: Sums::default(),
             usual: [Usual::default(); RESIDUALS],
             faults: [
@@ -423,42 +355,3 @@ impl Monitor {
 
 /// Corner of the filter on both sides of the torque balance, 1/s.
 const FILTER_PER_S: f64 = 20.0;
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_threshold_rises_as_alarms_become_rarer() {
-        let (often, rarely) = (threshold(1.0), threshold(1.0 / 30.0));
-        assert!(often > 5.0 && rarely > often + 2.0 && rarely < 20.0, "{often} {rarely}");
-    }
-
-    /// Siegmund's approximation against a simulated CUSUM.
-    #[test]
-    fn the_run_length_is_that_of_a_simulated_cusum() {
-        let (h, mut seed, mut total, runs) = (4.0, 1_u64, 0_u64, 400);
-        let mut normal = || {
-            // Sum of twelve uniforms: near enough to normal within four deviations.
-            (0..12)
-                .map(|_| {
-                    seed =
-                        seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-                    (seed >> 11) as f64 / (1_u64 << 53) as f64
-                })
-                .sum::<f64>()
-                - 6.0
-        };
-        for _ in 0..runs {
-            let mut sum = 0.0;
-            while sum < h {
-                sum = f64::max(0.0, sum + normal() - REFERENCE);
-                total += 1;
-            }
-        }
-        let (d, b) = (REFERENCE, h + 1.166);
-        let expected = ((2.0 * d * b).exp() - 2.0 * d * b - 1.0) / (2.0 * d * d);
-        let found = total as f64 / f64::from(runs);
-        assert!((found / expected - 1.0).abs() < 0.3, "{found} {expected}");
-    }
-}

@@ -360,13 +360,8 @@ pub struct ProcessFault {
 /// Whether something that starts `at_s`, lasts `for_s` and repeats is on at a time.
 pub fn is_on(at_s: f64, for_s: f64, every_s: Option<f64>, time_s: f64) -> bool {
     let since = time_s - at_s;
-    if since < 0.0 {
-        return false;
-    }
-    match every_s {
-        Some(every) if every > 0.0 => since % every < for_s,
-        _ => since < for_s,
-    }
+    let within = every_s.filter(|every| *every > 0.0).map_or(since, |every| since % every);
+    since >= 0.0 && within < for_s
 }
 
 impl Scenario {

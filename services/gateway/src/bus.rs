@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 use kort_proto::events::{Before, Event, EventKind};
 use kort_proto::faults::Fault;
 use kort_proto::messages::{
-    ControllerState, PATHS, Reply, Setpoint as SetpointMessage, SetpointKind, Telemetry, Trip,
+    ControllerState, Reply, Setpoint as SetpointMessage, SetpointKind, Telemetry, Trip,
 };
 use kort_proto::signals::{Kind, SIGNALS};
 use kort_proto::transport::{Deployment, GatewayPorts, Ticker, TransportError, monotonic_ns, realtime};
@@ -20,7 +20,7 @@ use crate::events::Events;
 use crate::record::Recorder;
 use crate::tally::Tally;
 use crate::thruster::{ANSWER_WITHIN, Ask, Thruster};
-use crate::view::Setpoint;
+use crate::view::{MismatchView, Setpoint};
 
 /// Ports that cannot be opened, or that belong to a past generation, are tried again this often.
 const REOPEN_EVERY: Duration = Duration::from_millis(100);
@@ -101,7 +101,6 @@ struct Bridge {
     held: Held,
     /// Latched faults of servo and controller as last heard; none before the first word.
     latched: [Option<u64>; 2],
-    /// Path that was off at the last look, as in the controller's state.
     mismatch_path: u32,
     /// What the thruster did when it was last heard armed.
     before: Option<Before>,
@@ -262,22 +261,17 @@ impl Bridge {
         }
     }
 
-    /// A path that is off goes to the event log when it is found, when it turns out to be another, and when all is well.
+    /// A path that is off, and that all is well again.
     fn tell_mismatch(&mut self, state: &ControllerState) {
-        let before = std::mem::replace(&mut self.mismatch_path, state.mismatch_path);
-        if before == state.mismatch_path {
-            return;
+        if std::mem::replace(&mut self.mismatch_path, state.mismatch_path) != state.mismatch_path {
+            let id = &self.link.thruster.id;
+            self.link.events.tell(
+                EventKind::Mismatch,
+                Some(id),
+                "controller",
+                MismatchView::of(state).words(),
+            );
         }
-        let detail = match PATHS.get((state.mismatch_path as usize).wrapping_sub(1)) {
-            Some(path) => {
-                format!(
-                    "the {path} path is off against the rig as stated since {:.0} s",
-                    state.mismatch_since_s
-                )
-            }
-            None => "the thruster agrees with the rig as stated again".to_owned(),
-        };
-        self.link.events.tell(EventKind::Mismatch, Some(&self.link.thruster.id), "controller", detail);
     }
 
     fn receive(&mut self, ports: &GatewayPorts, recorder: &Recorder, now: Instant) {

@@ -140,6 +140,17 @@ impl MismatchView {
             .map(|(path, value)| PathView { path, level: level(value) });
         Self { paths: paths.collect(), alarm, since_s: alarm.map(|_| state.mismatch_since_s) }
     }
+
+    /// For the event log.
+    pub fn words(&self) -> String {
+        match self.alarm {
+            Some(path) => {
+                let since_s = self.since_s.unwrap_or(0.0);
+                format!("the {path} path is off against the rig as stated since {since_s:.0} s")
+            }
+            None => "the thruster agrees with the rig as stated again".into(),
+        }
+    }
 }
 
 /// An estimated parameter.

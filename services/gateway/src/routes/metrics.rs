@@ -272,24 +272,14 @@ fn state(families: &mut Families, thruster: &Thruster, tally: &Tally) {
             &label,
             f64::from(state.estimator_frozen != 0),
         );
-        for (k, path) in PATHS.iter().enumerate() {
+        for ((k, path), level) in PATHS.iter().enumerate().zip(state.mismatch_level) {
             let labels = [("thruster", id), ("path", *path)];
-            let level = state.mismatch_level[k];
+            let alarm = f64::from(u8::from(state.mismatch_path as usize == k + 1));
+            families.gauge("mismatch_alarm", "Is this path off against the rig as stated?", &labels, alarm);
             if level.is_finite() {
-                families.gauge(
-                    "mismatch_level_ratio",
-                    "How near a path is to an alarm of mismatch: 1 and above is one.",
-                    &labels,
-                    level,
-                );
+                let words = "How near a path is to an alarm of mismatch: 1 and above is one.";
+                families.gauge("mismatch_level_ratio", words, &labels, level);
             }
-            let alarm = state.mismatch_path as usize == k + 1;
-            families.gauge(
-                "mismatch_alarm",
-                "Is this path off against the rig as stated?",
-                &labels,
-                f64::from(u8::from(alarm)),
-            );
         }
         for parameter in state.parameters.iter().take(state.parameter_count as usize) {
             let labels =

@@ -185,7 +185,7 @@ impl Entry {
             ("Confused with", self.confused_with.join(", ")),
             ("Separated by", self.separated_by.into()),
             ("Parameters", self.parameter_list()),
-            ("Known in a rig, used for", self.usage()),
+            (USED_FOR, self.usage()),
             ("Reference", self.reference.into()),
         ]
     }
@@ -198,6 +198,9 @@ impl Entry {
         }
     }
 }
+
+/// Heading of what laws and observers do with an effect.
+const USED_FOR: &str = "Known in a rig, used for";
 
 /// Words with a capital and a full stop.
 fn sentence(words: &str) -> String {
@@ -246,7 +249,8 @@ fn markdown(effects: &[&'static Descriptor]) -> String {
     for effect in effects {
         let entry = Entry::of(effect);
         let _ = write!(text, "\n## {}\n\n", entry.effect);
-        for (heading, body) in entry.sections() {
+        // What laws do with it belongs to the rig's page, `docs/control.md`.
+        for (heading, body) in entry.sections().into_iter().filter(|(heading, _)| *heading != USED_FOR) {
             let body = match heading {
                 "Equation" => format!("`{body}`"),
                 "Confused with" => {
