@@ -37,7 +37,7 @@ impl Log {
 
     /// One tick: what was measured, and the command that then acted until the next.
     pub fn tick(&mut self, time_s: f64, measured: &Signals, command: f64) {
-        if self.ticks % self.every == 0 {
+        if self.ticks.is_multiple_of(self.every) {
             self.finish_row();
             self.row = Some((time_s, *measured));
         }
