@@ -51,7 +51,9 @@ fn named(name: &str) -> Rig {
 
 #[test]
 fn a_law_that_knows_an_effect_is_better_than_one_that_does_not() {
-    let cases: &[(&str, &[(&str, f64)], LawKind, f64)] = &[
+    /// Effect, its values, law, share of the untold error that may be left.
+    type Told<'a> = (&'a str, &'a [(&'a str, f64)], LawKind, f64);
+    let cases: &[Told] = &[
         ("coulomb_friction", &[("coulomb_torque_n_m", 3.0)], LawKind::TorqueControl, 0.6),
         ("windage_drag", &[("windage_nm_s2", 3.0)], LawKind::TorqueControl, 0.6),
         ("torque_constant_saturation", &[("saturation_per_a2", 4.0)], LawKind::TorqueControl, 0.6),

@@ -98,7 +98,11 @@ fn learnt() -> Watched {
 #[test]
 fn an_effect_of_a_few_percent_is_found_on_its_path() {
     let full_n_m = 9.0 * 1.25;
-    let cases: [(&str, Option<(&str, &[(&str, f64)])>, &[(Parameter, f64)], Path); 8] = [
+    /// An effect with its values, if one is switched on.
+    type Switched<'a> = Option<(&'a str, &'a [(&'a str, f64)])>;
+    /// Name, effect, parameters that change, and the path to be blamed.
+    type Case<'a> = (&'a str, Switched<'a>, &'a [(Parameter, f64)], Path);
+    let cases: [Case; 8] = [
         (
             "friction",
             Some(("coulomb_friction", &[("coulomb_torque_n_m", 0.03 * full_n_m)])),
