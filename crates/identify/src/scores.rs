@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 
+use kort_thruster::effects::Scale;
 use rand::{Rng, SeedableRng};
-
 use serde::Serialize;
 
 use crate::fit::Fit;
-use crate::hypothesis::Target;
+use crate::hypothesis::{Member, Target};
 use crate::simulate::{Problem, Stack};
 
 /// A parameter with its uncertainty.
@@ -80,6 +80,28 @@ pub fn parameters(fit: &Fit, std_errors: &[f64], effect: Option<usize>) -> Vec<P
             std_error: std_errors[k],
             stated: f.stated.then_some(f.mean),
             at_bound: Some(at_bound[k]),
+        })
+        .chain(effect.into_iter().flat_map(|i| taken_as_given(&fit.hypothesis.effects[i])))
+        .collect()
+}
+
+/// Values of an effect that are not fitted and without which those that are mean nothing: the order of a ripple, the
+/// command at which a curve ends.
+fn taken_as_given(member: &Member) -> Vec<ParameterReport> {
+    let specs = (member.effect.parameters)(&Scale::ANY);
+    let belongs = |place: usize| {
+        let group = specs[place + 1..].iter().take_while(|s| !(s.held && s.shape)).count();
+        group == 0 || (place + 1..=place + group).any(|k| !member.held.contains(&k))
+    };
+    (0..specs.len())
+        .filter(|j| specs[*j].held && specs[*j].shape && belongs(*j))
+        .map(|j| ParameterReport {
+            name: specs[j].name.into(),
+            value: member.values[j],
+            unit: specs[j].unit.into(),
+            std_error: 0.0,
+            stated: None,
+            at_bound: None,
         })
         .collect()
 }
