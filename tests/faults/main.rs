@@ -29,12 +29,20 @@ fn every_fault_ends_within_its_bound() {
         ("sensors", &[sensors::lying]),
     ];
     let only = std::env::var("KORT_FAULT_GROUPS").ok();
-    let mut table = Table::default();
+    let table = std::cell::RefCell::new(Table::default());
     for (name, faults) in groups {
         if only.as_ref().is_none_or(|only| only.split(',').any(|wanted| wanted == name)) {
-            faults.iter().for_each(|fault| fault(&mut table));
+            for fault in faults {
+                // Rows of a trial in which the machine stood still are dropped with it.
+                common::in_real_time(|| {
+                    let mut rows = Table::default();
+                    fault(&mut rows);
+                    table.borrow_mut().append(rows);
+                });
+            }
         }
     }
+    let table = table.into_inner();
     println!("{table}");
     assert!(table.holds(), "a bound does not hold:\n{table}");
 }

@@ -18,6 +18,11 @@ struct Row {
 }
 
 impl Table {
+    /// Rows of another table behind this one's.
+    pub fn append(&mut self, other: Self) {
+        self.0.extend(other.0);
+    }
+
     /// Notes the times measured of one fault.
     pub fn row(
         &mut self,
