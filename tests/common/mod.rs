@@ -141,7 +141,7 @@ thread_local! {
 }
 
 /// Runs a test of live processes again, up to twice, where it failed and a servo said that its loop
-/// stood still: then the machine was suspended or overloaded for longer than a drive may wait, the trip
+/// or its controller stood still: then the machine was suspended or overloaded for longer than a drive may wait, the trip
 /// to zero is what the service promises, and what the test asks about was not to be seen.
 pub fn in_real_time(test: impl Fn()) {
     for again in [true, true, false] {
@@ -347,7 +347,7 @@ impl Drop for Stack {
     fn drop(&mut self) {
         if std::thread::panicking() {
             let log = self.site.log();
-            STOOD_STILL.set(log.contains("loop_stalled"));
+            STOOD_STILL.set(["loop_stalled", "command_timeout"].iter().any(|trip| log.contains(trip)));
             eprintln!("--- log of the deployment\n{log}");
         }
         let children = children(self.supervisor.id());
