@@ -17,13 +17,21 @@ fn schemathesis_finds_no_answer_that_the_document_does_not_promise() {
         return;
     }
     let stack = Stack::start();
-    let done = Command::new(program)
-        .args(["run", &format!("http://127.0.0.1:{}/openapi.json", stack.site.port)])
-        .args(["--max-examples", "20", "--seed", "1", "--request-timeout", "10", "--no-color"])
-        .current_dir(stack.site.folder.path())
-        .output()
-        .unwrap();
-    let words = String::from_utf8_lossy(&done.stdout);
-    assert!(done.status.success(), "{words}{}", String::from_utf8_lossy(&done.stderr));
+    let run = || {
+        let done = Command::new(&program)
+            .args(["run", &format!("http://127.0.0.1:{}/openapi.json", stack.site.port)])
+            .args(["--max-examples", "20", "--seed", "1", "--request-timeout", "10", "--no-color"])
+            .current_dir(stack.site.folder.path())
+            .output()
+            .unwrap();
+        (done.status.success(), String::from_utf8_lossy(&done.stdout).into_owned(), done.stderr)
+    };
+    // A machine that holds the servo up gets the 503 that the document promises, which schemathesis counts as an
+    // error of the server: then once more.
+    let (mut passed, mut words, mut talk) = run();
+    if !passed && words.contains("urn:kort:problem:not-ready") {
+        (passed, words, talk) = run();
+    }
+    assert!(passed, "{words}{}", String::from_utf8_lossy(&talk));
     assert!(words.contains("24 selected"), "every operation is tried: {words}");
 }
