@@ -166,7 +166,7 @@ fn a_dead_servo_is_not_shown_as_armed() {
         let mut stack = Stack::start();
         stack.thrust(80.0, LEASE_MS);
         kill(stack.process_of("servo"), "STOP");
-        std::thread::sleep(Duration::from_millis(60));
+        std::thread::sleep(Duration::from_nanos(3 * PERIOD_NS));
         let state = stack.state().unwrap();
         assert_eq!(state["armed"], false, "{state}");
         assert!(state["faults"].to_string().contains("servo_lost"), "{state}");
