@@ -295,6 +295,12 @@ impl Service {
             self.generations = 0;
         }
         if let Some(spent) = self.roles.iter().find(|role| role.failed_starts >= STARTS_PER_GENERATION) {
+            if let Err(full) = self.owner.has_room(self.ids.len()) {
+                // Room comes back, and afresh there would be no more of it: those that run go on.
+                warn!("{} failed to start {STARTS_PER_GENERATION} times: {full}", spent.name);
+                self.roles.iter_mut().for_each(|role| role.failed_starts = 0);
+                return Ok(());
+            }
             self.generations += 1;
             if self.generations > GENERATIONS {
                 return Err(UpError::DoesNotStart { name: spent.name.to_owned() });

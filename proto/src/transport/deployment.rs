@@ -18,14 +18,10 @@ use thiserror::Error;
 
 use super::clock::monotonic_ns;
 use super::ports::{Services, create_services};
+use super::room;
 
 /// Longest root: the sockets by which iceoryx2 wakes a process lie under it, and a socket path has 107 bytes.
 const ROOT_BYTES_MAX: usize = 35;
-/// What the services of one thruster and its peers take in `/dev/shm`, with as much again to spare, KiB.
-const NEEDED_KIB: u64 = 8192;
-/// Files they are.
-const NEEDED_FILES: u64 = 200;
-
 /// Why shared memory cannot be used.
 #[derive(Debug, Error)]
 pub enum TransportError {
@@ -62,7 +58,7 @@ pub enum TransportError {
     },
     /// No room for the samples: writing them would end in SIGBUS.
     #[error(
-        "/dev/shm: {free_kib} KiB and {free_files} files are free; {needed_kib} KiB and {NEEDED_FILES} files are needed\nhint: delete what is left over there, or make it larger (a container: shm_size)"
+        "/dev/shm: {free_kib} KiB and {free_files} files are free; {needed_kib} KiB and {needed_files} files are needed\nhint: delete what is left over there, or make it larger (a container: shm_size)"
     )]
     Room {
         /// Free space, KiB.
@@ -71,6 +67,8 @@ pub enum TransportError {
         free_files: u64,
         /// Needed space, KiB.
         needed_kib: u64,
+        /// Needed files.
+        needed_files: u64,
     },
     /// Too few files may be open.
     #[error(
@@ -223,7 +221,7 @@ impl Deployment {
         let root =
             iceoryx2::prelude::Path::new(folder.as_os_str().as_encoded_bytes()).map_err(|_| path_error())?;
         config.global.set_root_path(&root);
-        let prefix = format!("{}{tag}_", self.prefix());
+        let prefix = self.prefix_of(generation);
         config.global.prefix = FileName::new(prefix.as_bytes()).map_err(|_| path_error())?;
         // Clearing up after the dead takes tens of milliseconds: only the owner does it.
         config.global.node.cleanup_dead_nodes_on_creation = false;
@@ -241,6 +239,16 @@ impl Deployment {
             .iter()
             .fold(0x811c_9dc5_u32, |hash, byte| (hash ^ u32::from(*byte)).wrapping_mul(0x0100_0193));
         format!("kort_{hash:08x}_")
+    }
+
+    /// Prefix of one generation's objects.
+    fn prefix_of(&self, generation: u64) -> String {
+        format!("{}{}_", self.prefix(), tag(generation))
+    }
+
+    /// Takes every page of one generation's shared memory, see [`room::reserve`].
+    pub(super) fn reserve(&self, generation: u64) -> Result<(), TransportError> {
+        room::reserve(&self.prefix_of(generation))
     }
 
     /// The file in which the supervisor notes what it watches, see [`super::Watched`].
@@ -280,7 +288,7 @@ impl Owner {
     /// # Errors
     /// [`TransportError`] if iceoryx2 or the file system refuses.
     pub fn create(&mut self, thrusters: &[&str]) -> Result<u64, TransportError> {
-        room_for(thrusters.len() as u64)?;
+        room::room_for_thrusters(thrusters.len() as u64)?;
         allow_files(thrusters.len() as u64)?;
         let generation = monotonic_ns();
         let node = self.deployment.node("owner", generation)?;
@@ -288,6 +296,7 @@ impl Owner {
             .iter()
             .map(|thruster| create_services(&node, thruster, generation))
             .collect::<Result<_, _>>()?;
+        self.deployment.reserve(generation)?;
         self.node = Some(node);
         let path = self.deployment.generation_file();
         let draft = self.deployment.beside("generation.new");
@@ -297,6 +306,14 @@ impl Owner {
             .and_then(|()| fs::rename(&draft, &path))
             .map_err(|error| TransportError::File { path, error })?;
         Ok(generation)
+    }
+
+    /// Could the services of so many thrusters be created afresh?
+    ///
+    /// # Errors
+    /// [`TransportError::Room`] if `/dev/shm` is too full for them.
+    pub fn has_room(&self, thrusters: usize) -> Result<(), TransportError> {
+        room::room_for_thrusters(thrusters as u64)
     }
 
     /// Frees what dead processes held. Takes tens of milliseconds for each of them.
@@ -376,19 +393,6 @@ fn nobody_else_may_replace(folder: &Path) -> Result<(), TransportError> {
                 about.mode() & 0o7777
             ),
         });
-    }
-    Ok(())
-}
-
-/// Has `/dev/shm` room for this many thrusters? Where that cannot be said, it has.
-fn room_for(thrusters: u64) -> Result<(), TransportError> {
-    let Ok(shm) = rustix::fs::statvfs("/dev/shm") else { return Ok(()) };
-    let free_kib = shm.f_bavail.saturating_mul(shm.f_frsize) / 1024;
-    // A file system that counts no files says zero of zero.
-    let free_files = if shm.f_files == 0 { u64::MAX } else { shm.f_favail };
-    let needed_kib = NEEDED_KIB * thrusters;
-    if free_kib < needed_kib || free_files < NEEDED_FILES {
-        return Err(TransportError::Room { free_kib, free_files, needed_kib });
     }
     Ok(())
 }

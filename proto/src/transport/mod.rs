@@ -4,6 +4,7 @@
 mod clock;
 mod deployment;
 mod ports;
+mod room;
 mod watched;
 
 pub use clock::{Ticker, monotonic_ns, ordinary, realtime};

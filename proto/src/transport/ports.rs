@@ -8,6 +8,7 @@ use iceoryx2::service::port_factory::{event, publish_subscribe};
 
 use super::clock::monotonic_ns;
 use super::deployment::{Deployment, TransportError};
+use super::room;
 use crate::messages::{Command, ControllerState, Message, Reply, Request, Setpoint, Telemetry};
 use crate::names::Stream;
 
@@ -85,8 +86,10 @@ pub fn create_services(
     })
 }
 
-/// Opens ports of one thruster in one generation.
+/// Opens ports of one thruster in one generation. What a port takes of shared memory is looked for before it is
+/// opened and reserved when it is, see [`room`].
 struct Opener<'a> {
+    deployment: &'a Deployment,
     node: &'a Node<ipc::Service>,
     thruster: &'a str,
     generation: u64,
@@ -104,12 +107,15 @@ impl Opener<'_> {
     }
 
     fn outbox<T: Message + ZeroCopySend>(&self, stream: Stream) -> Result<Outbox<T>, TransportError> {
+        // A sample for each place in each receiver's queue, and those in hand.
+        room::room_for((size_of::<T>() * MAX_PORTS * (stream.depth() + 4)) as u64)?;
         let publisher = self
             .open::<T>(stream)?
             .publisher_builder()
             .backpressure_strategy(BackpressureStrategy::DiscardData)
             .create()
             .map_err(|e| TransportError::iceoryx(format!("sending {}", stream.name()), e))?;
+        self.deployment.reserve(self.generation)?;
         Ok(Outbox { publisher, session: self.session, sequence: 0 })
     }
 
@@ -118,12 +124,15 @@ impl Opener<'_> {
         stream: Stream,
         depth: usize,
     ) -> Result<Inbox<T>, TransportError> {
+        // Two words for each place, one there and one back, with each sender.
+        room::room_for((2 * size_of::<u64>() * MAX_PORTS * (depth + stream.depth() + 64)) as u64)?;
         let subscriber = self
             .open::<T>(stream)?
             .subscriber_builder()
             .buffer_size(depth)
             .create()
             .map_err(|e| TransportError::iceoryx(format!("receiving {}", stream.name()), e))?;
+        self.deployment.reserve(self.generation)?;
         Ok(Inbox { subscriber })
     }
 
@@ -235,13 +244,13 @@ macro_rules! ports {
             ///
             /// # Errors
             /// [`TransportError::NoGeneration`] if nobody owns the deployment,
-            /// [`TransportError::Iceoryx`] if a service is not there or full.
+            /// [`TransportError::Room`] if `/dev/shm` is full, [`TransportError::Iceoryx`] if a service is not there or full.
             pub fn open(deployment: &Deployment, thruster: &str) -> Result<Self, TransportError> {
                 let generation = deployment.generation().ok_or_else(|| TransportError::NoGeneration {
                     root: deployment.root().to_path_buf(),
                 })?;
                 let node = deployment.node($node, generation)?;
-                let opener = Opener { node: &node, thruster, generation, session: monotonic_ns() };
+                let opener = Opener { deployment, node: &node, thruster, generation, session: monotonic_ns() };
                 $(let $field = { let $o = &opener; $make };)*
                 Ok(Self { $($field,)* generation, _node: node })
             }
