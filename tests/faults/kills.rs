@@ -13,7 +13,9 @@ use crate::table::Table;
 const LEASE_MS: u64 = 60_000;
 /// The bounds of docs/operations.md; a sample of the servo comes every 2 ms.
 const CONTROLLER: Duration = Duration::from_nanos(5 * PERIOD_NS);
-const GATEWAY: Duration = Duration::from_millis(500);
+/// The controller's part, at its ticks: the silence and the end of the ramp are each seen up to a period late, and the
+/// servo is stopped with the tick after.
+const GATEWAY: Duration = Duration::from_nanos(400_000_000 + 4 * PERIOD_NS);
 /// At once, or after many quick ends 2 s later.
 const SUCCESSOR: Duration = Duration::from_millis(3000);
 /// A process is silent for 2 s, is ended, and its successor starts.

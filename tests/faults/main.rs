@@ -14,7 +14,7 @@ mod sensors;
 mod shared_memory;
 mod table;
 
-use table::Table;
+use table::{Stalls, Table};
 
 /// Makes a fault, and notes what follows from it.
 type Fault = fn(&mut Table);
@@ -30,14 +30,16 @@ fn every_fault_ends_within_its_bound() {
     ];
     let only = std::env::var("KORT_FAULT_GROUPS").ok();
     let table = std::cell::RefCell::new(Table::default());
+    let stalls = Stalls::watch();
     for (name, faults) in groups {
         if only.as_ref().is_none_or(|only| only.split(',').any(|wanted| wanted == name)) {
             for fault in faults {
                 // Rows of a trial in which the machine stood still are dropped with it.
                 common::in_real_time(|| {
                     let mut rows = Table::default();
+                    stalls.take_ms();
                     fault(&mut rows);
-                    table.borrow_mut().append(rows);
+                    table.borrow_mut().append(rows, stalls.take_ms());
                 });
             }
         }
