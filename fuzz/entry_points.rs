@@ -52,7 +52,7 @@ pub fn deployment(text: &str) -> Result<(), String> {
     let rig = Rig::from_toml(RIG).expect("a sound rig");
     for (id, thruster) in &config.thrusters {
         kort_servo::settings::Settings::new(&config, id, thruster, &rig).map_err(|e| fail(e.to_string()))?;
-        kort_servo::amplifier::build(&config, id, thruster, &rig).map_err(|e| fail(e.to_string()))?;
+        kort_servo::drives::choose(&config, id, thruster, &rig).map_err(|e| fail(e.to_string()))?;
     }
     Ok(())
 }

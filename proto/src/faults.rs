@@ -22,7 +22,7 @@ pub enum Fault {
     SensorFrozen = 7,
     /// A sensor jumps faster than the thruster can move.
     SensorSpike = 8,
-    /// The drive reports a fault, or cannot be talked to.
+    /// The drive reports a fault of its own.
     AmplifierFault = 9,
     /// The supply is outside its band.
     SupplyOutOfRange = 10,
@@ -34,6 +34,14 @@ pub enum Fault {
     ControllerRestarted = 13,
     /// The servo ended while armed; its successor latches this at its start.
     ServoRestarted = 14,
+    /// The drive does not answer: unplugged, without power, or its answers are unreadable.
+    DriveLost = 15,
+    /// The drive was reset: what it had been told at its start is gone.
+    DriveRestarted = 16,
+    /// The drive's own time-out for a silent host is not confirmed.
+    DriveUnguarded = 17,
+    /// A sensor source that is required gives no readings.
+    SensorLost = 18,
     /// No word from the gateway within its time-out while armed.
     GatewayLost = 33,
     /// No telemetry from the servo within its time-out while armed.
@@ -46,7 +54,7 @@ pub enum Fault {
 
 impl Fault {
     /// Every fault, in the order of codes.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 22] = [
         Self::OverCurrent,
         Self::OverSpeed,
         Self::ThermalOverload,
@@ -61,6 +69,10 @@ impl Fault {
         Self::LoopStalled,
         Self::ControllerRestarted,
         Self::ServoRestarted,
+        Self::DriveLost,
+        Self::DriveRestarted,
+        Self::DriveUnguarded,
+        Self::SensorLost,
         Self::GatewayLost,
         Self::ServoLost,
         Self::ControlNotFinite,
@@ -94,6 +106,10 @@ impl Fault {
             Self::LoopStalled => "loop_stalled",
             Self::ControllerRestarted => "controller_restarted",
             Self::ServoRestarted => "servo_restarted",
+            Self::DriveLost => "drive_lost",
+            Self::DriveRestarted => "drive_restarted",
+            Self::DriveUnguarded => "drive_unguarded",
+            Self::SensorLost => "sensor_lost",
             Self::GatewayLost => "gateway_lost",
             Self::ServoLost => "servo_lost",
             Self::ControlNotFinite => "control_not_finite",
@@ -120,13 +136,27 @@ impl Fault {
                 "the shaft sensor stands still while the motor pulls: jammed shaft or dead sensor"
             }
             Self::SensorSpike => "a sensor jumped more than the thruster can move: check cable and shielding",
-            Self::AmplifierFault => "the drive reports a fault or does not answer: see its display or log",
+            Self::AmplifierFault => {
+                "the drive reports a fault of its own: see its display or the servo's log"
+            }
             Self::SupplyOutOfRange => "the supply voltage left its band: check battery, cable and charger",
             Self::OverTemperature => "the motor is too hot: let it cool, check cooling and load",
             Self::LoopStalled => "the servo's loop stood still: the machine is overloaded or was suspended",
             Self::ControllerRestarted => "the controller was replaced while armed: arm again",
             Self::ServoRestarted => {
                 "the servo ended while armed (killed, hung or the whole service died): see the event log, then clear and arm again"
+            }
+            Self::DriveLost => {
+                "the drive does not answer: check its cable, its power and `drive.port`; the servo's log says what was seen"
+            }
+            Self::DriveRestarted => {
+                "the drive was reset while in use: look for a supply that dips, then clear and arm"
+            }
+            Self::DriveUnguarded => {
+                "the drive's own time-out is not confirmed: the servo's log says why, docs/hardware.md how to set it"
+            }
+            Self::SensorLost => {
+                "a required sensor gives no readings: check its cable, its power and its `port` or `path`"
             }
             Self::GatewayLost => "the gateway stopped while armed: take the lease and arm again",
             Self::ServoLost => "the servo stopped sending telemetry: see its log",

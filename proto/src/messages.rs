@@ -306,6 +306,10 @@ message! { "kort.Telemetry",
         commands_stale: u64,
         /// Share of the I2t budget in use, 0 to 1.
         thermal_load: f64,
+        /// How old the newest reading of the shaft speed is at `time_ns`, ns.
+        shaft_age_ns: u64,
+        /// How long a reading of the shaft speed stands, ns; after that it is not measured.
+        shaft_life_ns: u64,
         /// Largest drive the servo takes, in the unit of the drive.
         drive_max: f64,
         /// The last stop that nobody asked for; all zero without one.

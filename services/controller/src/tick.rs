@@ -173,8 +173,10 @@ impl Tick {
             }
         }
         self.measured = Signals::from_values(held);
-        // A needed sensor that is gone must not look alive.
-        if !telemetry.signals.shaft_speed_rad_s.is_finite() {
+        // A needed sensor that is gone must not look alive; between readings of a drive on a wire it is not gone.
+        let life_ns = telemetry.shaft_life_ns;
+        let gone = life_ns == 0 || telemetry.shaft_age_ns > life_ns;
+        if gone && !telemetry.signals.shaft_speed_rad_s.is_finite() {
             self.measured.shaft_speed_rad_s = f64::NAN;
         }
     }

@@ -8,9 +8,8 @@ use kort_proto::signals::Signals;
 
 use crate::settings::Limits;
 
-/// Ticks a measured value must be bad in a row before it trips.
+/// Readings that must be bad in a row before a value trips.
 const OVER_TICKS: u32 = 2;
-const MISSING_TICKS: u32 = 3;
 const SUPPLY_TICKS: u32 = 10;
 /// Spikes within [`SPIKE_WINDOW`] ticks that trip.
 const SPIKES: u32 = 3;
@@ -23,12 +22,14 @@ pub struct Guard {
     dt_s: f64,
     over_current: u32,
     over_speed: u32,
-    missing: u32,
+    current_missing: u32,
+    speed_missing: u32,
     current_told: bool,
     supply: u32,
     spikes: u32,
     since_spike: u32,
     still_s: f64,
+    since_speed: u64,
     last_angle_rad: f64,
     last_speed_rad_s: f64,
     held_speed_rad_s: f64,
@@ -45,12 +46,14 @@ impl Guard {
             dt_s,
             over_current: 0,
             over_speed: 0,
-            missing: 0,
+            current_missing: 0,
+            speed_missing: 0,
             current_told: false,
             supply: 0,
             spikes: 0,
             since_spike: SPIKE_WINDOW,
             still_s: 0.0,
+            since_speed: 0,
             last_angle_rad: f64::NAN,
             last_speed_rad_s: f64::NAN,
             held_speed_rad_s: 0.0,
@@ -87,21 +90,27 @@ impl Guard {
             }
         };
 
-        // Needed sensors: hold the last value over a short gap. A drive with a speed loop of its own guards its
-        // current itself and need not tell it; one that has told it once must go on.
+        // Needed sensors: a drive on a wire shows a value every few ticks, and a gap is bridged with the last one
+        // for as long as a reading stands. A drive with a speed loop of its own guards its current itself and need
+        // not tell it; one that has told it once must go on.
         let told = measured.current_a.is_finite();
         self.current_told |= told;
         let needed = self.current_told || !matches!(l.kind, DriveKind::Speed | DriveKind::Duty);
-        let finite = (told || !needed) && measured.shaft_speed_rad_s.is_finite();
-        self.missing = if finite { 0 } else { self.missing.saturating_add(1) };
-        trip(Fault::SensorNotFinite, self.missing >= MISSING_TICKS);
+        let gap = |ticks: &mut u32, there: bool| {
+            *ticks = if there { 0 } else { ticks.saturating_add(1) };
+            *ticks >= l.missing_ticks
+        };
+        let no_current = gap(&mut self.current_missing, told || !needed);
+        let no_speed = gap(&mut self.speed_missing, measured.shaft_speed_rad_s.is_finite());
+        trip(Fault::SensorNotFinite, no_current || no_speed);
         if told {
             self.held_current_a = measured.current_a;
         }
 
         // A jump that the shaft cannot make is left out; several within a short time trip.
         let speed = measured.shaft_speed_rad_s;
-        let jump = (speed - self.last_speed_rad_s).abs() > l.spike_rad_s * ticks.max(1) as f64;
+        self.since_speed = self.since_speed.saturating_add(ticks.max(1));
+        let jump = (speed - self.last_speed_rad_s).abs() > l.spike_rad_s * self.since_speed as f64;
         self.since_spike = self.since_spike.saturating_add(1);
         if jump {
             self.spikes = if self.since_spike < SPIKE_WINDOW { self.spikes.saturating_add(1) } else { 1 };
@@ -114,27 +123,34 @@ impl Guard {
         // A shaft that shows no motion at all while the motor pulls.
         let angle = measured.shaft_angle_rad;
         let same_angle = angle == self.last_angle_rad || angle.is_nan();
+        let same_speed = speed == self.last_speed_rad_s || speed.is_nan();
         let pulls = drive.abs() > l.drive_max / 3.0;
-        self.still_s =
-            if pulls && same_angle && speed == self.last_speed_rad_s { self.still_s + dt } else { 0.0 };
+        self.still_s = if pulls && same_angle && same_speed { self.still_s + dt } else { 0.0 };
         trip(Fault::SensorFrozen, self.still_s > l.frozen_s);
         if angle.is_finite() {
             self.last_angle_rad = angle;
         }
         if speed.is_finite() {
             self.last_speed_rad_s = speed;
+            self.since_speed = 0;
         }
 
-        let count = |counter: &mut u32, on: bool| {
-            *counter = if on { counter.saturating_add(1) } else { 0 };
+        // What is counted is readings: a tick without one neither confirms the last nor clears it.
+        let count = |counter: &mut u32, read: f64, on: bool| {
+            if !read.is_nan() {
+                *counter = if on { counter.saturating_add(1) } else { 0 };
+            }
             *counter
         };
-        let n = count(&mut self.over_current, measured.current_a.abs() > l.trip_current_a);
+        let current = measured.current_a;
+        let n = count(&mut self.over_current, current, current.abs() > l.trip_current_a);
         trip(Fault::OverCurrent, n >= OVER_TICKS);
-        let n = count(&mut self.over_speed, self.held_speed_rad_s.abs() > l.trip_speed_rad_s);
+        let fast = self.held_speed_rad_s.abs() > l.trip_speed_rad_s;
+        let n = count(&mut self.over_speed, speed, fast);
         trip(Fault::OverSpeed, n >= OVER_TICKS);
         let (low, high) = l.supply_v;
-        let n = count(&mut self.supply, measured.supply_v < low || measured.supply_v > high);
+        let supply = measured.supply_v;
+        let n = count(&mut self.supply, supply, supply < low || supply > high);
         trip(Fault::SupplyOutOfRange, n >= SUPPLY_TICKS);
         trip(Fault::OverTemperature, measured.temperature_c > l.temperature_c);
 
@@ -211,6 +227,7 @@ mod tests {
             full_drive_s: 0.01,
             supply_v: (90.0, 140.0),
             temperature_c: 100.0,
+            missing_ticks: 3,
             frozen_s: 0.2,
             spike_rad_s: 20.0,
             winding: (f64::NAN, 1.2),
@@ -294,6 +311,36 @@ mod tests {
             }
         };
         assert_eq!(after(spiky, 200, 5.0), Fault::SensorSpike.bit());
+    }
+
+    /// A drive on a wire shows a reading every fifth tick: gaps are no fault, spikes are judged over the gap, and
+    /// what must be bad twice is bad in two readings, not in two ticks.
+    #[test]
+    fn sparse_readings_are_judged_by_reading() {
+        let run = |change: &dyn Fn(u32, &mut Signals)| {
+            let mut guard = Guard::new(Limits { missing_ticks: 20, spike_rad_s: 1.0, ..limits() }, 1e-3);
+            (0..500).fold(0, |seen, i| {
+                let mut s = if i % 5 == 0 { turning(i) } else { Signals::UNKNOWN };
+                change(i, &mut s);
+                seen | guard.inspect(&s, 5.0, 1)
+            })
+        };
+        assert_eq!(run(&|_, _| ()), 0);
+        let only = |at: u32, s: &mut Signals, change: &dyn Fn(&mut Signals)| {
+            if at == 100 {
+                change(s);
+            }
+        };
+        assert_eq!(run(&|i, s| only(i, s, &|s| s.current_a = 50.0)), 0, "one reading");
+        let rising = |i: u32, s: &mut Signals| s.shaft_speed_rad_s += f64::from(i.min(50)) * 0.9;
+        assert_eq!(run(&rising), 0, "4.5 rad/s in five ticks");
+        assert_eq!(run(&|_, s| s.shaft_angle_rad = s.shaft_angle_rad.min(1.0)), Fault::SensorFrozen.bit());
+        assert_eq!(
+            run(&|i, s| if i > 300 {
+                *s = Signals::UNKNOWN
+            }),
+            Fault::SensorNotFinite.bit()
+        );
     }
 
     #[test]

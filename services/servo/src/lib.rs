@@ -4,15 +4,17 @@
 //! deadline -> requests, newest command -> measure -> tick (guard) -> drive -> telemetry
 //! ```
 //!
-//! [`tick`] is the pure step, [`guard`] holds limits and trips, [`amplifier`] the drives; the
-//! process (feature `process`) adds the clock, real-time scheduling and shared memory. Once the
-//! loop runs it allocates nothing, takes no lock and has no path that panics; `tests/no_allocation.rs`
-//! counts, and says what iceoryx2 does when a sample is sent.
+//! [`tick`] is the pure step, [`guard`] holds limits and trips, [`drives`] and [`sensors`] are what
+//! hangs on wires, merged by [`devices`]; the process (feature `process`) adds the clock, real-time
+//! scheduling and shared memory. Once the loop runs it allocates nothing, takes no lock and has no path
+//! that panics; `tests/no_allocation.rs` counts, and says what iceoryx2 does when a sample is sent.
 
-pub mod amplifier;
+pub mod devices;
+pub mod drives;
 pub mod guard;
 #[cfg(feature = "process")]
 mod process;
+pub mod sensors;
 pub mod settings;
 pub mod tick;
 

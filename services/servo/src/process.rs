@@ -6,7 +6,6 @@ use std::time::Duration;
 
 use kort_proto::config::{Config, ConfigError};
 use kort_proto::messages::{Request, Trip};
-use kort_proto::signals::Signals;
 use kort_proto::transport::{
     Deployment, ServoPorts, Ticker, TransportError, monotonic_ns, ordinary, realtime,
 };
@@ -14,7 +13,8 @@ use kort_thruster::rig::Rig;
 use thiserror::Error;
 use tracing::{info, warn};
 
-use crate::amplifier::{self, Amplifier};
+use crate::devices::{At, Devices};
+use crate::drives;
 use crate::settings::Settings;
 use crate::tick::{Inputs, Servo};
 
@@ -65,7 +65,7 @@ pub fn check(config: &Config, id: &str) -> Result<(), ServoError> {
     let (file, text) = config.rig_text(id, thruster)?;
     let rig = Rig::from_toml(&text).map_err(|error| ServoError::Rig { file, error })?;
     Settings::new(config, id, thruster, &rig)?;
-    amplifier::build(config, id, thruster, &rig)?;
+    drives::choose(config, id, thruster, &rig)?;
     Ok(())
 }
 
@@ -85,7 +85,7 @@ pub fn run(
     let (file, text) = config.rig_text(id, thruster)?;
     let rig = Rig::from_toml(&text).map_err(|error| ServoError::Rig { file, error })?;
     let settings = Settings::new(config, id, thruster, &rig)?;
-    let mut amplifier = amplifier::build(config, id, thruster, &rig)?;
+    let drive = drives::choose(config, id, thruster, &rig)?;
     let stop = Arc::new(AtomicBool::new(false));
     for signal in END_SIGNALS {
         signal_hook::flag::register(signal, Arc::clone(&stop))?;
@@ -104,8 +104,11 @@ pub fn run(
         amplifier = thruster.amplifier,
         "servo runs, disarmed"
     );
+    let mut devices = Devices::new(drive.start(), Vec::new(), monotonic_ns());
+    let life_ns = devices.reading_life_ns();
+    let settings = settings.with_reading_life(life_ns);
     let servo = Servo::new(settings, monotonic_ns()).with_latched(inherited.latched, inherited.tripped);
-    tick_until_stopped(servo, amplifier.as_mut(), &mut ports, settings.period_ns, &stop);
+    tick_until_stopped(servo, &mut devices, &mut ports, settings.period_ns, &stop);
     info!(thruster = id, "servo ends, drive off");
     drop(ports);
     if let Some(owner) = owner {
@@ -117,27 +120,27 @@ pub fn run(
 /// The loop. From here on nothing of ours allocates, waits for another process or panics.
 fn tick_until_stopped(
     mut servo: Servo,
-    amplifier: &mut dyn Amplifier,
+    devices: &mut Devices,
     ports: &mut ServoPorts,
     period_ns: u64,
     stop: &AtomicBool,
 ) {
     let mut ticker = Ticker::new(period_ns);
+    let life_ns = devices.reading_life_ns();
     loop {
         let (deadline_ns, missed) = ticker.wait();
         let woke_ns = monotonic_ns();
         if stop.load(Ordering::Relaxed) {
             servo.stop();
         }
-        let mut measured = Signals::UNKNOWN;
-        let well = amplifier.measure(1 + missed, &mut measured).is_ok();
+        let shown = devices.show(At { now_ns: woke_ns, ticks: 1 + missed });
         let command = ports.command.latest();
         let inputs = Inputs {
             now_ns: woke_ns,
             ticks: 1 + missed,
             command: command.as_ref(),
-            measured: &measured,
-            amplifier_well: well,
+            measured: &shown.signals,
+            devices: shown.faults,
         };
         for _ in 0..REQUESTS_PER_TICK {
             let Some(request): Option<Request> = ports.request.next() else { break };
@@ -145,15 +148,17 @@ fn tick_until_stopped(
                 let _ = ports.reply.send(reply);
             }
         }
-        amplifier.drive(servo.tick(&inputs));
-        let mut telemetry = servo.telemetry(deadline_ns, &measured);
+        devices.drive(woke_ns, servo.tick(&inputs));
+        let mut telemetry = servo.telemetry(deadline_ns, &shown.signals);
+        telemetry.shaft_age_ns = shown.shaft_age_ns;
+        telemetry.shaft_life_ns = life_ns;
         telemetry.timing = ticker.timing;
         // A sample that cannot be sent is missed by its readers, who watch for that.
         let _ = ports.telemetry.send(telemetry);
         ports.waker.wake();
         ticker.worked(woke_ns);
         if stop.load(Ordering::Relaxed) {
-            amplifier.drive(None);
+            devices.drive(woke_ns, None);
             return;
         }
     }

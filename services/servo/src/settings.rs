@@ -5,6 +5,9 @@ use kort_proto::messages::DriveKind;
 use kort_thruster::rig::{AmplifierKind, Rig};
 use serde::Deserialize;
 
+/// Ticks without a needed reading that trip where every tick has one.
+const MISSING_TICKS: u32 = 3;
+
 /// Section `limits` as written.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -83,6 +86,8 @@ pub struct Limits {
     pub supply_v: (f64, f64),
     /// Motor temperature that trips, deg C.
     pub temperature_c: f64,
+    /// Ticks without a reading of current or shaft speed that trip.
+    pub missing_ticks: u32,
     /// Longest time the shaft sensor may stand still while the motor pulls, s.
     pub frozen_s: f64,
     /// Largest believable change of shaft speed in one tick, rad/s.
@@ -249,6 +254,7 @@ impl Settings {
                 keys.supply_high_v.unwrap_or(f64::INFINITY),
             ),
             temperature_c: keys.temperature_c.unwrap_or(f64::INFINITY),
+            missing_ticks: MISSING_TICKS,
             frozen_s: positive("checks.frozen_s", checks.frozen_s.unwrap_or(0.5))?,
             spike_rad_s: positive(
                 "checks.spike_rad_s",
@@ -277,5 +283,13 @@ impl Settings {
         // 3.5 of the controller's periods, so that zero torque is reached within five.
         let command_timeout_ns = thruster.controller_period_ns() * 7 / 2;
         Ok(Self { period_ns: thruster.servo_period_ns(), command_timeout_ns, limits })
+    }
+
+    /// With readings of the drive that stand for `life_ns`: one that tells more seldom than the loop asks.
+    pub fn with_reading_life(mut self, life_ns: u64) -> Self {
+        let ticks = u32::try_from(life_ns.div_ceil(self.period_ns.max(1))).unwrap_or(u32::MAX);
+        // Some ticks more, so that a device that falls silent is told by its own fault.
+        self.limits.missing_ticks = ticks.saturating_add(MISSING_TICKS);
+        self
     }
 }

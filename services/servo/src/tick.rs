@@ -21,6 +21,8 @@ pub struct Servo {
     armed: bool,
     armed_at_ns: u64,
     latched: u64,
+    /// Faults of drive and sensor sources whose cause is there now.
+    devices: u64,
     /// The last stop nobody asked for.
     tripped: Trip,
     /// What the shaft did last while armed; becomes `tripped` with the stop.
@@ -42,8 +44,8 @@ pub struct Inputs<'a> {
     pub command: Option<&'a Command>,
     /// What the sensors show.
     pub measured: &'a Signals,
-    /// The drive answers and reports no fault of its own.
-    pub amplifier_well: bool,
+    /// What drive and sensor sources report, bits of [`Fault`].
+    pub devices: u64,
 }
 
 impl Servo {
@@ -58,6 +60,7 @@ impl Servo {
             armed: false,
             armed_at_ns: 0,
             latched: 0,
+            devices: 0,
             tripped: Trip::default(),
             before: Trip::default(),
             limits: 0,
@@ -86,9 +89,8 @@ impl Servo {
     /// One tick. Returns the drive for the amplifier; `None` means output stage off.
     pub fn tick(&mut self, inputs: &Inputs) -> Option<f64> {
         let mut faults = self.guard.inspect(inputs.measured, self.drive, inputs.ticks);
-        if !inputs.amplifier_well {
-            faults |= Fault::AmplifierFault.bit();
-        }
+        faults |= inputs.devices;
+        self.devices = inputs.devices;
         if let Some(command) = inputs.command {
             faults |= self.take(command, inputs.now_ns);
         }
@@ -198,7 +200,7 @@ impl Servo {
             }
             RequestKind::ClearFaults => {
                 // What is latched and still there stays.
-                self.latched &= self.guard.active();
+                self.latched &= self.guard.active() | self.devices;
                 if self.latched == 0 {
                     answer(Outcome::Done, format_args!("no faults"))
                 } else {
@@ -276,6 +278,7 @@ mod tests {
                 full_drive_s: 0.001,
                 supply_v: (f64::NEG_INFINITY, f64::INFINITY),
                 temperature_c: f64::INFINITY,
+                missing_ticks: 3,
                 frozen_s: 10.0,
                 spike_rad_s: 1e9,
                 winding: (f64::NAN, 1.2),
@@ -318,7 +321,7 @@ mod tests {
                 ticks: 1,
                 command,
                 measured: &measured,
-                amplifier_well: true,
+                devices: 0,
             })
         }
 
@@ -403,7 +406,7 @@ mod tests {
             ticks: 30,
             command: Some(&command),
             measured: &measured,
-            amplifier_well: true,
+            devices: 0,
         };
         assert_eq!(bench.servo.tick(&inputs), None);
         assert_eq!(bench.servo.faults(), Fault::LoopStalled.bit());
@@ -413,10 +416,13 @@ mod tests {
             ticks: 1,
             command: None,
             measured: &measured,
-            amplifier_well: false,
+            devices: Fault::AmplifierFault.bit(),
         };
         assert_eq!(bench.servo.tick(&inputs), None);
         assert_eq!(bench.servo.faults(), Fault::AmplifierFault.bit());
+        assert_eq!(bench.ask(RequestKind::ClearFaults), Outcome::Refused, "the drive still says so");
+        bench.drive(0.0);
+        assert_eq!(bench.ask(RequestKind::ClearFaults), Outcome::Done);
     }
 
     #[test]

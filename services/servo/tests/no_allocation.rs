@@ -9,9 +9,9 @@ use std::cell::Cell;
 
 use kort_proto::config::Config;
 use kort_proto::messages::{Command, Request, RequestKind};
-use kort_proto::signals::Signals;
 use kort_proto::transport::{ControllerPorts, Deployment, GatewayPorts, ServoPorts, monotonic_ns};
-use kort_servo::amplifier;
+use kort_servo::devices::{At, Devices};
+use kort_servo::drives;
 use kort_servo::settings::Settings;
 use kort_servo::tick::{Inputs, Servo};
 use kort_thruster::rig::Rig;
@@ -45,7 +45,8 @@ fn the_loop_allocates_nothing_after_start() {
     let thruster = config.thruster("t1").unwrap();
     let rig = Rig::from_toml(&config.rig_text("t1", thruster).unwrap().1).unwrap();
     let settings = Settings::new(&config, "t1", thruster, &rig).unwrap();
-    let mut drive = amplifier::build(&config, "t1", thruster, &rig).unwrap();
+    let drive = drives::choose(&config, "t1", thruster, &rig).unwrap().start();
+    let mut devices = Devices::new(drive, Vec::new(), monotonic_ns());
     let folder = tempfile::tempdir().unwrap();
     let deployment = Deployment::new(Some(&folder.path().join("shm")));
     let mut owner = deployment.own().unwrap();
@@ -68,17 +69,22 @@ fn the_loop_allocates_nothing_after_start() {
             gateway.request.send(Request { id: i, kind: kind as u32, ..Request::default() }).unwrap();
         }
         let before = COUNT.with(Cell::get);
-        let mut measured = Signals::UNKNOWN;
-        let well = drive.measure(1, &mut measured).is_ok();
-        let command = ports.command.latest();
         let now_ns = monotonic_ns();
+        let shown = devices.show(At { now_ns, ticks: 1 });
+        let measured = shown.signals;
+        let command = ports.command.latest();
         let mut reply = None;
         while let Some(request) = ports.request.next() {
             reply = servo.request(&request, now_ns);
         }
-        let inputs =
-            Inputs { now_ns, ticks: 1, command: command.as_ref(), measured: &measured, amplifier_well: well };
-        drive.drive(servo.tick(&inputs));
+        let inputs = Inputs {
+            now_ns,
+            ticks: 1,
+            command: command.as_ref(),
+            measured: &measured,
+            devices: shown.faults,
+        };
+        devices.drive(now_ns, servo.tick(&inputs));
         let telemetry = servo.telemetry(now_ns, &measured);
         let sending = COUNT.with(Cell::get);
         let _ = ports.telemetry.send(telemetry);

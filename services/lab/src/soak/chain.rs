@@ -94,7 +94,7 @@ impl Chain for ProductionChain {
             ticks: 1,
             command: self.command.take().as_ref(),
             measured: &guarded,
-            amplifier_well: true,
+            devices: 0,
         });
         self.operate(alive, thrust_n);
         if alive {
@@ -180,6 +180,7 @@ fn settings(rig: &Rig, controller: &Controller, period_ns: u64) -> Settings {
             full_drive_s: 0.005,
             supply_v: (f64::NEG_INFINITY, f64::INFINITY),
             temperature_c: f64::INFINITY,
+            missing_ticks: 3,
             frozen_s: 0.5,
             spike_rad_s: 10.0 * fastest + 4.0 * model.speed_quantum_rad_s,
             winding: (model.winding_resistance_ohm.unwrap_or(f64::NAN), model.torque_constant_nm_a),

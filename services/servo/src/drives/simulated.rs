@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use kort_proto::config::{Config, ConfigError, Thruster};
+use kort_proto::faults::Fault;
 use kort_proto::messages::DriveKind;
 use kort_proto::signals::Signals;
 use kort_scenario::Measuring;
@@ -14,7 +15,8 @@ use kort_thruster::rig::{AmplifierKind, Rig, Sensors};
 use serde::Deserialize;
 
 use super::lying::{Lying, SensorFault};
-use super::{Amplifier, AmplifierFault};
+use super::{Drive, kind_of};
+use crate::devices::{At, Reading, Shown};
 
 /// Most ticks caught up at once after a stall; a longer one loses simulated time.
 const CATCH_UP: u64 = 50;
@@ -101,11 +103,7 @@ impl Simulated {
         let chosen: Vec<(&Descriptor, &[f64])> = chosen.iter().map(|(d, v)| (*d, v.as_slice())).collect();
         Ok(Self {
             plant: Plant::new(model, rig, &parameters, &chosen, tick_s).with_encoder_quantised(true),
-            kind: match rig.amplifier.kind {
-                AmplifierKind::Current => DriveKind::Current,
-                AmplifierKind::Voltage => DriveKind::Voltage,
-                AmplifierKind::Speed => DriveKind::Speed,
-            },
+            kind: kind_of(rig),
             command: 0.0,
             tick_s,
             time_s: 0.0,
@@ -117,13 +115,17 @@ impl Simulated {
     }
 }
 
-impl Amplifier for Simulated {
+impl Drive for Simulated {
     fn kind(&self) -> DriveKind {
         self.kind
     }
 
-    fn measure(&mut self, ticks: u64, into: &mut Signals) -> Result<(), AmplifierFault> {
-        for _ in 0..ticks.clamp(1, CATCH_UP) {
+    fn reading_life_ns(&self) -> u64 {
+        0
+    }
+
+    fn show(&mut self, at: At) -> Shown {
+        for _ in 0..at.ticks.clamp(1, CATCH_UP) {
             self.plant.step(&Tick {
                 time_s: self.time_s,
                 command: self.command,
@@ -132,13 +134,27 @@ impl Amplifier for Simulated {
             });
             self.time_s += self.tick_s;
         }
+        let mut signals = Signals::UNKNOWN;
         let truth = self.plant.truth();
-        if !(truth.shaft_speed_rad_s.is_finite()
-            && truth.current_a.is_finite()
-            && truth.axial_m_s.is_finite())
-        {
-            return Err(AmplifierFault);
+        let well =
+            truth.shaft_speed_rad_s.is_finite() && truth.current_a.is_finite() && truth.axial_m_s.is_finite();
+        if well {
+            self.read(&mut signals);
         }
+        Shown {
+            reading: Some(Reading { stamp_ns: at.now_ns, signals }),
+            faults: if well { 0 } else { Fault::AmplifierFault.bit() },
+        }
+    }
+
+    fn drive(&mut self, _: u64, drive: Option<f64>) {
+        self.command = drive.unwrap_or(0.0);
+    }
+}
+
+impl Simulated {
+    /// Reads the stand's sensors.
+    fn read(&mut self, into: &mut Signals) {
         let read = self.measuring.read(self.time_s, &self.plant.sensed());
         // A drive with a speed loop of its own tells no current; nothing of it is modelled either.
         if self.kind != DriveKind::Speed {
@@ -159,11 +175,6 @@ impl Amplifier for Simulated {
         if let Some(lying) = &mut self.lying {
             lying.distort(self.time_s, into);
         }
-        Ok(())
-    }
-
-    fn drive(&mut self, drive: Option<f64>) {
-        self.command = drive.unwrap_or(0.0);
     }
 }
 

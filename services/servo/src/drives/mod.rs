@@ -1,0 +1,72 @@
+//! Drives. One drive, one file, behind one trait; the loop knows no hardware.
+
+mod lying;
+pub mod simulated;
+
+use kort_proto::config::{Config, ConfigError, Thruster};
+use kort_proto::messages::DriveKind;
+use kort_thruster::rig::{AmplifierKind, Rig};
+
+use crate::devices::{At, Shown};
+
+pub use simulated::Simulated;
+
+/// A drive: takes commands, and tells what it measures itself.
+///
+/// Both [`show`](Self::show) and [`drive`](Self::drive) happen once a tick, in this order; neither may wait,
+/// allocate or panic. Dropping a drive must switch its output off, and real hardware must have a time-out of its
+/// own for a host that goes silent.
+pub trait Drive {
+    /// Unit of the drive.
+    fn kind(&self) -> DriveKind;
+
+    /// How long a reading stands before silence is `drive_lost`, ns; zero: every tick has one.
+    fn reading_life_ns(&self) -> u64;
+
+    /// What it shows at this tick.
+    fn show(&mut self, at: At) -> Shown;
+
+    /// Sets the drive, in the unit of [`Self::kind`]; `None` switches the output stage off.
+    fn drive(&mut self, now_ns: u64, drive: Option<f64>);
+}
+
+/// A drive as the configuration describes it; nothing is opened yet.
+pub enum Chosen {
+    /// A model of the rig in real time.
+    Simulated(Box<Simulated>),
+}
+
+/// Names of the drives, as `amplifier` gives them.
+pub const ALL: [&str; 1] = ["simulated"];
+
+/// Reads what the configuration says of the drive.
+///
+/// # Errors
+/// [`ConfigError`] names the kinds there are.
+pub fn choose(config: &Config, id: &str, thruster: &Thruster, rig: &Rig) -> Result<Chosen, ConfigError> {
+    match thruster.amplifier.as_str() {
+        "simulated" => Ok(Chosen::Simulated(Box::new(Simulated::new(config, id, thruster, rig)?))),
+        other => Err(config.error(format!(
+            "`thrusters.{id}.amplifier` = \"{other}\" is no drive\nhint: known are \"{}\"",
+            ALL.join("\", \"")
+        ))),
+    }
+}
+
+impl Chosen {
+    /// Starts it.
+    pub fn start(self) -> Box<dyn Drive> {
+        match self {
+            Self::Simulated(drive) => drive,
+        }
+    }
+}
+
+/// Unit of the drive that the rig's amplifier is.
+pub fn kind_of(rig: &Rig) -> DriveKind {
+    match rig.amplifier.kind {
+        AmplifierKind::Current => DriveKind::Current,
+        AmplifierKind::Voltage => DriveKind::Voltage,
+        AmplifierKind::Speed => DriveKind::Speed,
+    }
+}
