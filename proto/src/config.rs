@@ -64,8 +64,14 @@ pub struct Transport {
 pub struct Thruster {
     /// Rig description, relative to the file.
     pub rig: PathBuf,
-    /// Which drive: only `simulated` so far.
+    /// Which drive: `simulated`, or the kind of a real one.
     pub amplifier: String,
+    /// The real drive's wire and settings, read by the servo.
+    #[serde(default)]
+    pub drive: Table,
+    /// Sources of measurements beside the drive by name, read by the servo.
+    #[serde(default)]
+    pub sensors: BTreeMap<String, Table>,
     /// The simulated stand, read by the servo.
     #[serde(default)]
     pub simulation: Table,

@@ -11,6 +11,7 @@ use kort_proto::messages::Telemetry;
 use kort_proto::transport::Deployment;
 use serde_json::{Value, json};
 
+pub mod bench;
 mod watch;
 #[allow(unused_imports)]
 pub use watch::{Watch, at_zero};
@@ -298,7 +299,7 @@ impl Stack {
     }
 
     /// Takes the lease, clears, arms and asks for a thrust.
-    fn command(&mut self, newton: f64, ttl_ms: u64) {
+    pub fn command(&mut self, newton: f64, ttl_ms: u64) {
         let lease = wait("the lease", || {
             if self.leases.contains_key(self.thruster) {
                 self.http("DELETE", "/lease", None)?;

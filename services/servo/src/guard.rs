@@ -260,36 +260,17 @@ mod tests {
         assert_eq!(after(|_, _| {}, 2000, 5.0), 0);
         // A shaft at rest without drive, and one bad sample of each kind, are no faults.
         assert_eq!(after(|_, s| s.shaft_angle_rad = 1.0, 2000, 0.0), 0);
-        assert_eq!(
-            after(
-                |i, s| if i == 7 {
-                    s.shaft_speed_rad_s = f64::NAN
-                },
-                100,
-                5.0
-            ),
-            0
-        );
-        assert_eq!(
-            after(
-                |i, s| if i == 7 {
-                    s.current_a = 50.0
-                },
-                100,
-                5.0
-            ),
-            0
-        );
-        assert_eq!(
-            after(
-                |i, s| if i == 7 {
-                    s.supply_v = 0.0
-                },
-                100,
-                5.0
-            ),
-            0
-        );
+        let once = |change: fn(&mut Signals)| {
+            let change = move |i, s: &mut Signals| {
+                if i == 7 {
+                    change(s);
+                }
+            };
+            after(change, 100, 5.0)
+        };
+        assert_eq!(once(|s| s.shaft_speed_rad_s = f64::NAN), 0);
+        assert_eq!(once(|s| s.current_a = 50.0), 0);
+        assert_eq!(once(|s| s.supply_v = 0.0), 0);
     }
 
     #[test]

@@ -12,6 +12,7 @@
 pub mod devices;
 pub mod drives;
 pub mod guard;
+pub mod link;
 #[cfg(feature = "process")]
 mod process;
 pub mod sensors;

@@ -15,6 +15,7 @@ use tracing::{info, warn};
 
 use crate::devices::{At, Devices};
 use crate::drives;
+use crate::sensors;
 use crate::settings::Settings;
 use crate::tick::{Inputs, Servo};
 
@@ -51,6 +52,9 @@ pub enum ServoError {
     /// Shared memory.
     #[error(transparent)]
     Transport(#[from] TransportError),
+    /// No thread or descriptor for a device.
+    #[error("a device cannot be served: {0}")]
+    Device(std::io::Error),
     /// Signals cannot be watched.
     #[error("signals cannot be watched: {0}")]
     Signals(#[from] std::io::Error),
@@ -66,6 +70,7 @@ pub fn check(config: &Config, id: &str) -> Result<(), ServoError> {
     let rig = Rig::from_toml(&text).map_err(|error| ServoError::Rig { file, error })?;
     Settings::new(config, id, thruster, &rig)?;
     drives::choose(config, id, thruster, &rig)?;
+    sensors::choose(config, id, thruster)?;
     Ok(())
 }
 
@@ -86,6 +91,7 @@ pub fn run(
     let rig = Rig::from_toml(&text).map_err(|error| ServoError::Rig { file, error })?;
     let settings = Settings::new(config, id, thruster, &rig)?;
     let drive = drives::choose(config, id, thruster, &rig)?;
+    let sensors = sensors::choose(config, id, thruster)?;
     let stop = Arc::new(AtomicBool::new(false));
     for signal in END_SIGNALS {
         signal_hook::flag::register(signal, Arc::clone(&stop))?;
@@ -104,7 +110,10 @@ pub fn run(
         amplifier = thruster.amplifier,
         "servo runs, disarmed"
     );
-    let mut devices = Devices::new(drive.start(), Vec::new(), monotonic_ns());
+    let priority = thruster.servo.priority;
+    let drive = drive.start(id, priority).map_err(ServoError::Device)?;
+    let sensors: Result<_, _> = sensors.into_iter().map(|sensor| sensor.start(id, priority)).collect();
+    let mut devices = Devices::new(drive, sensors.map_err(ServoError::Device)?, monotonic_ns());
     let life_ns = devices.reading_life_ns();
     let settings = settings.with_reading_life(life_ns);
     let servo = Servo::new(settings, monotonic_ns()).with_latched(inherited.latched, inherited.tripped);

@@ -45,7 +45,7 @@ fn the_loop_allocates_nothing_after_start() {
     let thruster = config.thruster("t1").unwrap();
     let rig = Rig::from_toml(&config.rig_text("t1", thruster).unwrap().1).unwrap();
     let settings = Settings::new(&config, "t1", thruster, &rig).unwrap();
-    let drive = drives::choose(&config, "t1", thruster, &rig).unwrap().start();
+    let drive = drives::choose(&config, "t1", thruster, &rig).unwrap().start("t1", 0).unwrap();
     let mut devices = Devices::new(drive, Vec::new(), monotonic_ns());
     let folder = tempfile::tempdir().unwrap();
     let deployment = Deployment::new(Some(&folder.path().join("shm")));

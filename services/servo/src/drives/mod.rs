@@ -2,14 +2,20 @@
 
 mod lying;
 pub mod simulated;
+pub mod vesc;
+mod wired;
 
 use kort_proto::config::{Config, ConfigError, Thruster};
 use kort_proto::messages::DriveKind;
 use kort_thruster::rig::{AmplifierKind, Rig};
 
 use crate::devices::{At, Shown};
+#[cfg(feature = "process")]
+use crate::link::{Link, Protocol};
 
 pub use simulated::Simulated;
+pub use vesc::Vesc;
+pub use wired::Wired;
 
 /// A drive: takes commands, and tells what it measures itself.
 ///
@@ -34,10 +40,12 @@ pub trait Drive {
 pub enum Chosen {
     /// A model of the rig in real time.
     Simulated(Box<Simulated>),
+    /// A VESC on a serial port or USB.
+    Vesc(Vesc),
 }
 
 /// Names of the drives, as `amplifier` gives them.
-pub const ALL: [&str; 1] = ["simulated"];
+pub const ALL: [&str; 2] = ["simulated", "vesc"];
 
 /// Reads what the configuration says of the drive.
 ///
@@ -46,6 +54,7 @@ pub const ALL: [&str; 1] = ["simulated"];
 pub fn choose(config: &Config, id: &str, thruster: &Thruster, rig: &Rig) -> Result<Chosen, ConfigError> {
     match thruster.amplifier.as_str() {
         "simulated" => Ok(Chosen::Simulated(Box::new(Simulated::new(config, id, thruster, rig)?))),
+        "vesc" => Ok(Chosen::Vesc(Vesc::new(config, id, thruster, rig)?)),
         other => Err(config.error(format!(
             "`thrusters.{id}.amplifier` = \"{other}\" is no drive\nhint: known are \"{}\"",
             ALL.join("\", \"")
@@ -53,12 +62,18 @@ pub fn choose(config: &Config, id: &str, thruster: &Thruster, rig: &Rig) -> Resu
     }
 }
 
+#[cfg(feature = "process")]
 impl Chosen {
-    /// Starts it.
-    pub fn start(self) -> Box<dyn Drive> {
-        match self {
-            Self::Simulated(drive) => drive,
-        }
+    /// Opens and starts it; `priority` is the loop's.
+    ///
+    /// # Errors
+    /// No thread or no descriptor is to be had. A device that is not there is a fault, not an error.
+    pub fn start(self, id: &str, priority: i32) -> std::io::Result<Box<dyn Drive>> {
+        let (wired, kind, protocol): (_, _, Box<dyn Protocol>) = match self {
+            Self::Simulated(drive) => return Ok(drive),
+            Self::Vesc(vesc) => (vesc.wired.clone(), vesc.kind, Box::new(vesc::Protocol::new(vesc))),
+        };
+        Ok(Box::new(Link::start(wired.wire(id, priority), kind, protocol)?))
     }
 }
 

@@ -1,9 +1,18 @@
 //! Sources of measurements beside the drive: a force cell, an encoder, a flow meter on wires of their own.
 //! One kind, one file; [`Devices`](crate::devices::Devices) merges what they show by the signal table.
 
+pub mod iio;
+#[cfg(feature = "process")]
+mod polled;
+pub mod serial_line;
+mod settings;
+mod units;
+
 use kort_proto::signals::SIGNALS;
 
 use crate::devices::{At, Shown};
+
+pub use settings::{Chosen, Kind, choose};
 
 /// Something that measures.
 pub trait Source {
@@ -23,6 +32,26 @@ pub struct Sensor {
     pub required: bool,
     /// When its newest reading came, on CLOCK_MONOTONIC, ns.
     pub read_ns: u64,
+}
+
+/// Which part of a source is which signal, and what its numbers mean.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Channel<F> {
+    /// The part: a column, a file.
+    pub from: F,
+    /// Place of the signal in the table.
+    pub place: usize,
+    /// SI units in one of the source's; negative where it points the other way.
+    pub scale: f64,
+    /// Value at the source's zero, SI.
+    pub offset: f64,
+}
+
+impl<F> Channel<F> {
+    /// A number of the source in SI.
+    pub fn si(&self, value: f64) -> f64 {
+        value * self.scale + self.offset
+    }
 }
 
 /// Place of a signal in the table.

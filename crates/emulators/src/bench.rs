@@ -1,0 +1,238 @@
+//! Any device on a pseudo terminal, served by a thread, with a wire that can be spoiled.
+
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use crate::pty::Pty;
+
+/// How often the device lives.
+const STEP: Duration = Duration::from_micros(500);
+
+/// A device at the far end of a wire.
+pub trait Device: Send {
+    /// Takes bytes as they come; its answers, a frame each.
+    fn hear(&mut self, now_s: f64, bytes: &[u8]) -> Vec<Vec<u8>>;
+
+    /// Lives on to this instant: own time-out, motor, shaft. What it says unasked.
+    fn live(&mut self, now_s: f64) -> Vec<Vec<u8>>;
+
+    /// Its supply was cut and came back: everything that it does not store is forgotten.
+    fn restart(&mut self, now_s: f64);
+
+    /// It reports this fault of its own from now on, in its own code; zero: none.
+    fn report(&mut self, code: u32);
+
+    /// What is true at its motor.
+    fn truth(&self) -> Truth;
+}
+
+/// What is true at the motor.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Truth {
+    /// What the power stage is asked for, in the amplifier's unit.
+    pub command: f64,
+    /// Motor current, A.
+    pub current_a: f64,
+    /// Shaft speed, rad/s.
+    pub shaft_speed_rad_s: f64,
+    /// Thrust, N.
+    pub thrust_n: f64,
+}
+
+/// What happens to the wire.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Mischief {
+    /// Nothing.
+    #[default]
+    None,
+    /// The plug is pulled.
+    Unplugged,
+    /// Answers are lost.
+    Silent,
+    /// Noise instead of answers.
+    Garbage,
+    /// Only the first half of each answer arrives.
+    Truncated,
+    /// A bit of each answer is turned on the way.
+    Flipped,
+    /// The last answer before arrives instead of each new one.
+    Stale,
+    /// Answers arrive in pieces of one to three bytes; nothing is lost.
+    Split,
+    /// Noise between the answers; nothing is lost.
+    Noisy,
+}
+
+#[derive(Default)]
+struct Shared {
+    mischief: Mischief,
+    restart: bool,
+    report: Option<u32>,
+    ending: bool,
+    truth: Truth,
+    /// The last instant at which the power stage was asked for something.
+    driven: Option<Instant>,
+    heard: u64,
+}
+
+/// A device, running.
+pub struct Bench {
+    folder: tempfile::TempDir,
+    shared: Arc<Mutex<Shared>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Bench {
+    /// Starts the device.
+    ///
+    /// # Errors
+    /// No pseudo terminal is to be had.
+    pub fn start(device: impl Device + 'static) -> std::io::Result<Self> {
+        let folder = tempfile::tempdir()?;
+        let shared = Arc::new(Mutex::new(Shared::default()));
+        let pty = Pty::new(&folder.path().join("port"))?;
+        let (link, theirs) = (folder.path().join("port"), Arc::clone(&shared));
+        let thread = std::thread::Builder::new()
+            .name("emulator".into())
+            .spawn(move || Serving { device, link, shared: theirs, last: Vec::new(), dice: 1 }.run(pty))?;
+        Ok(Self { folder, shared, thread: Some(thread) })
+    }
+
+    /// The device's name, which stays when it is plugged in again.
+    pub fn port(&self) -> PathBuf {
+        self.folder.path().join("port")
+    }
+
+    /// Spoils the wire from now on, or mends it.
+    pub fn spoil(&self, mischief: Mischief) {
+        self.lock().mischief = mischief;
+    }
+
+    /// Cuts the device's supply for a moment.
+    pub fn restart(&self) {
+        self.lock().restart = true;
+    }
+
+    /// Has the device report a fault of its own; zero: none any more.
+    pub fn report(&self, code: u32) {
+        self.lock().report = Some(code);
+    }
+
+    /// What is true at the motor.
+    pub fn truth(&self) -> Truth {
+        self.lock().truth
+    }
+
+    /// When the power stage was asked for something last.
+    pub fn driven(&self) -> Option<Instant> {
+        self.lock().driven
+    }
+
+    /// Bytes that reached the device so far.
+    pub fn heard(&self) -> u64 {
+        self.lock().heard
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Shared> {
+        self.shared.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Drop for Bench {
+    fn drop(&mut self) {
+        self.lock().ending = true;
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+struct Serving<D> {
+    device: D,
+    link: PathBuf,
+    shared: Arc<Mutex<Shared>>,
+    /// The last frame sent unspoiled.
+    last: Vec<u8>,
+    dice: u32,
+}
+
+impl<D: Device> Serving<D> {
+    fn run(mut self, pty: Pty) {
+        let began = Instant::now();
+        let mut pty = Some(pty);
+        loop {
+            std::thread::sleep(STEP);
+            let now_s = began.elapsed().as_secs_f64();
+            let (mischief, restart, report) = {
+                let mut shared = self.shared.lock().unwrap_or_else(PoisonError::into_inner);
+                if shared.ending {
+                    return;
+                }
+                (shared.mischief, std::mem::take(&mut shared.restart), shared.report.take())
+            };
+            if restart {
+                self.device.restart(now_s);
+            }
+            if let Some(code) = report {
+                self.device.report(code);
+            }
+            if mischief == Mischief::Unplugged {
+                if pty.take().is_some() {
+                    let _ = std::fs::remove_file(&self.link);
+                }
+            } else if pty.is_none() {
+                pty = Pty::new(&self.link).ok();
+            }
+            let bytes = pty.as_ref().map(Pty::read).unwrap_or_default();
+            let mut said = self.device.hear(now_s, &bytes);
+            said.extend(self.device.live(now_s));
+            if let Some(pty) = &pty {
+                for frame in said {
+                    self.send(pty, frame, mischief);
+                }
+            }
+            let mut shared = self.shared.lock().unwrap_or_else(PoisonError::into_inner);
+            shared.truth = self.device.truth();
+            shared.heard += bytes.len() as u64;
+            if shared.truth.command != 0.0 {
+                shared.driven = Some(Instant::now());
+            }
+        }
+    }
+
+    fn send(&mut self, pty: &Pty, mut frame: Vec<u8>, mischief: Mischief) {
+        match mischief {
+            Mischief::Unplugged | Mischief::Silent => return,
+            Mischief::Garbage => frame.iter_mut().for_each(|byte| *byte = self.dice()),
+            Mischief::Truncated => frame.truncate(frame.len() / 2),
+            Mischief::Flipped => {
+                let at = usize::from(self.dice()) % frame.len().max(1);
+                if let Some(byte) = frame.get_mut(at) {
+                    *byte ^= 1 << (self.dice() % 7);
+                }
+            }
+            Mischief::Stale => frame.clone_from(&self.last),
+            Mischief::Noisy => pty.write(&[self.dice() | 0x80, self.dice() | 0x80]),
+            Mischief::None | Mischief::Split => self.last.clone_from(&frame),
+        }
+        if mischief == Mischief::Split {
+            let mut rest = frame.as_slice();
+            while !rest.is_empty() {
+                let (piece, after) = rest.split_at((1 + usize::from(self.dice() % 3)).min(rest.len()));
+                pty.write(piece);
+                std::thread::sleep(Duration::from_micros(100));
+                rest = after;
+            }
+        } else {
+            pty.write(&frame);
+        }
+    }
+
+    /// A byte by chance (a linear congruence), the same in every run.
+    fn dice(&mut self) -> u8 {
+        self.dice = self.dice.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (self.dice >> 24) as u8
+    }
+}

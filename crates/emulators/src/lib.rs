@@ -1,0 +1,17 @@
+//! Drives and instruments on pseudo terminals, for tests.
+//!
+//! Each is written from the protocol's public description and shares no code with kort's drivers: its framing, its check sums
+//! and its text are its own. Behind each a simulated thruster turns in real time, with the drive's own limits, quantisation and
+//! time-out. [`Bench`] is the same for all: it carries bytes, and spoils them when a test asks for it.
+//!
+//! What an emulator cannot show: the timing of USB and of a real UART (bytes arrive at once), a real power stage, and
+//! whatever a firmware does that its description does not say.
+
+mod bench;
+mod pty;
+mod stand;
+pub mod vesc;
+
+pub use bench::{Bench, Device, Mischief, Truth};
+pub use stand::Stand;
+pub use vesc::Vesc;

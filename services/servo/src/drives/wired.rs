@@ -1,0 +1,138 @@
+//! What every drive on a wire is told in the section `drive` of its thruster.
+
+use std::path::PathBuf;
+
+use kort_proto::config::{Config, ConfigError, Thruster};
+use serde::Deserialize;
+
+/// Section `drive` as written.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct Keys {
+    port: PathBuf,
+    baud: u32,
+    rate_hz: f64,
+    timeout_ms: f64,
+    reading_life_ms: f64,
+    reversed: bool,
+    identity: String,
+    pole_pairs: Option<u32>,
+}
+
+impl Default for Keys {
+    fn default() -> Self {
+        Self {
+            port: PathBuf::new(),
+            baud: 115_200,
+            rate_hz: 200.0,
+            timeout_ms: 100.0,
+            reading_life_ms: 50.0,
+            reversed: false,
+            identity: String::new(),
+            pole_pairs: None,
+        }
+    }
+}
+
+/// A drive on a wire, as the configuration describes it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Wired {
+    /// The device.
+    pub port: PathBuf,
+    /// Bits a second; an USB device takes any.
+    pub baud: u32,
+    /// Exchanges a second: a command, and a question for the measurements.
+    pub rate_hz: f64,
+    /// Longest time-out of the drive itself that is accepted, and the one it is given, s.
+    pub timeout_s: f64,
+    /// How long a reading stands before its absence is `drive_lost`, ns.
+    pub reading_life_ns: u64,
+    /// The motor is wired, or the propeller cut, the other way round: command, current, speed and angle change sign.
+    pub reversed: bool,
+    /// Serial number of the one drive that is meant; empty takes any.
+    pub identity: String,
+    /// Pole pairs of the motor, for drives that tell electrical speed.
+    pub pole_pairs: Option<u32>,
+}
+
+impl Wired {
+    /// Reads and checks the section.
+    ///
+    /// # Errors
+    /// [`ConfigError`] names key, value and what is allowed.
+    pub fn new(config: &Config, id: &str, thruster: &Thruster) -> Result<Self, ConfigError> {
+        let section = format!("thrusters.{id}.drive");
+        let keys: Keys = config.section(&section, &thruster.drive)?;
+        let fail = |key: &str, words: String| Err(config.error(format!("`{section}.{key}` {words}")));
+        if keys.port.as_os_str().is_empty() {
+            return fail(
+                "port",
+                "is missing\nhint: the drive's device, best by its serial number: /dev/serial/by-id/…".into(),
+            );
+        }
+        for (key, value, low, high, hint) in [
+            ("baud", f64::from(keys.baud), 1200.0, 12_000_000.0, "115200; an USB device takes any"),
+            (
+                "rate_hz",
+                keys.rate_hz,
+                10.0,
+                thruster.servo.rate_hz,
+                "200; at most the servo's rate and what the wire carries",
+            ),
+            ("timeout_ms", keys.timeout_ms, 20.0, 1000.0, "100: torque outlives a broken cable by this time"),
+            (
+                "reading_life_ms",
+                keys.reading_life_ms,
+                5.0,
+                1000.0,
+                "50: three answers and more may be lost in it",
+            ),
+        ] {
+            if !(low..=high).contains(&value) {
+                return fail(key, format!("= {value} is outside {low} to {high}\nhint: {hint}"));
+            }
+        }
+        let period_ms = 1e3 / keys.rate_hz;
+        for (key, value) in [("timeout_ms", keys.timeout_ms), ("reading_life_ms", keys.reading_life_ms)] {
+            if value < 3.0 * period_ms {
+                return fail(
+                    key,
+                    format!(
+                        "= {value} is less than three exchanges at rate_hz = {}\nhint: {} or more, or a faster exchange",
+                        keys.rate_hz,
+                        3.0 * period_ms
+                    ),
+                );
+            }
+        }
+        Ok(Self {
+            port: keys.port,
+            baud: keys.baud,
+            rate_hz: keys.rate_hz,
+            timeout_s: keys.timeout_ms * 1e-3,
+            reading_life_ns: (keys.reading_life_ms * 1e6) as u64,
+            reversed: keys.reversed,
+            identity: keys.identity.to_ascii_lowercase(),
+            pole_pairs: keys.pole_pairs,
+        })
+    }
+
+    /// The wire as its thread is told it. The thread stands just below the loop that it serves.
+    #[cfg(feature = "process")]
+    pub fn wire(self, id: &str, priority: i32) -> crate::link::Wire {
+        crate::link::Wire {
+            name: format!("drive of {id}"),
+            port: self.port,
+            baud: self.baud,
+            rate_hz: self.rate_hz,
+            reading_life_ns: self.reading_life_ns,
+            priority: if priority > 0 { (priority - 1).max(1) } else { 0 },
+            is_drive: true,
+        }
+    }
+
+    /// Sign between the thruster's ahead and the drive's.
+    pub fn sign(&self) -> f64 {
+        if self.reversed { -1.0 } else { 1.0 }
+    }
+}

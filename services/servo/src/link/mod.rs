@@ -1,0 +1,52 @@
+//! A device on a wire, served by a thread of its own: the tick leaves its newest command in one lock-free
+//! slot and finds the newest reading in another, and never waits for a device.
+//!
+//! What is said on the wire is a [`Protocol`]: pure, fed with bytes, one file a device. The thread here is
+//! the same for all: it opens the port (again and again while it is not there), has the protocol confirm the
+//! drive's own time-out, and from then on exchanges a command and a question at the link's rate. A command is
+//! sent once: a servo that stands still feeds nothing, and the drive's time-out takes the torque away.
+
+#[cfg(feature = "process")]
+mod port;
+#[cfg(feature = "process")]
+mod thread;
+#[cfg(feature = "process")]
+mod wire;
+
+use kort_proto::signals::Signals;
+
+#[cfg(feature = "process")]
+pub use wire::{Link, Wire};
+
+/// What a protocol heard.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Heard {
+    /// Who answers, in words.
+    Known(String),
+    /// A whole answer with its measurements.
+    Reading(Signals),
+    /// What the device says of itself changed: its fault in words, or none any more.
+    Fault(Option<String>),
+    /// The device was reset.
+    Restarted,
+    /// The device is the right one and its own time-out is as it must be; the words say so.
+    Guarded(String),
+    /// It is not, and why.
+    Unguarded(String),
+}
+
+/// What is said on a wire. Pure: no clock, no port, no panic on any bytes.
+pub trait Protocol: Send {
+    /// A new conversation: the port was just opened, or the device reset.
+    fn begin(&mut self);
+
+    /// What to say next until the device is known and its time-out confirmed; called some times a second. What
+    /// stays unanswered is heard too.
+    fn ask(&mut self, out: &mut Vec<u8>, heard: &mut dyn FnMut(Heard));
+
+    /// One exchange: the command (`None`: output off), and the question for the measurements.
+    fn tell(&mut self, drive: Option<f64>, out: &mut Vec<u8>);
+
+    /// Takes bytes as they come, split and joined at will.
+    fn hear(&mut self, bytes: &[u8], heard: &mut dyn FnMut(Heard));
+}

@@ -1,0 +1,229 @@
+//! The thread behind a wire.
+
+use std::io;
+use std::os::fd::OwnedFd;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use kort_proto::faults::Fault;
+use kort_proto::transport::{monotonic_ns, ordinary, realtime};
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use tracing::{info, warn};
+use triple_buffer::{Input, Output};
+
+use super::port::Port;
+use super::wire::{Command, Told, Wire};
+use super::{Heard, Protocol};
+
+/// Pause before a port that could not be opened, or was lost, is tried again.
+const AGAIN: Duration = Duration::from_millis(250);
+/// Pause between two questions on the way to a confirmed time-out.
+const ASK_AGAIN: Duration = Duration::from_millis(100);
+/// Longest wait without bytes and without a tick.
+const LONGEST_WAIT_NS: i64 = 20_000_000;
+
+pub(super) struct Serving {
+    wire: Wire,
+    protocol: Box<dyn Protocol>,
+    commands: Output<Command>,
+    tell: Input<Told>,
+    told: Told,
+    waker: Arc<OwnedFd>,
+    ending: Arc<AtomicBool>,
+    /// Said last, so that what lasts is said once.
+    complaint: String,
+    /// The device has said something since the port was opened.
+    answered: bool,
+    driving: bool,
+    /// When its time-out was confirmed, on CLOCK_MONOTONIC, ns.
+    guarded_ns: u64,
+}
+
+impl Serving {
+    pub(super) fn new(
+        wire: Wire,
+        protocol: Box<dyn Protocol>,
+        commands: Output<Command>,
+        tell: Input<Told>,
+        waker: Arc<OwnedFd>,
+        ending: Arc<AtomicBool>,
+    ) -> Self {
+        Self {
+            wire,
+            protocol,
+            commands,
+            tell,
+            told: Told::NOTHING,
+            waker,
+            ending,
+            complaint: String::new(),
+            answered: false,
+            driving: false,
+            guarded_ns: 0,
+        }
+    }
+
+    pub(super) fn run(mut self) {
+        if self.wire.priority > 0 {
+            // What is not permitted the loop's own thread has said.
+            let _ = realtime(self.wire.priority, false);
+        } else {
+            ordinary();
+        }
+        while !self.ending.load(Ordering::Relaxed) {
+            let done = Port::open(&self.wire.port, self.wire.baud).and_then(|mut port| self.serve(&mut port));
+            if let Err(error) = done {
+                let port = self.wire.port.display();
+                self.complain(format!(
+                    "{port}: {error}\nhint: is it plugged in, powered, free, and may this user read and write it?"
+                ));
+                self.lost();
+                std::thread::sleep(AGAIN);
+            }
+        }
+    }
+
+    /// The port is gone.
+    fn lost(&mut self) {
+        self.answered = false;
+        self.driving = false;
+        self.told.guarded = false;
+        self.told.faults = if self.wire.is_drive { Fault::DriveLost.bit() } else { 0 };
+        self.tell.write(self.told);
+    }
+
+    /// Talks until the port is lost or the servo ends.
+    fn serve(&mut self, port: &mut Port) -> io::Result<()> {
+        let mut bytes = [0; 1024];
+        let mut out = Vec::with_capacity(1024);
+        let period = Duration::from_secs_f64(1.0 / self.wire.rate_hz);
+        let (mut next, mut ask_next) = (Instant::now(), Instant::now());
+        self.begin();
+        self.driving = false;
+        loop {
+            if self.ending.load(Ordering::Relaxed) {
+                out.clear();
+                self.protocol.tell(None, &mut out);
+                return port.send(&out);
+            }
+            self.wait(port)?;
+            let n = port.read(&mut bytes)?;
+            self.hear(bytes.get(..n).unwrap_or_default());
+            let silent_ns = monotonic_ns().saturating_sub(self.told.stamp_ns.max(self.guarded_ns));
+            if self.told.guarded && silent_ns > self.wire.reading_life_ns {
+                // Whoever answers next may have been reset, or be another one.
+                self.begin();
+            }
+            // An instrument hears no commands; it is asked at its own rate.
+            let ticked = self.commands.update() || !self.wire.is_drive;
+            let command = *self.commands.output_buffer();
+            let now = Instant::now();
+            out.clear();
+            if !self.told.guarded {
+                if std::mem::take(&mut self.driving) {
+                    // Perhaps it still hears, though it is not heard: off.
+                    self.protocol.tell(None, &mut out);
+                } else if now >= ask_next {
+                    ask_next = now + ASK_AGAIN;
+                    self.converse(|protocol, heard| protocol.ask(&mut out, heard));
+                }
+            } else if ticked && !port.is_behind() {
+                // Off goes out at once, whatever the rate.
+                let off = self.driving && command.drive.is_none();
+                if now >= next || off {
+                    next = (next + period).max(now);
+                    self.driving = command.drive.is_some();
+                    self.protocol.tell(command.drive, &mut out);
+                }
+            }
+            port.send(&out)?;
+        }
+    }
+
+    fn begin(&mut self) {
+        self.protocol.begin();
+        self.answered = false;
+        self.told.guarded = false;
+    }
+
+    /// Sleeps until bytes come, the loop ticks, or some time passes.
+    fn wait(&self, port: &Port) -> io::Result<()> {
+        let interest = if port.is_behind() { PollFlags::IN | PollFlags::OUT } else { PollFlags::IN };
+        let mut both = [PollFd::new(port, interest), PollFd::new(&*self.waker, PollFlags::IN)];
+        let longest_ns = if self.wire.is_drive {
+            LONGEST_WAIT_NS
+        } else {
+            LONGEST_WAIT_NS.min((1e9 / self.wire.rate_hz) as i64)
+        };
+        let longest = Timespec { tv_sec: 0, tv_nsec: longest_ns };
+        match poll(&mut both, Some(&longest)) {
+            Ok(_) | Err(rustix::io::Errno::INTR) => (),
+            Err(error) => return Err(error.into()),
+        }
+        let _ = rustix::io::read(&*self.waker, &mut [0; 8]);
+        Ok(())
+    }
+
+    /// Has the protocol read, and leaves for the tick what it made of it.
+    fn hear(&mut self, bytes: &[u8]) {
+        if bytes.is_empty() {
+            return;
+        }
+        self.converse(|protocol, heard| protocol.hear(bytes, heard));
+    }
+
+    fn converse(&mut self, talk: impl FnOnce(&mut dyn Protocol, &mut dyn FnMut(Heard))) {
+        let Self { protocol, wire, told, answered, complaint, guarded_ns, .. } = self;
+        let mut restarted = false;
+        talk(protocol.as_mut(), &mut |heard| match heard {
+            Heard::Known(words) => {
+                info!("{}: {words}", wire.name);
+                *answered = true;
+            }
+            Heard::Reading(signals) => {
+                told.readings = told.readings.wrapping_add(1);
+                told.stamp_ns = monotonic_ns();
+                told.signals = signals;
+            }
+            Heard::Fault(Some(words)) => {
+                warn!("{}: {words}", wire.name);
+                told.faults |= Fault::AmplifierFault.bit();
+            }
+            Heard::Fault(None) => told.faults &= !Fault::AmplifierFault.bit(),
+            Heard::Restarted => {
+                warn!("{} was reset", wire.name);
+                told.restarts = told.restarts.wrapping_add(1);
+                restarted = true;
+            }
+            Heard::Guarded(words) => {
+                info!("{}: {words}", wire.name);
+                told.guarded = true;
+                *guarded_ns = monotonic_ns();
+                complaint.clear();
+            }
+            Heard::Unguarded(words) => {
+                told.guarded = false;
+                if *complaint != words {
+                    warn!("{}: {words}", wire.name);
+                    *complaint = words;
+                }
+            }
+        });
+        if restarted {
+            self.begin();
+            self.answered = true;
+        }
+        let unguarded = self.wire.is_drive && self.answered && !self.told.guarded;
+        let kept = self.told.faults & Fault::AmplifierFault.bit();
+        self.told.faults = kept | if unguarded { Fault::DriveUnguarded.bit() } else { 0 };
+        self.tell.write(self.told);
+    }
+
+    fn complain(&mut self, words: String) {
+        if self.complaint != words {
+            warn!("{}: {words}", self.wire.name);
+            self.complaint = words;
+        }
+    }
+}

@@ -1,0 +1,148 @@
+//! The tick's end of a wire.
+
+use std::os::fd::OwnedFd;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use kort_proto::faults::Fault;
+use kort_proto::messages::DriveKind;
+use kort_proto::signals::Signals;
+use rustix::event::{EventfdFlags, eventfd};
+use triple_buffer::{Input, Output, triple_buffer};
+
+use super::{Protocol, thread};
+use crate::devices::{At, Reading, Shown};
+use crate::drives::Drive;
+use crate::sensors::Source;
+
+/// How long the start waits for a device that is there to answer in full; without it the servo starts all the
+/// same, with the fault shown.
+const PATIENCE: Duration = Duration::from_secs(1);
+
+/// How the wire is used.
+#[derive(Clone, Debug)]
+pub struct Wire {
+    /// For the log, for example "t1's drive".
+    pub name: String,
+    /// The device.
+    pub port: PathBuf,
+    /// Bits a second.
+    pub baud: u32,
+    /// Exchanges a second.
+    pub rate_hz: f64,
+    /// How long a reading stands, ns.
+    pub reading_life_ns: u64,
+    /// SCHED_FIFO priority of the thread; zero leaves the scheduler alone.
+    pub priority: i32,
+    /// It answers to commands; a mere instrument speaks by itself.
+    pub is_drive: bool,
+}
+
+/// Newest command of the tick.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Command {
+    pub(super) drive: Option<f64>,
+}
+
+/// Newest word of the device.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Told {
+    pub(super) readings: u64,
+    pub(super) stamp_ns: u64,
+    pub(super) signals: Signals,
+    pub(super) faults: u64,
+    pub(super) restarts: u32,
+    pub(super) guarded: bool,
+}
+
+impl Told {
+    pub(super) const NOTHING: Self =
+        Self { readings: 0, stamp_ns: 0, signals: Signals::UNKNOWN, faults: 0, restarts: 0, guarded: false };
+}
+
+/// The tick's end of a wire.
+pub struct Link {
+    kind: DriveKind,
+    life_ns: u64,
+    commands: Input<Command>,
+    told: Output<Told>,
+    seen: Told,
+    waker: Arc<OwnedFd>,
+    ending: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Link {
+    /// Starts the thread, and waits for a device that answers at once.
+    ///
+    /// # Errors
+    /// No thread or no descriptor is to be had.
+    pub fn start(wire: Wire, kind: DriveKind, protocol: Box<dyn Protocol>) -> std::io::Result<Self> {
+        let (commands, newest) = triple_buffer(&Command { drive: None });
+        let (tell, told) = triple_buffer(&Told::NOTHING);
+        let waker = Arc::new(eventfd(0, EventfdFlags::NONBLOCK | EventfdFlags::CLOEXEC)?);
+        let ending = Arc::new(AtomicBool::new(false));
+        let life_ns = wire.reading_life_ns;
+        let serving =
+            thread::Serving::new(wire, protocol, newest, tell, Arc::clone(&waker), Arc::clone(&ending));
+        let thread = std::thread::Builder::new().name("device".into()).spawn(move || serving.run())?;
+        let mut link =
+            Self { kind, life_ns, commands, told, seen: Told::NOTHING, waker, ending, thread: Some(thread) };
+        let end = std::time::Instant::now() + PATIENCE;
+        while !link.told.read().guarded && std::time::Instant::now() < end {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        Ok(link)
+    }
+
+    fn newest(&mut self) -> Shown {
+        let told = *self.told.read();
+        let new = told.readings != self.seen.readings;
+        let restarted = told.restarts != self.seen.restarts;
+        self.seen = told;
+        Shown {
+            reading: new.then_some(Reading { stamp_ns: told.stamp_ns, signals: told.signals }),
+            faults: told.faults | if restarted { Fault::DriveRestarted.bit() } else { 0 },
+        }
+    }
+}
+
+impl Drive for Link {
+    fn kind(&self) -> DriveKind {
+        self.kind
+    }
+
+    fn reading_life_ns(&self) -> u64 {
+        self.life_ns
+    }
+
+    fn show(&mut self, _: At) -> Shown {
+        self.newest()
+    }
+
+    fn drive(&mut self, _: u64, drive: Option<f64>) {
+        self.commands.write(Command { drive });
+        // A full counter wakes as well as one that grew.
+        let _ = rustix::io::write(&*self.waker, &1u64.to_ne_bytes());
+    }
+}
+
+impl Source for Link {
+    fn show(&mut self, _: At) -> Shown {
+        self.newest()
+    }
+}
+
+impl Drop for Link {
+    /// The thread switches the output off before it ends.
+    fn drop(&mut self) {
+        self.ending.store(true, Ordering::Relaxed);
+        let _ = rustix::io::write(&*self.waker, &1u64.to_ne_bytes());
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}

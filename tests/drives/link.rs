@@ -1,0 +1,235 @@
+//! What is asked of every drive on a wire, whatever it speaks.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use kort_emulators::{Bench as Emulator, Mischief};
+use kort_proto::faults::Fault;
+use kort_proto::messages::{Command, Outcome, RequestKind, Telemetry};
+
+use crate::common::bench::Bench;
+use serde_json::json;
+
+use crate::common::{PERIOD_NS, Site, Stack, kill, wait};
+
+/// Added to every bound: what a machine shared with others may hold a process up.
+const SLACK: Duration = Duration::from_nanos(2 * PERIOD_NS);
+
+/// How long a reading stands in these tests, longer than by default: emulators have no priority.
+const LIFE_MS: u64 = 150;
+/// One deployment at a time: emulators beside each other would hold each other up.
+static ALONE: Mutex<()> = Mutex::new(());
+
+/// Waits until no other test runs a deployment.
+pub fn alone() -> MutexGuard<'static, ()> {
+    ALONE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// One kind of drive under test.
+pub struct Case {
+    /// Name in `amplifier`.
+    pub kind: &'static str,
+    /// Keys of `drive` beside its port.
+    pub keys: &'static str,
+    /// Drive that makes the shaft turn, in the unit of the drive.
+    pub drive: f64,
+    /// The command that carries it.
+    pub command: Command,
+}
+
+impl Case {
+    /// A servo on this drive.
+    pub fn servo(&self, emulator: &Emulator) -> Bench {
+        let mut bench = Bench::start_at(self.site(emulator));
+        bench.zero = self.command;
+        bench
+    }
+
+    pub fn site(&self, emulator: &Emulator) -> Site {
+        let keys = format!("port = {:?}, reading_life_ms = {LIFE_MS}, {}", emulator.port(), self.keys);
+        Site::new().with_drive(self.kind, &keys)
+    }
+
+    fn driving(&self) -> Command {
+        Command { drive: self.drive, ..self.command }
+    }
+
+    /// The whole service: lease, arm, a thrust, a recording whose columns tell what is true.
+    pub fn serves(&self, emulator: &Emulator) {
+        const THRUST_N: f64 = 60.0;
+        let mut stack = Stack::start_at(self.site(emulator));
+        let recordings = "/v1/recordings";
+        let agent: ureq::Agent = ureq::Agent::config_builder().http_status_as_error(false).build().into();
+        let url = format!("http://127.0.0.1:{}{recordings}", stack.site.port);
+        let started = agent.post(&url).send_json(json!({"name": self.kind, "rate_hz": 500})).unwrap();
+        assert_eq!(started.status(), 201);
+        stack.command(THRUST_N, 60_000);
+        wait("the thrust", || {
+            let truth = emulator.truth();
+            ((truth.thrust_n - THRUST_N).abs() < 0.2 * THRUST_N).then_some(())
+        });
+        std::thread::sleep(Duration::from_secs(2));
+        let (truth, state) = (emulator.truth(), stack.state().expect("a state"));
+        agent.delete(&url).call().unwrap();
+        let told = |name: &str| state["measured"][name].as_f64().unwrap_or(f64::NAN);
+        for (name, truth) in [("shaft_speed_rad_s", truth.shaft_speed_rad_s), ("current_a", truth.current_a)]
+        {
+            assert!(
+                (told(name) - truth).abs() < 0.1 * truth.abs() + 0.1,
+                "{name}: {} for {truth}",
+                told(name)
+            );
+        }
+        let csv = stack.text(&format!("{recordings}/{}?format=csv", self.kind)).expect("the recording");
+        let mut lines = csv.lines().map(|line| line.split(',').collect::<Vec<_>>());
+        let head = lines.next().expect("a head");
+        let at = |name: &str| head.iter().position(|column| *column == name).expect("a column");
+        let (time, speed) = (at("time_s"), at("shaft_speed_rad_s"));
+        let rows: Vec<(f64, Option<f64>)> =
+            lines.map(|cells| (cells[time].parse().expect("a time"), cells[speed].parse().ok())).collect();
+        // Between two answers of the drive nothing was sampled, and the cell says so.
+        let sampled: Vec<f64> = rows.iter().filter_map(|row| row.1).collect();
+        let seconds = rows.last().expect("rows").0 - rows[0].0;
+        let rate_hz = sampled.len() as f64 / seconds;
+        assert!((50.0..=205.0).contains(&rate_hz), "{rate_hz} readings a second, asked for 200");
+        let last = sampled.last().expect("readings");
+        assert!(
+            (last - truth.shaft_speed_rad_s).abs() < 0.1 * truth.shaft_speed_rad_s,
+            "{last} for {truth:?}"
+        );
+    }
+
+    /// Arms, and drives until the shaft turns; a machine that held somebody up trips it, and it is armed again.
+    pub fn turn(&self, bench: &mut Bench, emulator: &Emulator) {
+        let end = Instant::now() + Duration::from_secs(20);
+        loop {
+            let armed = self.drive_for(bench, 10).last().is_some_and(|row| row.armed != 0);
+            if armed && emulator.truth().command != 0.0 && emulator.truth().shaft_speed_rad_s > 2.0 {
+                return;
+            }
+            assert!(Instant::now() < end, "the shaft does not turn: {:?}", emulator.truth());
+            if !armed && bench.ask(RequestKind::ClearFaults).0 == Outcome::Done {
+                bench.arm();
+            }
+        }
+    }
+
+    /// Sends the driving command for some servo ticks.
+    pub fn drive_for(&self, bench: &mut Bench, ticks: usize) -> Vec<Telemetry> {
+        bench.send(ticks, |ports, _| ports.command.send(self.driving()).unwrap())
+    }
+
+    /// The motor is at zero within the bound and stays there, the fault is latched, nothing resumes; mended, it
+    /// takes a clear and an arm to drive again.
+    pub fn ends_at_zero(
+        &self,
+        bench: &mut Bench,
+        emulator: &Emulator,
+        faults: &[Fault],
+        bound: Duration,
+        cause: impl Fn(),
+        mend: impl Fn(),
+    ) {
+        let any: u64 = faults.iter().map(|fault| fault.bit()).sum();
+        // A machine that holds the emulator up for longer than a reading stands has lost it the drive: once more.
+        let took = (0..3).find_map(|_| {
+            self.turn(bench, emulator);
+            self.drive_for(bench, 100);
+            let began = Instant::now();
+            cause();
+            let trip = |row: &Telemetry| row.armed == 0;
+            let last = wait("the servo to trip", || self.drive_for(bench, 10).into_iter().find(trip));
+            if last.faults & any == 0 {
+                assert_eq!(last.faults, Fault::DriveLost.bit(), "not one of {faults:?}");
+                mend();
+                return None;
+            }
+            wait("zero at the motor", || {
+                self.drive_for(bench, 5);
+                (emulator.truth().command == 0.0).then_some(())
+            });
+            Some(emulator.driven().expect("it drove").saturating_duration_since(began))
+        });
+        let took = took.unwrap_or_else(|| panic!("never one of {faults:?}"));
+        println!("{} {faults:?}: zero at the motor after {} ms", self.kind, took.as_millis());
+        assert!(took <= bound + SLACK, "{took:?} beyond {bound:?}");
+        mend();
+        // A controller that goes on commanding is not followed, mended or not.
+        let driven = emulator.driven();
+        self.drive_for(bench, 200);
+        assert_eq!(emulator.driven(), driven, "it drove again by itself");
+        wait("the fault to be cleared", || {
+            (bench.ask(RequestKind::ClearFaults).0 == Outcome::Done).then_some(())
+        });
+        self.drive_for(bench, 20);
+        assert_eq!(emulator.driven(), driven, "it drove again, cleared but not armed");
+        self.turn(bench, emulator);
+    }
+
+    /// Everything that can happen to a wire.
+    pub fn endures_its_wire(&self, emulator: &Emulator, timeout: Duration, frozen: Duration) {
+        let mut bench = self.servo(emulator);
+        // A reading's life, and some exchanges.
+        let silence = Duration::from_millis(LIFE_MS + 30);
+        for (mischief, fault, bound) in [
+            (Mischief::Silent, Fault::DriveLost, silence),
+            (Mischief::Garbage, Fault::DriveLost, silence),
+            (Mischief::Truncated, Fault::DriveLost, silence),
+            (Mischief::Flipped, Fault::DriveLost, silence),
+            (Mischief::Stale, Fault::SensorFrozen, frozen),
+            (Mischief::Unplugged, Fault::DriveLost, timeout),
+        ] {
+            println!("{mischief:?}");
+            self.ends_at_zero(
+                &mut bench,
+                emulator,
+                &[fault],
+                bound,
+                || emulator.spoil(mischief),
+                || emulator.spoil(Mischief::None),
+            );
+        }
+        // What loses nothing stops nothing.
+        for mischief in [Mischief::Split, Mischief::Noisy] {
+            let read = (0..3).find_map(|_| {
+                self.turn(&mut bench, emulator);
+                emulator.spoil(mischief);
+                let rows = self.drive_for(&mut bench, 300);
+                emulator.spoil(Mischief::None);
+                let read = rows.iter().filter(|row| row.signals.shaft_speed_rad_s.is_finite()).count();
+                rows.iter().all(|row| row.faults == 0).then_some(read as f64 / rows.len() as f64)
+            });
+            let read = read.unwrap_or_else(|| panic!("{mischief:?} is no fault"));
+            assert!(read > 0.05, "{mischief:?}: readings in {read} of the ticks");
+        }
+    }
+
+    /// A servo that is killed or stands still: the drive's own time-out ends it.
+    pub fn outlives_its_servo(&self, emulator: &Emulator, timeout: Duration) {
+        for signal in ["STOP", "KILL"] {
+            let mut bench = self.servo(emulator);
+            self.turn(&mut bench, emulator);
+            let began = Instant::now();
+            kill(bench.servo.id(), signal);
+            wait("zero at the motor", || (emulator.truth().command == 0.0).then_some(()));
+            let took = emulator.driven().expect("it drove").saturating_duration_since(began);
+            println!("{} SIG{signal}: zero at the motor after {} ms", self.kind, took.as_millis());
+            assert!(took <= timeout + SLACK, "SIG{signal}: {took:?} beyond {timeout:?}");
+            kill(bench.servo.id(), "KILL");
+        }
+    }
+
+    /// Its own time-out cannot be confirmed: nobody arms it.
+    pub fn cannot_be_armed(&self, emulator: &Emulator, words: &str) {
+        let mut bench = self.servo(emulator);
+        let log = wait("the reason", || Some(bench.site.log()).filter(|log| log.contains(words)));
+        assert!(log.contains("hint:"), "{log}");
+        bench.send(20, |ports, _| ports.command.send(self.command).unwrap());
+        let (outcome, answer) = bench.ask(RequestKind::Arm);
+        assert_eq!(outcome, Outcome::Refused, "{answer}");
+        assert!(answer.contains("drive_unguarded (code 17)"), "{answer}");
+        bench.send(20, |ports, _| ports.command.send(self.command).unwrap());
+        assert_eq!(bench.ask(RequestKind::ClearFaults).0, Outcome::Refused);
+        assert!(emulator.driven().is_none(), "it was driven");
+    }
+}
