@@ -133,16 +133,19 @@ pub fn promises(problem: &Problem, parent: &Fit, known: &[DMatrix<f64>], probes:
 
 fn of_probe(problem: &Problem, parent: &Fit, known: &[DMatrix<f64>], probe: &Probe) -> Option<Promise> {
     let specs = (probe.member.effect.parameters)(&problem.scale);
-    probe
-        .member
-        .effect
-        .forms(&specs)
+    // Forms of the same sizes differ in their shapes, about which a size alone tells nothing: all of them are
+    // free until the fit has shown which it needs ([`Search`](crate::search::Search) narrows them).
+    let mut forms: Vec<(Vec<usize>, Vec<usize>)> = Vec::new();
+    for form in probe.member.effect.forms(&specs) {
+        let sizes: Vec<usize> =
+            (0..probe.sizes.len()).filter(|k| form.contains(&probe.sizes[*k].0)).collect();
+        match forms.iter_mut().find(|(_, known)| *known == sizes) {
+            Some((places, _)) => places.extend(form),
+            None => forms.push((form, sizes)),
+        }
+    }
+    forms
         .into_iter()
-        .map(|form| {
-            let sizes: Vec<usize> =
-                (0..probe.sizes.len()).filter(|k| form.contains(&probe.sizes[*k].0)).collect();
-            (form, sizes)
-        })
         .filter(|(_, sizes)| !sizes.is_empty() || probe.always.is_some())
         .filter_map(|(form, sizes)| of_form(problem, parent, known, probe, &form, &sizes))
         .min_by(|a, b| a.cost.total_cmp(&b.cost))

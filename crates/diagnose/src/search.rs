@@ -128,6 +128,7 @@ impl<'a, 'p> Search<'a, 'p> {
             }
             next = self.swap(next, progress);
             next = self.backward(next);
+            self.narrow(&next);
             if self.cost(&next) >= self.cost(&best) - 1e-9 {
                 return best;
             }
@@ -178,6 +179,42 @@ impl<'a, 'p> Search<'a, 'p> {
                 return best;
             }
             best = better;
+        }
+    }
+
+    /// Fits a set anew with each member in its narrower forms: shapes that the data do not speak of stay at their
+    /// prior means. The cheapest is kept.
+    fn narrow(&mut self, set: &Set) {
+        let Some(from) = self.fits.get(set) else { return };
+        let members = self.problem.members(&from.hypothesis, &from.values);
+        let mut tried: Vec<Vec<Member>> = Vec::new();
+        for (k, member) in members.iter().enumerate() {
+            let specs = (member.effect.parameters)(&self.problem.scale);
+            let free = |j: &usize| !member.held.contains(j);
+            let now: Vec<usize> = (0..specs.len()).filter(free).collect();
+            for form in member.effect.forms(&specs) {
+                if form.len() >= now.len() || !form.iter().all(free) {
+                    continue;
+                }
+                let mut narrower = member.clone();
+                for j in now.iter().filter(|j| !form.contains(j)) {
+                    narrower.held.push(*j);
+                    narrower.values[*j] = if specs[*j].shape { specs[*j].mean } else { 0.0 };
+                }
+                let mut all = members.clone();
+                all[k] = narrower;
+                tried.push(all);
+            }
+        }
+        let fitted: Vec<Fit> = tried
+            .par_iter()
+            .map(|members| {
+                let (hypothesis, columns) = self.problem.recompose(from, members);
+                self.problem.settle(&hypothesis, &columns, &from.actions, ITERATIONS)
+            })
+            .collect();
+        for fit in fitted {
+            self.keep(set.clone(), fit);
         }
     }
 

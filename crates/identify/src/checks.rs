@@ -3,6 +3,7 @@
 use kort_thruster::rig::Rig;
 
 use crate::data::Series;
+use crate::gaps::GAP_INTERVALS;
 
 /// What the checks found: words for the report, and rows to leave out.
 #[derive(Clone, Debug, Default)]
@@ -17,8 +18,6 @@ pub struct Checked {
 const FROZEN_ROWS: usize = 40;
 /// A spike stands out of its neighbours by this many times their usual distance.
 const SPIKE_RATIO: f64 = 40.0;
-/// Usual intervals from row to row beyond which rows are missing.
-const GAP_INTERVALS: f64 = 3.5;
 /// Share of the largest command that counts as a step of it.
 const STEP_SHARE: f64 = 0.05;
 /// A gap longer than this may hide changes of the drive, s.

@@ -13,19 +13,20 @@ use crate::simulate::Problem;
 
 /// Rows after an edge that decide where it was.
 const WINDOW_ROWS: usize = 12;
+/// Places tried for a step that fell into a gap of the log.
+const MOST_PLACES: usize = 24;
 
 impl Problem<'_> {
     /// The command with its steps where they suit a fit best; none if that is where they are.
     pub fn place_edges(&self, fit: &Fit) -> Option<Inputs> {
         let movable =
-            |r: &Prepared| r.driving != Driving::Speed && !r.edges.is_empty() && r.ticks_per_row > 1;
-        let most = self.recordings.iter().filter(|r| movable(r)).map(|r| r.ticks_per_row).max()?;
+            |r: &Prepared| r.driving != Driving::Speed && r.edges.iter().any(|row| r.ticks_before(*row) > 1);
+        let places = self.recordings.iter().filter(|r| movable(r)).map(Prepared::places).max()?;
         let level = self.levels(fit);
         // Cost of every edge for every tick it may lie on, all edges moved together.
-        let costs: Vec<Vec<Vec<f64>>> = (0..most)
-            .map(|ticks| {
-                let edges =
-                    self.recordings.iter().map(|r| vec![ticks.min(r.ticks_per_row - 1); r.edges.len()]);
+        let costs: Vec<Vec<Vec<f64>>> = (0..places)
+            .map(|place| {
+                let edges = self.recordings.iter().map(|r| r.edges_at(place));
                 let inputs = Arc::new(Inputs::new(&self.recordings, edges.collect()));
                 let residual = self.residual(&Hypothesis { inputs, ..fit.hypothesis.clone() }, &fit.values);
                 let of = |(r, one): (usize, &Prepared)| edge_costs(one, &residual[r], &level[r]);
@@ -35,9 +36,9 @@ impl Problem<'_> {
         let mut edges = fit.hypothesis.inputs.edges.clone();
         for (r, recording) in self.recordings.iter().enumerate().filter(|(_, r)| movable(r)) {
             for (e, before) in edges[r].iter_mut().enumerate() {
-                *before = (0..recording.ticks_per_row)
-                    .min_by(|a, b| costs[*a][r][e].total_cmp(&costs[*b][r][e]))
-                    .unwrap_or(0);
+                let place =
+                    (0..recording.places()).min_by(|a, b| costs[*a][r][e].total_cmp(&costs[*b][r][e]));
+                *before = recording.edge_at(e, place.unwrap_or(0));
             }
         }
         (edges != fit.hypothesis.inputs.edges).then(|| Inputs::new(&self.recordings, edges))
@@ -59,6 +60,31 @@ impl Problem<'_> {
     }
 }
 
+impl Prepared {
+    /// Control ticks between a row and the one before it.
+    fn ticks_before(&self, row: usize) -> usize {
+        ((self.time_s[row] - self.time_s[row - 1]) / self.tick_s).round().max(1.0) as usize
+    }
+
+    /// Places that are tried for a step: every tick of a log interval, as many in a gap.
+    fn places(&self) -> usize {
+        let longest = self.edges.iter().map(|row| self.ticks_before(*row)).max().unwrap_or(1);
+        longest.min(self.ticks_per_row.max(MOST_PLACES))
+    }
+
+    /// Ticks before its row at which a step lies in one of its places.
+    fn edge_at(&self, edge: usize, place: usize) -> usize {
+        let (ticks, places) = (self.ticks_before(self.edges[edge]), self.places());
+        let place = place.min(places - 1);
+        if ticks <= places { place.min(ticks - 1) } else { place * (ticks - 1) / (places - 1).max(1) }
+    }
+
+    /// All steps in one of their places.
+    fn edges_at(&self, place: usize) -> Vec<usize> {
+        (0..self.edges.len()).map(|edge| self.edge_at(edge, place)).collect()
+    }
+}
+
 fn edge_costs(recording: &Prepared, residual: &[Vec<f64>], level: &[f64]) -> Vec<f64> {
     let mut costs = vec![0.0; recording.edges.len()];
     for (c, channel) in recording.channels.iter().enumerate() {
@@ -71,4 +97,39 @@ fn edge_costs(recording: &Prepared, residual: &[Vec<f64>], level: &[f64]) -> Vec
         }
     }
     costs
+}
+
+#[cfg(test)]
+mod tests {
+    use kort_thruster::rig::Rig;
+
+    use crate::data::{Prepared, Series};
+
+    /// Steps of a command logged at 100 Hz, the second of them just after half a second without rows.
+    fn prepared() -> Prepared {
+        let rows: Vec<usize> = (0..400).filter(|k| !(150..200).contains(k)).collect();
+        let time_s = rows.iter().map(|k| 0.01 * *k as f64).collect();
+        let command: Vec<f64> = rows.iter().map(|k| if (50..200).contains(k) { 1.0 } else { -1.0 }).collect();
+        let columns = vec![
+            ("current_cmd_a".into(), command),
+            ("shaft_speed_rad_s".into(), rows.iter().map(|k| (*k as f64).sin()).collect()),
+        ];
+        let rig = "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = 0.01\ntorque_constant_nm_a = 1.0\n";
+        let rig = Rig::from_toml(rig).unwrap();
+        Prepared::new(&Series { name: "log".into(), time_s, columns }, &rig, false).unwrap()
+    }
+
+    #[test]
+    fn a_step_is_looked_for_on_every_tick_of_its_interval_and_all_over_a_gap() {
+        let recording = prepared();
+        assert_eq!(recording.edges, [50, 150]);
+        let places: Vec<Vec<usize>> = (0..recording.places()).map(|p| recording.edges_at(p)).collect();
+        let first: Vec<usize> = places.iter().map(|p| p[0]).collect();
+        let in_gap: Vec<usize> = places.iter().map(|p| p[1]).collect();
+        let ticks = recording.ticks_per_row;
+        assert!(first[..ticks].iter().copied().eq(0..ticks), "{first:?}");
+        assert_eq!((first.iter().max(), in_gap[0]), (Some(&(ticks - 1)), 0));
+        assert_eq!(in_gap.last(), Some(&(recording.ticks_before(150) - 1)), "{in_gap:?}");
+        assert!(in_gap.windows(2).all(|w| w[1] > w[0]) && in_gap.len() <= 24);
+    }
 }

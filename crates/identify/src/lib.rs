@@ -7,6 +7,7 @@ pub mod checks;
 pub mod data;
 pub mod edges;
 pub mod fit;
+mod gaps;
 pub mod heldout;
 pub mod hypothesis;
 pub mod identifiable;

@@ -73,6 +73,10 @@ impl<'a> Setup<'a> {
         let baseline =
             Hypothesis::baseline(model, rig, prescribed, current_seen, inputs).with_sampling(&recordings);
         let mut problem = Problem::new(model, rig, recordings, masked, criterion);
+        if let Some(hidden) = problem.hidden_by_gaps(&baseline) {
+            notes.extend(hidden.words(&problem.recordings));
+            problem = problem.without(&hidden.rows);
+        }
         if let Some(name) = telling_column(series, &problem, &baseline) {
             let sizes = spread(series, &name);
             for (one, recording) in series.iter().zip(&mut problem.recordings) {

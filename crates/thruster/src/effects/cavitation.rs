@@ -18,8 +18,9 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     id: "cavitation",
     path: Path::Blade,
     what: "at high blade speed the water boils on the blades: lift and drag coefficients fall",
-    equation: "sigma = (pa + rho g h - pv)/(rho/2 V^2); CL, CD / (1 + k ramp(sigma_i/sigma - 1)); k, sigma_i [1], h recorded \
-               or 1 m. An onset sigma_i above about 3 is no cavitation at 0.7 radius",
+    equation: "sigma = (pa + rho g h - pv)/(rho/2 V^2); CL (1 + k ramp(sigma_i/sigma - 1))^-1, CD (1 + k ramp(...))^-e; \
+               k, sigma_i, e [1], h recorded or 1 m; e = 1: both lose alike, e < 0: drag rises. An onset sigma_i above \
+               about 3 is no cavitation at 0.7 radius",
     signature: "thrust over speed squared droops at top speed only, alike in both directions; less so at depth",
     confused_with: &[
         "ventilation",
@@ -33,11 +34,11 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     commonness: 0.5,
     shifts_time: false,
     nonparametric: false,
-    forms: &[],
+    forms: &[&[0, 1], &[0, 1, 2]],
     parameters,
-    starts: |scale| [1.3, 3.0, 5.0].iter().map(|factor| vec![0.1, onset(scale, *factor)]).collect(),
+    starts: |scale| [1.3, 3.0, 5.0].iter().map(|factor| vec![0.1, onset(scale, *factor), 1.0]).chain([vec![0.1, onset(scale, 2.0), -0.3]]).collect(),
     needs: wet,
-    build: both!(|values, _| Box::new(Cavitation { loss: values[0], onset: values[1] })),
+    build: both!(|values, _| Box::new(Cavitation { loss: values[0], onset: values[1], drag: values[2] })),
 };
 
 /// Onset at a multiple of the smallest cavitation number in the recording; the speed through the
@@ -52,12 +53,14 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
     vec![
         Spec::strength("loss", "1", 0.1, 0.0, 3.0).sigma(0.4),
         Spec::shape("onset_sigma", "1", onset(scale, 2.0), 0.2, 50.0).sigma(onset(scale, 2.0)),
+        Spec::shape("drag_exponent", "1", 1.0, -1.0, 2.0).prior(1.0, 0.7),
     ]
 }
 
 struct Cavitation<T> {
     loss: T,
     onset: T,
+    drag: T,
 }
 
 impl<T: Real> Effect<T> for Cavitation<T> {
@@ -73,6 +76,6 @@ impl<T: Real> Effect<T> for Cavitation<T> {
         let ramp = |x: T| (x + (x * x + WIDTH * WIDTH).sqrt()) * 0.5;
         let left = (self.loss * (ramp(past) - ramp(T::from(-1.0))) + 1.0).recip();
         foil.lift *= left;
-        foil.drag *= left;
+        foil.drag *= left.powf(self.drag);
     }
 }

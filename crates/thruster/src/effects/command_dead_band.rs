@@ -9,8 +9,8 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     id: "command_dead_band",
     path: Path::Drive,
     what: "the drive ignores commands near its neutral, as speed controllers for brushless motors do",
-    equation: "u* = u - clamp(u - u0, -d, d) (1 - k s(|u - u0|/d)); d, u0 in the command's unit, k = 0: shifted by d \
-               beyond the band, k = 1: passed on as it is",
+    equation: "u* = u - (u0 + clamp(u - u0, -d, d)) (1 - k s(|u - u0|/d)); d, u0 in the command's unit, u0 the drive's \
+               neutral; k = 0: shifted by d beyond the band, k = 1: passed on as it is",
     signature: "no current and no motion for small commands, the same way up and down (no hysteresis); large commands \
                 are off by d or not at all",
     confused_with: &["coulomb_friction", "torque_channel_bias", "gear_backlash", "command_curve"],
@@ -63,6 +63,6 @@ impl<T: Real> Effect<T> for CommandDeadBand<T> {
         let smooth = out * out * (T::from(3.0) - out * 2.0);
         let side = if u == T::ZERO { 0.0 } else { u.re().signum() };
         let held_back = if u.abs() < d { u } else { d * side };
-        drive.command -= held_back * (T::ONE - self.kept * smooth);
+        drive.command -= (held_back + self.centre) * (T::ONE - self.kept * smooth);
     }
 }

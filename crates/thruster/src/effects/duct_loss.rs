@@ -10,11 +10,13 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     id: "duct_loss",
     path: Path::Flow,
     what: "friction and inlet loss in the duct take up momentum, and the duct itself pushes on the stand",
-    equation: "T = m vp' + (dbeta + kd/2) rho a vp|vp|; y = T + cd rho a vp|vp|; kd, cd [1]. kd alone is an error of \
-               the flux coefficient and is taken up by it where that has a tolerance",
+    equation: "T = m vp' + (dbeta + (kd + ka [vp < 0])/2) rho a vp|vp|; y = T + cd rho a vp|vp|; kd, ka, cd [1]; ka: the \
+               flow parts from the lip where it enters astern. kd alone is an error of the flux coefficient and is taken \
+               up by it where that has a tolerance",
     signature: "thrust and flow no longer agree in the steady momentum balance, by the same percentage at all speeds; \
                 shaft speed hardly changes",
     confused_with: &[
+        "forward_reverse_asymmetry",
         "thrust_bias_gain_hysteresis",
         "flowmeter_offset_lag_location",
         "thrust_deduction_interaction",
@@ -25,7 +27,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     commonness: 0.7,
     shifts_time: false,
     nonparametric: false,
-    forms: &[&[0], &[1], &[0, 1]],
+    forms: &[&[0], &[1], &[2], &[0, 1], &[1, 2]],
     parameters,
     starts: one_start,
     needs: wet,
@@ -36,17 +38,19 @@ fn parameters(_: &Scale) -> Vec<Spec> {
     vec![
         Spec::strength("wall_loss", "1", 0.1, -1.0, 4.0).sigma(0.4),
         Spec::strength("duct_thrust", "1", 0.04, -1.5, 1.5).sigma(0.15),
+        Spec::strength("lip_loss_astern", "1", 0.1, -1.0, 4.0).sigma(0.4),
     ]
 }
 
 fn build<T: Real>(values: &[T], context: &Context<T>) -> Box<dyn Effect<T>> {
     let flux = context.parameters.get(P::DensityKgM3) * context.parameters.area_m2();
-    Box::new(DuctLoss { loss_kg_m: values[0] * 0.5 * flux, stand_kg_m: values[1] * flux })
+    Box::new(DuctLoss { loss_kg_m: values[0] * 0.5 * flux, stand_kg_m: values[1] * flux, astern_kg_m: values[2] * 0.5 * flux })
 }
 
 struct DuctLoss<T> {
     loss_kg_m: T,
     stand_kg_m: T,
+    astern_kg_m: T,
 }
 
 impl<T: Real> Effect<T> for DuctLoss<T> {
@@ -58,6 +62,9 @@ impl<T: Real> Effect<T> for DuctLoss<T> {
     fn balance(&self, at: &Local<T>, _: &[T], balance: &mut Balance<T>, _: &mut [T]) {
         let square = at.axial_m_s * at.axial_m_s.abs();
         balance.momentum_n -= self.loss_kg_m * square;
+        if at.axial_m_s < 0.0 {
+            balance.momentum_n -= self.astern_kg_m * square;
+        }
         balance.stand_n += self.stand_kg_m * square;
     }
 }

@@ -1,6 +1,6 @@
 //! The speed signal is filtered more than stated.
 
-use super::memory::FirstOrder;
+use super::memory::{FirstOrder, History};
 use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, speed_measured};
 use crate::plant::{Sensed, Tick};
 use crate::real::Real;
@@ -10,7 +10,8 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     id: "encoder_filter_lag",
     path: Path::Sensor,
     what: "measured shaft speed has a filter slower than stated, or one that is not stated at all",
-    equation: "(t1 + dt) y1' = Om - y1 in place of the stated t1, then t2 y' = y1 - y; dt, t2 [s]",
+    equation: "(t1 + dt) y1' = Om - y1 in place of the stated t1, then (1 - s) t2 y' = y1(t - s t2) - y; dt, t2 [s], s \
+               share of t2 that is dead time [1]: 0.4 for a running mean",
     signature: "shaft speed alone is late and rounded by a fixed time, at all amplitudes; thrust and flow fit",
     confused_with: &[
         "clock_skew",
@@ -24,9 +25,9 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     commonness: 2.0,
     shifts_time: false,
     nonparametric: false,
-    forms: &[&[0], &[1], &[0, 1]],
+    forms: &[&[0], &[1], &[0, 1], &[1, 2]],
     parameters,
-    starts: |_| vec![vec![0.03, 0.03], vec![0.1, 0.1]],
+    starts: |_| vec![vec![0.03, 0.03, 0.0], vec![0.1, 0.1, 0.0]],
     needs: speed_measured,
     build: both!(|values, context| {
         let tick_s = context.tick_s;
@@ -35,7 +36,9 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
             stated: decay(stated_s, tick_s),
             slower: decay(values[0] + stated_s, tick_s),
             memory: None,
-            lag_s: values[1],
+            dead_time_s: values[1] * values[2],
+            past: History::new(0.5, tick_s),
+            lag_s: values[1] * (-values[2] + 1.0),
             tick_s,
             lag: FirstOrder::new(),
         })
@@ -46,6 +49,7 @@ fn parameters(_: &Scale) -> Vec<Spec> {
     vec![
         Spec::strength("filter_excess_s", "s", 0.01, 0.0, 1.0).sigma(0.02),
         Spec::strength("second_lag_s", "s", 0.01, 0.0, 1.0).sigma(0.02),
+        Spec::shape("dead_time_share", "1", 0.0, 0.0, 0.8).prior(0.0, 0.3),
     ]
 }
 
@@ -60,6 +64,8 @@ struct EncoderFilterLag<T> {
     slower: T,
     /// Last output of the stated filter, and of the one in its place.
     memory: Option<(T, T)>,
+    dead_time_s: T,
+    past: History<T>,
     lag_s: T,
     tick_s: f64,
     lag: FirstOrder<T>,
@@ -77,6 +83,7 @@ impl<T: Real> Effect<T> for EncoderFilterLag<T> {
         let raw = (seen - before * self.stated) / (1.0 - self.stated);
         let slow = self.slower * last + (T::ONE - self.slower) * raw;
         self.memory = Some((seen, slow));
-        sensed.shaft_speed_rad_s = self.lag.step(slow, self.lag_s, self.tick_s);
+        self.past.push(slow);
+        sensed.shaft_speed_rad_s = self.lag.step(self.past.ago(self.dead_time_s), self.lag_s, self.tick_s);
     }
 }

@@ -25,7 +25,8 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     forms: &[],
     parameters,
     starts: |scale| {
-        [1.5, 3.0, 6.0, 12.0, 25.0].iter().map(|hz| vec![compliance(scale, *hz), 0.5, 0.1]).collect()
+        // A ring shows a fit the way only from near its frequency.
+        (0..16).map(|k| vec![compliance(scale, 1.2 * 1.25_f64.powi(k)), 0.5, 0.1]).collect()
     },
     needs: free_shaft,
     build: both!(|values, context| {

@@ -117,7 +117,7 @@ fn a_flexible_coupling_is_two_inertias_on_a_spring() {
 #[test]
 fn a_command_curve_bends_and_keeps_the_ends() {
     let reach = |command: f64| {
-        let mut plant = plant(&dry(), &[("command_curve", &[0.2, 0.1, 2.0])], TICK_S);
+        let mut plant = plant(&dry(), &[("command_curve", &[0.2, 0.1, 2.0, 0.0, 0.0, 0.0, 0.0])], TICK_S);
         plant.step(&hold(command, false));
         plant.sensed().current_a
     };

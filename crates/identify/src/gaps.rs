@@ -1,0 +1,148 @@
+//! What the drive may have done while the log was silent.
+//!
+//! A command that changes often changes within gaps too, and nobody wrote it down: until its trace has died away
+//! the rows after such a gap tell nothing. How long that is the stated rig tells: two simulations, one with the
+//! command straight across the gap and one with it at its far end, and the rows on which they differ.
+
+use crate::data::{Driving, Prepared};
+use crate::hypothesis::{Hypothesis, Inputs};
+use crate::simulate::Problem;
+use crate::spectrum::median_interval;
+
+/// Usual intervals from row to row beyond which rows are missing.
+pub const GAP_INTERVALS: f64 = 3.5;
+/// Changes of the command to be expected within a gap from which on one may have been missed.
+const MISSED: f64 = 0.1;
+/// Difference of the two simulations that still counts, over full scale: noise of a good sensor.
+const SHOWS: f64 = 0.01;
+
+impl Prepared {
+    /// Whether the log misses rows just before this one.
+    fn after_gap(&self, row: usize, usual_s: f64) -> bool {
+        row > 0 && self.time_s[row] - self.time_s[row - 1] > GAP_INTERVALS * usual_s
+    }
+
+    /// Rows that follow a gap in which a change of the command may have been missed.
+    fn silent(&self) -> Vec<usize> {
+        if !matches!(self.driving, Driving::Command(_)) {
+            return Vec::new();
+        }
+        let usual_s = median_interval(&self.time_s);
+        let turns = self.command.windows(3).filter(|w| (w[1] - w[0]) * (w[2] - w[1]) < 0.0).count();
+        let often_1_s = (self.edges.len() + turns) as f64 / self.duration_s();
+        (1..self.time_s.len())
+            .filter(|row| self.after_gap(*row, usual_s))
+            .filter(|row| often_1_s * (self.time_s[*row] - self.time_s[row - 1]) > MISSED)
+            .collect()
+    }
+
+    /// The command, at its far end within these gaps.
+    fn otherwise(&self, commands: &[f64], silent: &[usize]) -> Vec<f64> {
+        let (low, high) =
+            commands.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), c| (l.min(*c), h.max(*c)));
+        let mut other = commands.to_vec();
+        for row in silent {
+            let tick = |k: usize| {
+                (((self.time_s[k] - self.time_s[0]) / self.tick_s).round() as usize).min(other.len())
+            };
+            let (from, to) = (tick(row - 1), tick(*row));
+            for command in &mut other[from..to] {
+                *command = if *command - low > high - *command { low } else { high };
+            }
+        }
+        other
+    }
+}
+
+/// Rows on which what gaps hide may still show.
+pub struct Hidden {
+    /// By recording and row.
+    pub rows: Vec<Vec<bool>>,
+    /// Gaps that hide something, by recording.
+    gaps: Vec<usize>,
+}
+
+impl Hidden {
+    /// A line for every recording that has some.
+    pub fn words(&self, recordings: &[Prepared]) -> Vec<String> {
+        let line = |((recording, rows), gaps): ((&Prepared, &Vec<bool>), &usize)| {
+            let left_out = rows.iter().filter(|hidden| **hidden).count();
+            (*gaps > 0).then(|| {
+                format!(
+                    "{}: the command changes so often that some of it is lost in {gaps} gaps; {left_out} rows after them, on which that may still show, are left out",
+                    recording.name
+                )
+            })
+        };
+        recordings.iter().zip(&self.rows).zip(&self.gaps).filter_map(line).collect()
+    }
+}
+
+impl Problem<'_> {
+    /// Rows on which what a gap hides may still show; none if no gap hides anything.
+    pub fn hidden_by_gaps(&self, stated: &Hypothesis) -> Option<Hidden> {
+        let silent: Vec<Vec<usize>> = self.recordings.iter().map(Prepared::silent).collect();
+        if silent.iter().all(Vec::is_empty) {
+            return None;
+        }
+        let commands = self.recordings.iter().zip(&stated.inputs.commands).zip(&silent);
+        let commands = commands.map(|((r, commands), silent)| r.otherwise(commands, silent)).collect();
+        let inputs = Inputs { edges: stated.inputs.edges.clone(), commands };
+        let other = Hypothesis { inputs: inputs.into(), ..stated.clone() };
+        let (straight, other) = (self.respond(stated, &stated.start), self.respond(&other, &stated.start));
+        let mut rows: Vec<Vec<bool>> = self.recordings.iter().map(|r| vec![false; r.time_s.len()]).collect();
+        for (r, recording) in self.recordings.iter().enumerate() {
+            for (c, channel) in recording.channels.iter().enumerate() {
+                for (i, row) in channel.rows.iter().enumerate() {
+                    let apart = (straight[r][c][i] - other[r][c][i]).abs() / channel.full_scale;
+                    rows[r][*row] |= apart > SHOWS;
+                }
+            }
+        }
+        Some(Hidden { rows, gaps: silent.iter().map(Vec::len).collect() })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use kort_thruster::models::ModelName;
+    use kort_thruster::rig::Rig;
+
+    use super::Hidden;
+    use crate::data::Series;
+    use crate::noise::Criterion;
+    use crate::setup::Setup;
+
+    const RIG: &str = "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = 0.01\ntorque_constant_nm_a = 1.0\n\
+                       winding_resistance_ohm = 1.0\n[amplifier]\nkind = \"voltage\"\n";
+
+    /// A motor that settles within tens of milliseconds, reversed every `dwell` rows of 10 ms; 9 rows are missing
+    /// after row 500.
+    fn hidden(dwell: usize) -> Option<Hidden> {
+        let rows: Vec<usize> = (0..1000).filter(|k| !(501..510).contains(k)).collect();
+        let time_s: Vec<f64> = rows.iter().map(|k| 0.01 * *k as f64).collect();
+        let command: Vec<f64> = rows.iter().map(|k| if k / dwell % 2 == 0 { 5.0 } else { -5.0 }).collect();
+        let speed = rows.iter().map(|k| (*k as f64 * 0.7).sin()).collect();
+        let columns = vec![("voltage_cmd_v".into(), command), ("shaft_speed_rad_s".into(), speed)];
+        let series = [Series { name: "log".into(), time_s, columns }];
+        let rig = Rig::from_toml(RIG).unwrap();
+        let criterion =
+            Criterion { form_error: 0.01, own_form_error: 0.1, facts_a_band: 10.0, timing_s: 0.001 };
+        let setup = Setup::new(&series, &rig, ModelName::Model2, criterion).unwrap();
+        setup.problem.hidden_by_gaps(&setup.baseline)
+    }
+
+    #[test]
+    fn rows_after_a_gap_are_left_out_until_what_it_hides_has_died_away() {
+        let hidden = hidden(10).expect("a change may have been missed");
+        let left_out: Vec<usize> = (0..991).filter(|row| hidden.rows[0][*row]).collect();
+        // The first row after the gap is 501.
+        assert_eq!(left_out.first(), Some(&501));
+        assert!((3..15).contains(&left_out.len()), "{left_out:?}");
+    }
+
+    #[test]
+    fn a_command_that_hardly_changes_hides_nothing_in_a_gap() {
+        assert!(hidden(400).is_none());
+    }
+}
