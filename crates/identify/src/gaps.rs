@@ -121,7 +121,8 @@ mod tests {
     fn hidden(dwell: usize) -> Option<Hidden> {
         let rows: Vec<usize> = (0..1000).filter(|k| !(501..510).contains(k)).collect();
         let time_s: Vec<f64> = rows.iter().map(|k| 0.01 * *k as f64).collect();
-        let command: Vec<f64> = rows.iter().map(|k| if k / dwell % 2 == 0 { 5.0 } else { -5.0 }).collect();
+        let command: Vec<f64> =
+            rows.iter().map(|k| if (k / dwell).is_multiple_of(2) { 5.0 } else { -5.0 }).collect();
         let speed = rows.iter().map(|k| (*k as f64 * 0.7).sin()).collect();
         let columns = vec![("voltage_cmd_v".into(), command), ("shaft_speed_rad_s".into(), speed)];
         let series = [Series { name: "log".into(), time_s, columns }];

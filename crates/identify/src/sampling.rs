@@ -95,3 +95,65 @@ fn grain(recording: &Prepared, response: Response) -> Option<(bool, f64)> {
     let slow = crate::spectrum::is_slow(crate::spectrum::median_interval(&times), row_s);
     Some((slow, if slow { row_s } else { recording.tick_s }))
 }
+
+#[cfg(test)]
+mod tests {
+    use kort_thruster::plant::Sensed;
+    use kort_thruster::rig::Rig;
+
+    use super::{Delays, Instant, free};
+    use crate::data::{Prepared, Response, Series};
+    use crate::hypothesis::{Free, Target};
+
+    /// A speed at every row of 10 ms and a thrust at every fifth, under a current.
+    fn numbers() -> Vec<Free> {
+        let rows = 400;
+        let wave = |k: usize| (k as f64 * 0.1).sin();
+        let columns = vec![
+            ("current_cmd_a".into(), (0..rows).map(wave).collect()),
+            ("shaft_speed_rad_s".into(), (0..rows).map(wave).collect()),
+            (
+                "thrust_n".into(),
+                (0..rows).map(|k| if k.is_multiple_of(5) { wave(k) } else { f64::NAN }).collect(),
+            ),
+        ];
+        let rig =
+            Rig::from_toml(include_str!("../../../config/thrusters/whitcomb-yoerger-1999.toml")).unwrap();
+        let time_s = (0..rows).map(|k| 0.01 * k as f64).collect();
+        free(&[Prepared::new(&Series { name: "log".into(), time_s, columns }, &rig, false).unwrap()])
+    }
+
+    #[test]
+    fn a_channel_is_read_within_its_grain() {
+        let numbers = numbers();
+        let bounds = |response| {
+            let one = numbers
+                .iter()
+                .find(|f| matches!(f.target, Target::Sampling { response: r, .. } if r == response));
+            one.map(|f| (f.low, f.high)).unwrap()
+        };
+        let (low, high) = bounds(Response::ShaftSpeed);
+        assert!(low == -high && high <= 0.002, "within a control tick: {low} to {high}");
+        let (low, high) = bounds(Response::Thrust);
+        assert!(
+            low == 0.0 && (high - 0.01).abs() < 1e-9,
+            "a slow sensor, within a row before: {low} to {high}"
+        );
+    }
+
+    #[test]
+    fn a_late_sample_lies_behind_by_its_delay_times_the_rate() {
+        let at = |speed| Sensed { shaft_speed_rad_s: speed, ..Sensed::default() };
+        let (now, before, last_row) = (at(5.0), at(4.0), at(1.0));
+        let instant =
+            Instant { now: &now, tick: (&before, &now), tick_s: 0.002, last_row: &last_row, row_s: 0.01 };
+        let of = |slow| {
+            let target = Target::Sampling { response: Response::ShaftSpeed, slow };
+            let late = vec![Free { target, ..numbers()[0].clone() }];
+            Delays::of(&late, &[0.001]).sampled(Response::ShaftSpeed, &instant)
+        };
+        assert!((of(false) - 4.5_f64).abs() < 1e-12);
+        assert!((of(true) - 4.6_f64).abs() < 1e-12);
+        assert_eq!(Delays::<f64>::of(&[], &[]).sampled(Response::ShaftSpeed, &instant), 5.0);
+    }
+}
