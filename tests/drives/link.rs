@@ -8,6 +8,7 @@ use kort_proto::faults::Fault;
 use kort_proto::messages::{Command, Outcome, RequestKind, Telemetry};
 
 use crate::common::bench::Bench;
+use kort_thruster::rig::Rig;
 use serde_json::json;
 
 use crate::common::{PERIOD_NS, Site, Stack, kill, wait};
@@ -23,6 +24,12 @@ static ALONE: Mutex<()> = Mutex::new(());
 /// Waits until no other test runs a deployment.
 pub fn alone() -> MutexGuard<'static, ()> {
     ALONE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A rig that the repository describes.
+pub fn rig(name: &str) -> Rig {
+    let file = format!("{}/config/thrusters/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+    Rig::from_toml(&std::fs::read_to_string(file).unwrap()).unwrap()
 }
 
 /// One kind of drive under test.
@@ -167,33 +174,41 @@ impl Case {
     }
 
     /// Everything that can happen to a wire.
-    pub fn endures_its_wire(&self, emulator: &Emulator, timeout: Duration, frozen: Duration) {
+    pub fn endures_its_wire(
+        &self,
+        emulator: &Emulator,
+        timeout: Duration,
+        stale: &[Fault],
+        frozen: Duration,
+        harmless: &[Mischief],
+    ) {
         let mut bench = self.servo(emulator);
         // A reading's life, and some exchanges.
         let silence = Duration::from_millis(LIFE_MS + 30);
-        for (mischief, fault, bound) in [
-            (Mischief::Silent, Fault::DriveLost, silence),
-            (Mischief::Garbage, Fault::DriveLost, silence),
-            (Mischief::Truncated, Fault::DriveLost, silence),
-            (Mischief::Flipped, Fault::DriveLost, silence),
-            (Mischief::Stale, Fault::SensorFrozen, frozen),
-            (Mischief::Unplugged, Fault::DriveLost, timeout),
+        let lost: &[Fault] = &[Fault::DriveLost];
+        for (mischief, faults, bound) in [
+            (Mischief::Silent, lost, silence),
+            (Mischief::Garbage, lost, silence),
+            (Mischief::Truncated, lost, silence),
+            (Mischief::Flipped, lost, silence),
+            (Mischief::Stale, stale, frozen),
+            (Mischief::Unplugged, lost, timeout),
         ] {
             println!("{mischief:?}");
             self.ends_at_zero(
                 &mut bench,
                 emulator,
-                &[fault],
+                faults,
                 bound,
                 || emulator.spoil(mischief),
                 || emulator.spoil(Mischief::None),
             );
         }
         // What loses nothing stops nothing.
-        for mischief in [Mischief::Split, Mischief::Noisy] {
+        for mischief in harmless {
             let read = (0..3).find_map(|_| {
                 self.turn(&mut bench, emulator);
-                emulator.spoil(mischief);
+                emulator.spoil(*mischief);
                 let rows = self.drive_for(&mut bench, 300);
                 emulator.spoil(Mischief::None);
                 let read = rows.iter().filter(|row| row.signals.shaft_speed_rad_s.is_finite()).count();

@@ -4,4 +4,6 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod link;
+mod odrive;
+mod sensors;
 mod vesc;

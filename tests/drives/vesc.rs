@@ -3,12 +3,11 @@
 use std::time::Duration;
 
 use kort_emulators::vesc::Make;
-use kort_emulators::{Bench as Emulator, Vesc};
+use kort_emulators::{Bench as Emulator, Mischief, Vesc};
 use kort_proto::faults::Fault;
 use kort_proto::messages::{Command, DriveKind};
-use kort_thruster::rig::Rig;
 
-use crate::link::{Case, alone};
+use crate::link::{Case, alone, rig};
 
 /// The drive's time-out as kort sets it, and the period at which a VESC looks at it.
 const TIMEOUT: Duration = Duration::from_millis(100 + 10);
@@ -17,11 +16,6 @@ const FROZEN: Duration = Duration::from_millis(500 + 20);
 
 fn case() -> Case {
     Case { kind: "vesc", keys: "pole_pairs = 7", drive: 4.0, command: Command::default() }
-}
-
-fn rig(name: &str) -> Rig {
-    let file = format!("{}/config/thrusters/{name}.toml", env!("CARGO_MANIFEST_DIR"));
-    Rig::from_toml(&std::fs::read_to_string(file).unwrap()).unwrap()
 }
 
 fn vesc(make: Make) -> Emulator {
@@ -37,7 +31,13 @@ fn the_service_drives_it_and_records() {
 #[test]
 fn every_fault_of_the_wire_ends_at_zero() {
     let _alone = alone();
-    case().endures_its_wire(&vesc(Make::default()), TIMEOUT, FROZEN);
+    case().endures_its_wire(
+        &vesc(Make::default()),
+        TIMEOUT,
+        &[Fault::SensorFrozen],
+        FROZEN,
+        &[Mischief::Split, Mischief::Noisy],
+    );
 }
 
 #[test]

@@ -10,6 +10,9 @@ use crate::pty::Pty;
 /// How often the device lives.
 const STEP: Duration = Duration::from_micros(500);
 
+/// Changes of the command that are kept.
+const COMMANDS_MAX: usize = 1_000_000;
+
 /// A device at the far end of a wire.
 pub trait Device: Send {
     /// Takes bytes as they come; its answers, a frame each.
@@ -75,6 +78,8 @@ struct Shared {
     /// The last instant at which the power stage was asked for something.
     driven: Option<Instant>,
     heard: u64,
+    /// When the power stage was asked for something else, on CLOCK_MONOTONIC, ns, and for what.
+    commands: Vec<(u64, f64)>,
 }
 
 /// A device, running.
@@ -130,6 +135,11 @@ impl Bench {
         self.lock().driven
     }
 
+    /// Every change of what the power stage was asked for: when, on CLOCK_MONOTONIC, ns, and for what.
+    pub fn commands(&self) -> Vec<(u64, f64)> {
+        self.lock().commands.clone()
+    }
+
     /// Bytes that reached the device so far.
     pub fn heard(&self) -> u64 {
         self.lock().heard
@@ -163,7 +173,11 @@ impl<D: Device> Serving<D> {
         let began = Instant::now();
         let mut pty = Some(pty);
         loop {
-            std::thread::sleep(STEP);
+            match &pty {
+                Some(pty) => pty.wait(STEP),
+                None => std::thread::sleep(STEP),
+            }
+            let heard_ns = monotonic_ns();
             let now_s = began.elapsed().as_secs_f64();
             let (mischief, restart, report) = {
                 let mut shared = self.shared.lock().unwrap_or_else(PoisonError::into_inner);
@@ -194,7 +208,11 @@ impl<D: Device> Serving<D> {
                 }
             }
             let mut shared = self.shared.lock().unwrap_or_else(PoisonError::into_inner);
-            shared.truth = self.device.truth();
+            let before = std::mem::replace(&mut shared.truth, self.device.truth());
+            let command = shared.truth.command;
+            if command != before.command && shared.commands.len() < COMMANDS_MAX {
+                shared.commands.push((heard_ns, command));
+            }
             shared.heard += bytes.len() as u64;
             if shared.truth.command != 0.0 {
                 shared.driven = Some(Instant::now());
@@ -235,4 +253,9 @@ impl<D: Device> Serving<D> {
         self.dice = self.dice.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
         (self.dice >> 24) as u8
     }
+}
+
+fn monotonic_ns() -> u64 {
+    let now = rustix::time::clock_gettime(rustix::time::ClockId::Monotonic);
+    now.tv_sec as u64 * 1_000_000_000 + now.tv_nsec as u64
 }

@@ -8,10 +8,14 @@
 //! whatever a firmware does that its description does not say.
 
 mod bench;
+pub mod odrive;
+mod printer;
 mod pty;
 mod stand;
 pub mod vesc;
 
 pub use bench::{Bench, Device, Mischief, Truth};
+pub use odrive::ODrive;
+pub use printer::Printer;
 pub use stand::Stand;
 pub use vesc::Vesc;

@@ -4,7 +4,9 @@
 use std::io;
 use std::os::fd::OwnedFd;
 use std::path::Path;
+use std::time::Duration;
 
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{Mode, OFlags, fcntl_setfl, open};
 use rustix::io::Errno;
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
@@ -32,6 +34,12 @@ impl Pty {
         let _ = std::fs::remove_file(link);
         std::os::unix::fs::symlink(name.to_string_lossy().as_ref(), link)?;
         Ok(Self { master, _slave: slave })
+    }
+
+    /// Waits for bytes, at most this long.
+    pub fn wait(&self, most: Duration) {
+        let most = Timespec { tv_sec: 0, tv_nsec: most.subsec_nanos().into() };
+        let _ = poll(&mut [PollFd::new(&self.master, PollFlags::IN)], Some(&most));
     }
 
     /// Bytes that came.

@@ -7,6 +7,8 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
+use kort_emulators::vesc::Make;
+use kort_emulators::{Bench as Emulator, Vesc};
 use kort_proto::config::Config;
 use kort_proto::messages::{Command, Request, RequestKind};
 use kort_proto::transport::{ControllerPorts, Deployment, GatewayPorts, ServoPorts, monotonic_ns};
@@ -103,4 +105,30 @@ fn the_loop_allocates_nothing_after_start() {
         while gateway.reply.next().is_some() {}
     }
     assert!(armed_ticks > 500, "armed for {armed_ticks} ticks only");
+}
+
+/// A drive on a wire: its thread allocates as it likes, the tick's end of it does not.
+#[test]
+fn the_tick_of_a_drive_on_a_wire_allocates_nothing() {
+    let rig = Rig::from_toml(include_str!("../../../config/thrusters/whitcomb-yoerger-1999.toml")).unwrap();
+    let emulator = Emulator::start(Vesc::new(Make::default(), &rig)).unwrap();
+    let wired = format!("\"vesc\"\ndrive = {{ port = {:?}, pole_pairs = 7 }}", emulator.port());
+    let text = include_str!("../../../config/kort.toml")
+        .replace("amplifier = \"simulated\"", &format!("amplifier = {wired}"));
+    let config = Config::parse(&text, None).unwrap();
+    let thruster = config.thruster("t1").unwrap();
+    let drive = drives::choose(&config, "t1", thruster, &rig).unwrap().start("t1", 0).unwrap();
+    let mut devices = Devices::new(drive, Vec::new(), monotonic_ns());
+    let mut readings = 0;
+    for _ in 0..500 {
+        let before = COUNT.with(Cell::get);
+        let now_ns = monotonic_ns();
+        let shown = devices.show(At { now_ns, ticks: 1 });
+        devices.drive(now_ns, Some(1.0));
+        assert_eq!(COUNT.with(Cell::get) - before, 0);
+        readings += u32::from(shown.signals.shaft_speed_rad_s.is_finite());
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    assert!(readings > 10, "{readings} readings in half a second");
+    assert!(emulator.truth().command > 0.5, "it was driven: {:?}", emulator.truth());
 }

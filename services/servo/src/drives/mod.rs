@@ -1,6 +1,7 @@
 //! Drives. One drive, one file, behind one trait; the loop knows no hardware.
 
 mod lying;
+pub mod odrive;
 pub mod simulated;
 pub mod vesc;
 mod wired;
@@ -13,6 +14,7 @@ use crate::devices::{At, Shown};
 #[cfg(feature = "process")]
 use crate::link::{Link, Protocol};
 
+pub use odrive::ODrive;
 pub use simulated::Simulated;
 pub use vesc::Vesc;
 pub use wired::Wired;
@@ -42,10 +44,12 @@ pub enum Chosen {
     Simulated(Box<Simulated>),
     /// A VESC on a serial port or USB.
     Vesc(Vesc),
+    /// An ODrive on USB or a serial port.
+    ODrive(ODrive),
 }
 
 /// Names of the drives, as `amplifier` gives them.
-pub const ALL: [&str; 2] = ["simulated", "vesc"];
+pub const ALL: [&str; 3] = ["simulated", "vesc", "odrive"];
 
 /// Reads what the configuration says of the drive.
 ///
@@ -55,6 +59,7 @@ pub fn choose(config: &Config, id: &str, thruster: &Thruster, rig: &Rig) -> Resu
     match thruster.amplifier.as_str() {
         "simulated" => Ok(Chosen::Simulated(Box::new(Simulated::new(config, id, thruster, rig)?))),
         "vesc" => Ok(Chosen::Vesc(Vesc::new(config, id, thruster, rig)?)),
+        "odrive" => Ok(Chosen::ODrive(ODrive::new(config, id, thruster, rig)?)),
         other => Err(config.error(format!(
             "`thrusters.{id}.amplifier` = \"{other}\" is no drive\nhint: known are \"{}\"",
             ALL.join("\", \"")
@@ -72,6 +77,9 @@ impl Chosen {
         let (wired, kind, protocol): (_, _, Box<dyn Protocol>) = match self {
             Self::Simulated(drive) => return Ok(drive),
             Self::Vesc(vesc) => (vesc.wired.clone(), vesc.kind, Box::new(vesc::Protocol::new(vesc))),
+            Self::ODrive(odrive) => {
+                (odrive.wired.clone(), odrive.kind, Box::new(odrive::Protocol::new(odrive)))
+            }
         };
         Ok(Box::new(Link::start(wired.wire(id, priority), kind, protocol)?))
     }

@@ -117,6 +117,19 @@ impl Wired {
         })
     }
 
+    /// For a drive that tells the speed of the shaft itself.
+    ///
+    /// # Errors
+    /// [`ConfigError`] if `pole_pairs` is given.
+    pub fn without_pole_pairs(self, config: &Config, id: &str) -> Result<Self, ConfigError> {
+        match self.pole_pairs {
+            None => Ok(self),
+            Some(pairs) => Err(config.error(format!(
+                "`thrusters.{id}.drive.pole_pairs` = {pairs}: this drive tells the speed of the shaft itself\nhint: leave the key out"
+            ))),
+        }
+    }
+
     /// The wire as its thread is told it. The thread stands just below the loop that it serves.
     #[cfg(feature = "process")]
     pub fn wire(self, id: &str, priority: i32) -> crate::link::Wire {

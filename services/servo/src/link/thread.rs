@@ -89,7 +89,18 @@ impl Serving {
         self.answered = false;
         self.driving = false;
         self.told.guarded = false;
-        self.told.faults = if self.wire.is_drive { Fault::DriveLost.bit() } else { 0 };
+        self.told.faults = 0;
+        self.publish();
+    }
+
+    /// Leaves for the tick what is known. A drive whose time-out is not confirmed, now, is not one to be armed.
+    fn publish(&mut self) {
+        let why = match (self.wire.is_drive && !self.told.guarded, self.answered) {
+            (false, _) => 0,
+            (true, true) => Fault::DriveUnguarded.bit(),
+            (true, false) => Fault::DriveLost.bit(),
+        };
+        self.told.faults = self.told.faults & Fault::AmplifierFault.bit() | why;
         self.tell.write(self.told);
     }
 
@@ -145,6 +156,7 @@ impl Serving {
         self.protocol.begin();
         self.answered = false;
         self.told.guarded = false;
+        self.publish();
     }
 
     /// Sleeps until bytes come, the loop ticks, or some time passes.
@@ -214,10 +226,7 @@ impl Serving {
             self.begin();
             self.answered = true;
         }
-        let unguarded = self.wire.is_drive && self.answered && !self.told.guarded;
-        let kept = self.told.faults & Fault::AmplifierFault.bit();
-        self.told.faults = kept | if unguarded { Fault::DriveUnguarded.bit() } else { 0 };
-        self.tell.write(self.told);
+        self.publish();
     }
 
     fn complain(&mut self, words: String) {

@@ -82,7 +82,9 @@ impl Link {
     /// No thread or no descriptor is to be had.
     pub fn start(wire: Wire, kind: DriveKind, protocol: Box<dyn Protocol>) -> std::io::Result<Self> {
         let (commands, newest) = triple_buffer(&Command { drive: None });
-        let (tell, told) = triple_buffer(&Told::NOTHING);
+        // Until the thread has confirmed something else.
+        let lost = if wire.is_drive { Fault::DriveLost.bit() } else { 0 };
+        let (tell, told) = triple_buffer(&Told { faults: lost, ..Told::NOTHING });
         let waker = Arc::new(eventfd(0, EventfdFlags::NONBLOCK | EventfdFlags::CLOEXEC)?);
         let ending = Arc::new(AtomicBool::new(false));
         let life_ns = wire.reading_life_ns;

@@ -1,0 +1,131 @@
+//! Every drive beside the simulated one, through its emulator: the loop's period, the age of the shaft speed at the tick, and how
+//! long a command takes to the motor.
+//!
+//! `cargo bench --bench drives [-- SECONDS]`
+//!
+//! - period: from one tick to the next, by the servo's own clock;
+//! - age: of the newest shaft speed when the guard looks at it;
+//! - command: from the controller's send until the drive has it. A controller at 250 Hz changes the drive by a little with each
+//!   command, and the emulator notes when each arrived; for the simulated drive the tick that took it counts.
+//!
+//! An emulator's wire takes no time: what is measured is kort and the system under it, not a UART.
+
+#[path = "../tests/common/mod.rs"]
+mod common;
+
+use std::time::{Duration, Instant};
+
+use common::Site;
+use common::bench::Bench;
+use kort_emulators::vesc::Make;
+use kort_emulators::{Bench as Emulator, ODrive, Vesc};
+use kort_proto::messages::{Command, Outcome, RequestKind, Telemetry};
+use kort_proto::transport::{Ticker, monotonic_ns};
+use kort_thruster::rig::Rig;
+
+const COMMAND_NS: u64 = 4_000_000;
+/// Smallest step of the drive that every protocol carries, A, and how many there are until it begins anew.
+const STEP_A: f64 = 0.01;
+const STEPS: u64 = 100;
+
+fn main() {
+    let seconds: u64 = std::env::args().find_map(|a| a.parse().ok()).unwrap_or(10);
+    println!("{seconds} s each; microseconds p50 / p99 / p99.9 / max\n");
+    let rig =
+        Rig::from_toml(include_str!("../config/thrusters/whitcomb-yoerger-1999.toml")).expect("a sound rig");
+    let wired = |kind: &str, keys: &str, emulator: Emulator| {
+        let keys = format!("port = {:?}, rate_hz = 500, reading_life_ms = 200, {keys}", emulator.port());
+        (Site::new().with_drive(kind, &keys), emulator)
+    };
+    measure("simulated", Site::new(), None, seconds);
+    let vesc = Emulator::start(Vesc::new(Make::default(), &rig)).expect("a pseudo terminal");
+    let (site, emulator) = wired("vesc", "pole_pairs = 7", vesc);
+    measure("vesc", site, Some(emulator), seconds);
+    let odrive = Emulator::start(ODrive::new(&rig, false)).expect("a pseudo terminal");
+    let (site, emulator) = wired("odrive", "timeout_ms = 100", odrive);
+    measure("odrive", site, Some(emulator), seconds);
+}
+
+fn measure(name: &str, site: Site, emulator: Option<Emulator>, seconds: u64) {
+    // As it is run: at 1 kHz, with the real-time rights that there are.
+    site.add("[thrusters.t1]", "servo = { rate_hz = 1000 }");
+    let text = std::fs::read_to_string(site.config()).expect("a configuration");
+    let text =
+        text.replacen("servo = { rate_hz = 500 }\n", "", 1).replacen("rate_hz = 10,", "rate_hz = 250,", 1);
+    std::fs::write(site.config(), text).expect("a configuration");
+    let mut bench = Bench::start_at(site);
+    let mut ticker = Ticker::new(COMMAND_NS);
+    let end = Instant::now() + Duration::from_secs(seconds);
+    let (mut sent, mut rows): (Vec<(u64, f64)>, Vec<Telemetry>) = (Vec::new(), Vec::new());
+    let mut armed = false;
+    for n in 0u64.. {
+        if Instant::now() > end {
+            break;
+        }
+        if !armed {
+            // Trips of a busy machine are part of it; then it is armed again.
+            bench.ask(RequestKind::ClearFaults);
+            armed = bench.ask(RequestKind::Arm).0 == Outcome::Done;
+        }
+        let drive = 0.5 + (n % STEPS) as f64 * STEP_A;
+        let now_ns = monotonic_ns();
+        bench.controller.command.send(Command { drive, ..Command::default() }).expect("sent");
+        sent.push((now_ns, drive));
+        while let Some(row) = bench.gateway.telemetry.next() {
+            armed = row.armed != 0;
+            rows.push(row);
+        }
+        ticker.wait();
+    }
+    let periods = rows.windows(2).filter(|w| w[1].header.sequence == w[0].header.sequence + 1);
+    print_row(
+        name,
+        "period",
+        periods.map(|w| w[1].time_ns - w[0].time_ns + w[1].timing.lateness_ns).collect(),
+    );
+    print_row(name, "age", rows.iter().filter(|row| row.armed != 0).map(|row| row.shaft_age_ns).collect());
+    let arrived: Vec<(u64, f64)> = match &emulator {
+        Some(emulator) => emulator.commands(),
+        None => {
+            rows.iter().map(|row| (row.time_ns + row.timing.lateness_ns, row.signals.current_cmd_a)).collect()
+        }
+    };
+    print_row(name, "command", latencies(&sent, &arrived));
+    let overruns = rows.last().map_or(0, |row| row.timing.overruns);
+    println!("{name:>10}  ticks left out: {overruns} of {}\n", rows.len());
+    let _ = bench.servo.kill();
+}
+
+/// For every command that arrived, how long it took. A drive slower than the controller leaves some out.
+fn latencies(sent: &[(u64, f64)], arrived: &[(u64, f64)]) -> Vec<u64> {
+    let mut took = Vec::new();
+    let (mut from, mut last) = (0, f64::NAN);
+    for (at_ns, drive) in arrived {
+        if *drive == last || !drive.is_finite() {
+            continue;
+        }
+        last = *drive;
+        let same = |(_, sent): &(u64, f64)| (sent - drive).abs() < 0.4 * STEP_A;
+        if let Some(place) = sent.iter().skip(from).take(STEPS as usize / 2).position(same) {
+            from += place;
+            took.extend(at_ns.checked_sub(sent[from].0));
+        }
+    }
+    took
+}
+
+fn print_row(name: &str, what: &str, mut ns: Vec<u64>) {
+    ns.sort_unstable();
+    let at = |share: f64| {
+        ns.get(((ns.len().saturating_sub(1)) as f64 * share).round() as usize)
+            .map_or(f64::NAN, |n| *n as f64 * 1e-3)
+    };
+    println!(
+        "{name:>10}  {what:<8} {:9.1} {:9.1} {:9.1} {:9.1}   ({} samples)",
+        at(0.5),
+        at(0.99),
+        at(0.999),
+        at(1.0),
+        ns.len()
+    );
+}

@@ -1,0 +1,53 @@
+//! An ODrive (firmware 0.5, its first axis) on USB or a serial port, by its ASCII protocol with check sums.
+//!
+//! Read for this: the ASCII protocol page of the ODrive documentation, and what the firmware's interface description and
+//! `ascii_protocol.cpp` (odriverobotics/ODrive, 0.5.6) say about properties, formats and the watchdog.
+//!
+//! Units on the wire: torque in N m, speed in turns a second, angle in turns, current (`Iq_measured`) in A. Signs are
+//! the drive's; `reversed` turns all of them. A rig of kind `current` is driven by torque, current times the torque constant that the
+//! *drive* was given, which kort reads, so that the amperes are right; `speed` by the drive's own speed loop; volts it does not take.
+//!
+//! Its own watchdog: `axis0.config.enable_watchdog` and `watchdog_timeout`. kort sets both at each start, saves nothing, reads them
+//! again, and asks for the first with every exchange; after the time-out the axis reports `WATCHDOG_TIMER_EXPIRED` and lets the
+//! motor go. That error, which every silence leaves, is cleared at the start; any other is `amplifier_fault` until
+//! somebody clears it in the drive.
+//!
+//! Output on is the axis in closed loop control, off is idle: the shaft coasts. An axis that leaves closed loop by
+//! itself is `amplifier_fault`. A reset shows by the watchdog being off again, or by USB going away.
+
+mod protocol;
+pub mod text;
+
+use kort_proto::config::{Config, ConfigError, Thruster};
+use kort_proto::messages::DriveKind;
+use kort_thruster::rig::Rig;
+
+pub use protocol::Protocol;
+
+use super::{Wired, kind_of};
+
+/// An ODrive as the configuration describes it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ODrive {
+    /// The wire.
+    pub wired: Wired,
+    /// Unit of the drive.
+    pub kind: DriveKind,
+}
+
+impl ODrive {
+    /// Reads the section `drive`.
+    ///
+    /// # Errors
+    /// [`ConfigError`] names key, value and what is allowed.
+    pub fn new(config: &Config, id: &str, thruster: &Thruster, rig: &Rig) -> Result<Self, ConfigError> {
+        let wired = Wired::new(config, id, thruster)?.without_pole_pairs(config, id)?;
+        let kind = kind_of(rig);
+        if !matches!(kind, DriveKind::Current | DriveKind::Speed) {
+            return Err(config.error(format!(
+                "`thrusters.{id}.amplifier` = \"odrive\" takes current or speed, but the rig's amplifier is of kind voltage\nhint: amplifier.kind = \"current\" in the rig, with its current_limit_a"
+            )));
+        }
+        Ok(Self { wired, kind })
+    }
+}

@@ -1,0 +1,271 @@
+//! What is said to an ODrive and understood of it.
+
+use std::f64::consts::TAU;
+
+use kort_proto::messages::DriveKind;
+use kort_proto::signals::Signals;
+
+use super::ODrive;
+use super::text::{Lines, line};
+use crate::link::{self, Heard};
+
+/// Error bit of the axis that every silence leaves.
+const WATCHDOG_EXPIRED: u64 = 1 << 11;
+/// States of the axis.
+const IDLE: f64 = 1.0;
+const CLOSED_LOOP: f64 = 8.0;
+/// Questions without a whole answer before the reason is said.
+const ASKED_IN_VAIN: u32 = 10;
+/// Exchanges that the axis may take to enter closed loop.
+const ENTERING: u32 = 100;
+
+/// Properties asked for behind `f 0` at the start, in this order.
+const SETTINGS: [&str; 6] = [
+    "fw_version_major",
+    "fw_version_minor",
+    "axis0.config.enable_watchdog",
+    "axis0.config.watchdog_timeout",
+    "axis0.motor.config.torque_constant",
+    "axis0.error",
+];
+/// And in each exchange.
+const VALUES: [&str; 5] = [
+    "axis0.motor.current_control.Iq_measured",
+    "vbus_voltage",
+    "axis0.error",
+    "axis0.current_state",
+    "axis0.config.enable_watchdog",
+];
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Stage {
+    Settings,
+    Guarded,
+    /// Not to be driven, for a reason that was said.
+    Refused,
+}
+
+/// One conversation with an ODrive.
+pub struct Protocol {
+    odrive: ODrive,
+    lines: Lines,
+    stage: Stage,
+    asked: u32,
+    known: bool,
+    /// The time-out was set; what is read next must be it.
+    set: bool,
+    /// The error that silence leaves is to be cleared.
+    clear: bool,
+    torque_constant_nm_a: f64,
+    /// Angle and speed of the answer under way, turns and turns a second, and the numbers behind them.
+    moving: Option<(f64, f64)>,
+    numbers: Vec<f64>,
+    due: u32,
+    on: bool,
+    exchanges_on: u32,
+    fault: String,
+}
+
+impl Protocol {
+    /// Before the first word.
+    pub fn new(odrive: ODrive) -> Self {
+        Self {
+            odrive,
+            lines: Lines::default(),
+            stage: Stage::Settings,
+            asked: 0,
+            known: false,
+            set: false,
+            clear: false,
+            torque_constant_nm_a: f64::NAN,
+            moving: None,
+            numbers: Vec::new(),
+            due: 0,
+            on: false,
+            exchanges_on: 0,
+            fault: String::new(),
+        }
+    }
+
+    /// An answer begins with the two numbers of `f 0` and goes on with one a line; what comes otherwise is none, and
+    /// neither is one with a line lost.
+    fn line(&mut self, words: &str, heard: &mut dyn FnMut(Heard)) {
+        let numbers: Vec<f64> = words.split(' ').filter_map(|word| word.parse().ok()).collect();
+        let wanted = if self.stage == Stage::Guarded { VALUES.len() } else { SETTINGS.len() };
+        match (numbers.as_slice(), self.moving) {
+            (&[turns, turns_s], _) => {
+                self.moving = Some((turns, turns_s));
+                self.numbers.clear();
+            }
+            (&[number], Some(moving)) => {
+                self.numbers.push(number);
+                if self.numbers.len() == wanted {
+                    self.moving = None;
+                    let numbers = std::mem::take(&mut self.numbers);
+                    if self.stage == Stage::Guarded {
+                        self.values(moving, &numbers, heard);
+                    } else {
+                        self.settings(&numbers, heard);
+                    }
+                }
+            }
+            _ => self.moving = None,
+        }
+    }
+
+    fn settings(&mut self, numbers: &[f64], heard: &mut dyn FnMut(Heard)) {
+        let [major, minor, enabled, timeout_s, torque_constant_nm_a, error] = *numbers else { return };
+        if self.stage == Stage::Refused {
+            return;
+        }
+        self.asked = 0;
+        if !std::mem::replace(&mut self.known, true) {
+            heard(Heard::Known(format!("ODrive, firmware {major}.{minor}")));
+        }
+        let most_s = self.odrive.wired.timeout_s;
+        if (major, minor) != (0.0, 5.0) {
+            self.refuse(
+                format!("firmware {major}.{minor}; allowed is 0.5\nhint: newer boards speak CAN better"),
+                heard,
+            );
+        } else if torque_constant_nm_a.is_nan() || torque_constant_nm_a <= 0.0 {
+            let words = format!(
+                "its motor.config.torque_constant is {torque_constant_nm_a}\nhint: set up the motor in odrivetool"
+            );
+            self.refuse(words, heard);
+        } else if enabled == 1.0 && timeout_s > 0.0 && timeout_s <= most_s * 1.001 && self.set {
+            // A watchdog that ran out before kort came is no fault; it is cleared, and must stay so.
+            self.clear = error as u64 == WATCHDOG_EXPIRED;
+            if self.clear {
+                return;
+            }
+            self.torque_constant_nm_a = torque_constant_nm_a;
+            self.stage = Stage::Guarded;
+            heard(Heard::Guarded(format!("its own watchdog is {} ms", timeout_s * 1e3)));
+        } else if self.set {
+            let words = format!(
+                "its watchdog stays {}, {} ms; allowed is on, at most {} ms\nhint: odrivetool: axis0.config.enable_watchdog, watchdog_timeout",
+                if enabled == 1.0 { "on" } else { "off" },
+                timeout_s * 1e3,
+                most_s * 1e3
+            );
+            self.refuse(words, heard);
+        }
+    }
+
+    fn refuse(&mut self, words: String, heard: &mut dyn FnMut(Heard)) {
+        self.stage = Stage::Refused;
+        heard(Heard::Unguarded(words));
+    }
+
+    fn values(&mut self, (turns, turns_s): (f64, f64), numbers: &[f64], heard: &mut dyn FnMut(Heard)) {
+        let [iq_a, supply_v, error, state, enabled] = *numbers else { return };
+        if self.due == 0 {
+            return;
+        }
+        self.due = 0;
+        if enabled != 1.0 {
+            return heard(Heard::Restarted);
+        }
+        self.exchanges_on = if self.on { self.exchanges_on.saturating_add(1) } else { 0 };
+        let fault = if error != 0.0 {
+            format!(
+                "it reports axis error {:#x}\nhint: odrivetool: dump_errors(odrv0), then odrv0.clear_errors()",
+                error as u64
+            )
+        } else if self.exchanges_on > ENTERING && state != CLOSED_LOOP {
+            format!(
+                "its axis is in state {state}, not in closed loop control\nhint: calibrate it in odrivetool"
+            )
+        } else {
+            String::new()
+        };
+        if self.fault != fault {
+            heard(Heard::Fault(Some(fault.clone()).filter(|fault| !fault.is_empty())));
+            self.fault = fault;
+        }
+        let sign = self.odrive.wired.sign();
+        heard(Heard::Reading(Signals {
+            current_a: sign * iq_a,
+            shaft_speed_rad_s: sign * turns_s * TAU,
+            shaft_angle_rad: sign * turns * TAU,
+            supply_v,
+            ..Signals::UNKNOWN
+        }));
+    }
+}
+
+fn ask_for(properties: &[&str], out: &mut Vec<u8>) {
+    line("f 0", out);
+    for property in properties {
+        line(&format!("r {property}"), out);
+    }
+}
+
+impl link::Protocol for Protocol {
+    fn begin(&mut self) {
+        self.lines.clear();
+        self.stage = Stage::Settings;
+        self.asked = 0;
+        self.known = false;
+        self.set = false;
+        self.clear = false;
+        self.moving = None;
+        self.numbers.clear();
+        self.due = 0;
+        self.on = false;
+        self.exchanges_on = 0;
+        self.fault.clear();
+    }
+
+    fn ask(&mut self, out: &mut Vec<u8>, heard: &mut dyn FnMut(Heard)) {
+        if self.asked == ASKED_IN_VAIN {
+            heard(Heard::Unguarded(
+                "does not answer in full\nhint: is its ASCII protocol on (config.enable_uart_a, or USB), is it an ODrive of firmware 0.5?".into(),
+            ));
+            self.begin();
+        }
+        self.asked += 1;
+        if self.stage == Stage::Settings {
+            // Off, then what kort needs of it; the error that silence left goes last, when the watchdog is fed again.
+            line(&format!("w axis0.requested_state {IDLE}"), out);
+            line(&format!("w axis0.config.watchdog_timeout {}", self.odrive.wired.timeout_s), out);
+            line("u 0", out);
+            line("w axis0.config.enable_watchdog 1", out);
+            line("u 0", out);
+            if std::mem::take(&mut self.clear) {
+                line("sc", out);
+            }
+            self.set = true;
+            ask_for(&SETTINGS, out);
+        }
+    }
+
+    fn tell(&mut self, drive: Option<f64>, out: &mut Vec<u8>) {
+        let sign = self.odrive.wired.sign();
+        match drive {
+            Some(drive) => {
+                match self.odrive.kind {
+                    DriveKind::Speed => line(&format!("v 0 {:.6} 0", sign * drive / TAU), out),
+                    _ => line(&format!("c 0 {:.6}", sign * drive * self.torque_constant_nm_a), out),
+                }
+                if !self.on {
+                    line(&format!("w axis0.requested_state {CLOSED_LOOP}"), out);
+                }
+            }
+            None => {
+                line("c 0 0", out);
+                line(&format!("w axis0.requested_state {IDLE}"), out);
+            }
+        }
+        self.on = drive.is_some();
+        ask_for(&VALUES, out);
+        self.due = self.due.saturating_add(1);
+    }
+
+    fn hear(&mut self, bytes: &[u8], heard: &mut dyn FnMut(Heard)) {
+        for words in self.lines.take(bytes) {
+            self.line(&words, heard);
+        }
+    }
+}
