@@ -3,7 +3,7 @@
 use super::{Context, Descriptor, Effect, Hooks, Path, Scale, Spec, free_shaft};
 use crate::blade::{Inflow, REFERENCE_RADIUS};
 use crate::parameters::Parameter as P;
-use crate::plant::{Balance, Local, Sensed, Tick};
+use crate::plant::{Balance, Drive, Local, Sensed, Tick};
 use crate::real::Real;
 
 /// Catalogue entry.
@@ -71,6 +71,8 @@ pub(crate) struct Coupling<T> {
     share: T,
     lever_m: T,
     inertia_kg_m2: T,
+    torque_constant_nm_a: T,
+    twist_rad: T,
     relative_rad_s: T,
 }
 
@@ -101,6 +103,8 @@ impl<T: Real> Coupling<T> {
             share,
             lever_m: context.parameters.get(P::RadiusM) * REFERENCE_RADIUS,
             inertia_kg_m2,
+            torque_constant_nm_a: context.parameters.get(P::TorqueConstantNmA),
+            twist_rad: T::ZERO,
             relative_rad_s: T::ZERO,
         }
     }
@@ -112,12 +116,17 @@ impl<T: Real> Effect<T> for Coupling<T> {
     }
 
     fn hooks(&self) -> Hooks {
-        Hooks { inflow: true, balance: true, sense: true, ..Hooks::NONE }
+        Hooks { drive: true, inflow: true, balance: true, sense: true, ..Hooks::NONE }
     }
 
     /// A coupling stiffer than a tick can follow lets the load move little by itself.
     fn lightest_share(&self) -> f64 {
         (self.share / (self.give_s2 * self.stiffness_1_s2)).re().min(1.0)
+    }
+
+    /// The back-EMF is of the motor's own speed.
+    fn drive(&mut self, _: &Tick, drive: &mut Drive<T>) {
+        drive.back_emf_v += self.torque_constant_nm_a * self.share * self.relative_rad_s;
     }
 
     /// The blades turn with the load.
@@ -134,11 +143,12 @@ impl<T: Real> Effect<T> for Coupling<T> {
     }
 
     fn arrive(&mut self, _: &Local<T>, own: &[T]) {
-        self.relative_rad_s = own[1];
+        (self.twist_rad, self.relative_rad_s) = (own[0], own[1]);
     }
 
     /// The encoder sits on the motor.
     fn sense(&mut self, _: &Tick, sensed: &mut Sensed<T>) {
         sensed.shaft_speed_rad_s += self.share * self.relative_rad_s;
+        sensed.shaft_angle_rad += self.share * self.twist_rad;
     }
 }

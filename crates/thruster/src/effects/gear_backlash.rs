@@ -1,6 +1,6 @@
 //! Play between motor gear and propeller shaft.
 
-use super::{Context, Descriptor, Effect, Hooks, Path, Scale, Spec, geared, one_start};
+use super::{Context, Descriptor, Effect, Hooks, Path, Scale, Spec, geared};
 use crate::parameters::Parameter as P;
 use crate::plant::{Balance, Drive, Local, Sensed, Tick};
 use crate::real::Real;
@@ -21,14 +21,14 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     nonparametric: false,
     forms: &[],
     parameters,
-    starts: one_start,
+    starts: |_| [0.003, 0.03, 0.1, 0.25].iter().map(|play| vec![*play, 0.4]).collect(),
     needs: geared,
     build: both!(build),
 };
 
 fn parameters(_: &Scale) -> Vec<Spec> {
     vec![
-        Spec::strength("backlash_rad", "rad", 0.01, 0.0, 0.2).sigma(0.03),
+        Spec::strength("backlash_rad", "rad", 0.01, 0.0, 0.5).sigma(0.03),
         Spec::shape("motor_inertia_share", "1", 0.4, 0.05, 0.95).sigma(0.25),
     ]
 }
@@ -70,6 +70,8 @@ impl<T: Real> Effect<T> for GearBacklash<T> {
     }
 
     fn drive(&mut self, _: &Tick, drive: &mut Drive<T>) {
+        // The back-EMF is of the motor's own speed.
+        drive.back_emf_v -= self.torque_constant_nm_a * self.relative_rad_s * self.side;
         let (dt, torque) = (self.tick_s, self.torque_constant_nm_a * drive.current_a);
         (self.blow_n_m, self.later_n_m, self.passed) = (self.later_n_m, T::ZERO, T::ONE);
         if self.side == 0.0 {
@@ -110,5 +112,8 @@ impl<T: Real> Effect<T> for GearBacklash<T> {
     /// The encoder sits on the motor.
     fn sense(&mut self, _: &Tick, sensed: &mut Sensed<T>) {
         sensed.shaft_speed_rad_s -= self.relative_rad_s * self.side;
+        // Nothing on the flank that carries ahead, all of the play on the other.
+        let behind = if self.side < 0.0 { self.gap_rad - self.crossed_rad } else { self.crossed_rad };
+        sensed.shaft_angle_rad -= behind;
     }
 }
