@@ -6,7 +6,7 @@
 
 use std::sync::Arc;
 
-use crate::data::{Driving, Prepared};
+use crate::data::{Channel, Driving, Prepared};
 use crate::fit::Fit;
 use crate::hypothesis::{Hypothesis, Inputs};
 use crate::simulate::Problem;
@@ -15,6 +15,8 @@ use crate::simulate::Problem;
 const WINDOW_ROWS: usize = 12;
 /// Places tried for a step that fell into a gap of the log.
 const MOST_PLACES: usize = 24;
+/// Least noise of a channel over its full scale: rounding of a log.
+const LEAST: f64 = 1e-4;
 
 impl Problem<'_> {
     /// The command with its steps where they suit a fit best; none if that is where they are.
@@ -44,18 +46,21 @@ impl Problem<'_> {
         (edges != fit.hypothesis.inputs.edges).then(|| Inputs::new(&self.recordings, edges))
     }
 
-    /// Noise of each channel from one sample to the next, in its own unit.
+    /// Noise of each channel from one sample to the next, in its own unit: its usual size, which the few samples
+    /// about a misplaced step do not raise.
     fn levels(&self, fit: &Fit) -> Vec<Vec<f64>> {
-        let mut tops = self
-            .spectrum
-            .bands
-            .iter()
-            .zip(&fit.noise.level)
-            .filter(|(band, _)| !band.continues)
-            .map(|(_, level)| level.sqrt());
+        let residual = self.residual(&fit.hypothesis, &fit.values);
+        let usual = |(channel, left): (&Channel, &Vec<f64>)| {
+            let mut steps: Vec<f64> = left.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
+            steps.sort_by(f64::total_cmp);
+            // Of normal noise the median step is 0.95 standard deviations.
+            let median = steps.get(steps.len() / 2).copied().unwrap_or(0.0) / 0.95;
+            median.max(LEAST * channel.full_scale)
+        };
         self.recordings
             .iter()
-            .map(|r| r.channels.iter().map(|c| tops.next().unwrap_or(1.0) * c.full_scale).collect())
+            .zip(&residual)
+            .map(|(recording, left)| recording.channels.iter().zip(left).map(usual).collect())
             .collect()
     }
 }

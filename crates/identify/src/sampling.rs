@@ -8,7 +8,7 @@
 use kort_thruster::plant::Sensed;
 use kort_thruster::real::Real;
 
-use crate::data::{Prepared, Response};
+use crate::data::{Driving, Prepared, Response};
 use crate::hypothesis::{Free, Target};
 
 /// What the sensors show at a log instant, and just before it.
@@ -70,21 +70,29 @@ pub fn free(recordings: &[Prepared]) -> Vec<Free> {
             let grains = recordings.iter().filter_map(|r| grain(r, response));
             // The coarsest of several recordings.
             let (slow, grain_s) = grains.max_by(|a, b| a.1.total_cmp(&b.1))?;
-            // Anywhere within the grain: before the stamp where the sensor is slow, on either side else.
+            // Anywhere within the grain: before the stamp where the sensor is slow, on either side else. A command
+            // acts up to a tick before or after its own stamp, which shifts all that answers.
             let (low, high) = if slow { (0.0, grain_s) } else { (-grain_s, grain_s) };
+            let command_s = recordings.iter().map(command_grain_s).fold(0.0, f64::max);
+            let width_s = (high - low).hypot(2.0 * command_s);
             Some(Free {
                 target: Target::Sampling { response, slow },
                 name: "sampling_delay_s",
                 unit: "s",
                 stated: false,
                 mean: 0.5 * (low + high),
-                sigma: (high - low) / 12.0_f64.sqrt(),
-                low,
-                high,
+                sigma: width_s / 12.0_f64.sqrt(),
+                low: low - command_s,
+                high: high + command_s,
                 acts: None,
             })
         })
         .collect()
+}
+
+/// How far a logged command may lie from when it acted, s.
+fn command_grain_s(recording: &Prepared) -> f64 {
+    if matches!(recording.driving, Driving::Command(_)) { recording.tick_s } else { 0.0 }
 }
 
 /// Whether a channel is slower than the log, and how far its samples may lie from their stamps, s.
@@ -133,7 +141,10 @@ mod tests {
             one.map(|f| (f.low, f.high)).unwrap()
         };
         let (low, high) = bounds(Response::ShaftSpeed);
-        assert!(low == -high && high <= 0.002, "within a control tick: {low} to {high}");
+        assert!(
+            low == -high && high <= 0.004,
+            "within a control tick of its own and one of the command: {low} to {high}"
+        );
         let (low, high) = bounds(Response::Thrust);
         assert!(
             low == 0.0 && (high - 0.01).abs() < 1e-9,

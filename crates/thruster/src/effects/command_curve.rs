@@ -45,7 +45,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 
 fn parameters(scale: &Scale) -> Vec<Spec> {
     let full = scale.command;
-    let point = |name| Spec::strength(name, "1", 0.03, -0.5, 0.5).sigma(0.06);
+    let point = |name| Spec::strength(name, "1", 0.03, -0.2, 0.2).sigma(0.05);
     vec![
         Spec::strength("second_degree_share", "1", 0.05, -0.6, 0.95).sigma(0.2),
         Spec::strength("third_degree_share", "1", 0.03, -0.3, 0.6).sigma(0.1),

@@ -1,15 +1,16 @@
 //! Constant offsets of torque and current: drive zero, current sensor, torque transducer.
 
 use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, always, one_start};
-use crate::plant::{Balance, Local, Sensed, Tick};
+use crate::plant::{Balance, Drive, Local, Sensed, Tick};
 use crate::real::Real;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
     id: "torque_channel_bias",
     path: Path::Sensor,
-    what: "torque is off by a constant: the zero of the drive's torque or current measurement, or of the torque transducer",
-    equation: "shaft: kt im + b; measured: im + c, Q + d; b, d [N m], c [A]",
+    what: "torque is off by a constant: the zero of the command, of the drive's torque or current measurement, or of the \
+           torque transducer",
+    equation: "shaft: kt im + b; measured: im + c, Q + d; command: u + e; b, d [N m], c [A], e in the command's unit",
     signature: "a constant in the torque balance with the same sign in both directions (dry friction changes sign); a \
                 measured current or torque is off also at rest",
     confused_with: &[
@@ -23,14 +24,15 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     commonness: 3.0,
     shifts_time: false,
     nonparametric: false,
-    forms: &[&[0], &[1], &[2], &[0, 1], &[0, 2], &[0, 1, 2]],
+    forms: &[&[0], &[1], &[2], &[0, 1], &[0, 2], &[0, 1, 2], &[3]],
     parameters,
     starts: one_start,
     needs: always,
     build: both!(|values, _| Box::new(TorqueChannelBias {
         shaft_n_m: values[0],
         current_a: values[1],
-        transducer_n_m: values[2]
+        transducer_n_m: values[2],
+        command: values[3]
     })),
 };
 
@@ -43,6 +45,14 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
             .sigma(0.05 * current),
         Spec::strength("transducer_offset_n_m", "N m", 0.02 * torque, -0.5 * torque, 0.5 * torque)
             .sigma(0.05 * torque),
+        Spec::strength(
+            "command_offset",
+            "of the command",
+            0.02 * scale.command,
+            -0.5 * scale.command,
+            0.5 * scale.command,
+        )
+        .sigma(0.05 * scale.command),
     ]
 }
 
@@ -50,11 +60,16 @@ struct TorqueChannelBias<T> {
     shaft_n_m: T,
     current_a: T,
     transducer_n_m: T,
+    command: T,
 }
 
 impl<T: Real> Effect<T> for TorqueChannelBias<T> {
     fn hooks(&self) -> Hooks {
-        Hooks { balance: true, sense: true, ..Hooks::NONE }
+        Hooks { drive: true, balance: true, sense: true, ..Hooks::NONE }
+    }
+
+    fn drive(&mut self, _: &Tick, drive: &mut Drive<T>) {
+        drive.command += self.command;
     }
 
     /// A drive that regulates a current measured with a wrong zero does give this torque; where a
