@@ -42,6 +42,8 @@ pub enum Fault {
     DriveUnguarded = 17,
     /// A sensor source that is required gives no readings.
     SensorLost = 18,
+    /// The shaft sensor counts against the way the motor turns.
+    SensorReversed = 19,
     /// No word from the gateway within its time-out while armed.
     GatewayLost = 33,
     /// No telemetry from the servo within its time-out while armed.
@@ -54,7 +56,7 @@ pub enum Fault {
 
 impl Fault {
     /// Every fault, in the order of codes.
-    pub const ALL: [Self; 22] = [
+    pub const ALL: [Self; 23] = [
         Self::OverCurrent,
         Self::OverSpeed,
         Self::ThermalOverload,
@@ -73,6 +75,7 @@ impl Fault {
         Self::DriveRestarted,
         Self::DriveUnguarded,
         Self::SensorLost,
+        Self::SensorReversed,
         Self::GatewayLost,
         Self::ServoLost,
         Self::ControlNotFinite,
@@ -110,6 +113,7 @@ impl Fault {
             Self::DriveRestarted => "drive_restarted",
             Self::DriveUnguarded => "drive_unguarded",
             Self::SensorLost => "sensor_lost",
+            Self::SensorReversed => "sensor_reversed",
             Self::GatewayLost => "gateway_lost",
             Self::ServoLost => "servo_lost",
             Self::ControlNotFinite => "control_not_finite",
@@ -157,6 +161,9 @@ impl Fault {
             }
             Self::SensorLost => {
                 "a required sensor gives no readings: check its cable, its power and its `port` or `path`"
+            }
+            Self::SensorReversed => {
+                "the shaft sensor counts against the way the motor turns: check its phases and its sign"
             }
             Self::GatewayLost => "the gateway stopped while armed: take the lease and arm again",
             Self::ServoLost => "the servo stopped sending telemetry: see its log",

@@ -310,14 +310,12 @@ impl Stack {
             (status == 201).then_some(body)
         });
         self.leases.insert(self.thruster, lease["lease_id"].as_str().unwrap().to_owned());
-        wait("faults to clear and the servo to arm", || {
+        // A trip between any two of these begins them anew.
+        wait("faults to clear, the servo to arm and the setpoint to be accepted", || {
             self.http("POST", "/clear-faults", None)?;
-            let (status, _) = self.http("POST", "/arm", None)?;
-            (status < 300).then_some(())
-        });
-        wait("the setpoint to be accepted", || {
-            let (status, _) = self.http("PUT", "/setpoint", Some(json!({"thrust_n": newton})))?;
-            (status < 300).then_some(())
+            let done = |answer: Option<(u16, Value)>| answer.filter(|(status, _)| *status < 300).map(|_| ());
+            done(self.http("POST", "/arm", None))?;
+            done(self.http("PUT", "/setpoint", Some(json!({"thrust_n": newton}))))
         });
     }
 

@@ -6,6 +6,7 @@ use kort_proto::limits::Limit;
 use kort_proto::messages::DriveKind;
 use kort_proto::signals::Signals;
 
+use crate::direction::Direction;
 use crate::settings::Limits;
 
 /// Readings that must be bad in a row before a value trips.
@@ -30,6 +31,7 @@ pub struct Guard {
     since_spike: u32,
     still_s: f64,
     since_speed: u64,
+    direction: Direction,
     last_angle_rad: f64,
     last_speed_rad_s: f64,
     held_speed_rad_s: f64,
@@ -54,6 +56,7 @@ impl Guard {
             since_spike: SPIKE_WINDOW,
             still_s: 0.0,
             since_speed: 0,
+            direction: Direction::default(),
             last_angle_rad: f64::NAN,
             last_speed_rad_s: f64::NAN,
             held_speed_rad_s: 0.0,
@@ -127,6 +130,10 @@ impl Guard {
         let pulls = drive.abs() > l.drive_max / 3.0;
         self.still_s = if pulls && same_angle && same_speed { self.still_s + dt } else { 0.0 };
         trip(Fault::SensorFrozen, self.still_s > l.frozen_s);
+        // A jump that is left out above says nothing of the direction either.
+        let shown = if jump { f64::NAN } else { speed };
+        let current = if self.current_told { self.held_current_a } else { f64::NAN };
+        trip(Fault::SensorReversed, self.direction.is_reversed(&l, shown, current, drive, dt));
         if angle.is_finite() {
             self.last_angle_rad = angle;
         }
@@ -210,8 +217,9 @@ impl Guard {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
+    use crate::direction::Shaft;
     use proptest::prelude::*;
 
     pub(crate) fn limits() -> Limits {
@@ -231,6 +239,7 @@ mod tests {
             frozen_s: 0.2,
             spike_rad_s: 20.0,
             winding: (f64::NAN, 1.2),
+            shaft: Shaft { inertia_kg_m2: 0.1, water_w: f64::INFINITY },
         }
     }
 

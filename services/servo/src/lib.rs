@@ -10,6 +10,7 @@
 //! that panics; `tests/no_allocation.rs` counts, and says what iceoryx2 does when a sample is sent.
 
 pub mod devices;
+pub mod direction;
 pub mod drives;
 pub mod guard;
 pub mod link;

@@ -5,6 +5,8 @@ use kort_proto::messages::DriveKind;
 use kort_thruster::rig::{AmplifierKind, Rig};
 use serde::Deserialize;
 
+use crate::direction::Shaft;
+
 /// Ticks without a needed reading that trip where every tick has one.
 const MISSING_TICKS: u32 = 3;
 
@@ -43,7 +45,11 @@ impl LimitKeys {
 
 impl CheckKeys {
     fn check(&self) -> Result<(), (&'static str, f64)> {
-        first_odd([("checks.frozen_s", self.frozen_s), ("checks.spike_rad_s", self.spike_rad_s)])
+        first_odd([
+            ("checks.frozen_s", self.frozen_s),
+            ("checks.spike_rad_s", self.spike_rad_s),
+            ("checks.inflow_m_s", self.inflow_m_s),
+        ])
     }
 }
 
@@ -59,6 +65,7 @@ fn first_odd<const N: usize>(keys: [(&'static str, Option<f64>); N]) -> Result<(
 struct CheckKeys {
     frozen_s: Option<f64>,
     spike_rad_s: Option<f64>,
+    inflow_m_s: Option<f64>,
 }
 
 /// Limits and checks in force; every value finite or plus infinity.
@@ -94,6 +101,8 @@ pub struct Limits {
     pub spike_rad_s: f64,
     /// Winding resistance, ohm, and back-EMF constant, V s: a voltage drive's current limit.
     pub winding: (f64, f64),
+    /// What the shaft sensor's direction is held against.
+    pub shaft: Shaft,
 }
 
 /// Everything the pure servo needs to know.
@@ -164,7 +173,7 @@ impl Settings {
         let rig_current_a = Some(rig.amplifier.current_limit_a).filter(|a| a.is_finite()).unwrap_or(10_000.0);
         let rig_supply_v = rig.amplifier.supply_v.filter(|v| v.is_finite()).unwrap_or(10_000.0);
         // Beyond what rig and physics know a limit protects nothing.
-        let bounds: [(&str, Option<f64>, f64, f64, &str); 12] = [
+        let bounds: [(&str, Option<f64>, f64, f64, &str); 13] = [
             (
                 "limits.current_a",
                 keys.current_a,
@@ -212,6 +221,7 @@ impl Settings {
                 "the winding's class, for example 120",
             ),
             ("checks.frozen_s", checks.frozen_s, 0.01, 60.0, "0.5"),
+            ("checks.inflow_m_s", checks.inflow_m_s, 0.0, 50.0, "the fastest the vehicle goes through water"),
             (
                 "checks.spike_rad_s",
                 checks.spike_rad_s,
@@ -261,6 +271,7 @@ impl Settings {
                 checks.spike_rad_s.unwrap_or(10.0 * fastest + 4.0 * count),
             )?,
             winding: (rig.motor.winding_resistance_ohm.map_or(f64::NAN, |r| r.value), kt),
+            shaft: Shaft::of(rig, current_a, speed_rad_s, checks.inflow_m_s),
         };
         if limits.trip_current_a < current_a {
             return Err(config.error(format!(

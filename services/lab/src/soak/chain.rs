@@ -7,6 +7,7 @@ use kort_control::{Controller, ControllerConfig, ModelError, Output};
 use kort_controller::tick::Tick;
 use kort_proto::messages::{Command, DriveKind, Header, Request, RequestKind, Setpoint, SetpointKind};
 use kort_proto::signals::Signals;
+use kort_servo::direction::Shaft;
 use kort_servo::settings::{Limits, Settings};
 use kort_servo::tick::{Inputs, Servo};
 use kort_soak::{Chain, Driven};
@@ -184,6 +185,7 @@ fn settings(rig: &Rig, controller: &Controller, period_ns: u64) -> Settings {
             frozen_s: 0.5,
             spike_rad_s: 10.0 * fastest + 4.0 * model.speed_quantum_rad_s,
             winding: (model.winding_resistance_ohm.unwrap_or(f64::NAN), model.torque_constant_nm_a),
+            shaft: Shaft::of(rig, current_a, speed_rad_s, None),
         },
     }
 }

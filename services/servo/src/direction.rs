@@ -1,0 +1,184 @@
+//! Does the shaft sensor count the way the motor turns? One that is wired the wrong way round, or loses a phase, turns
+//! every loop that uses it into one that runs away; nothing it shows is impossible by itself. It is known by what
+//! stands beside it:
+//!
+//! - a voltage drive by its back-EMF, whatever the load: `Om = (V - R i) / ke`;
+//! - any drive that tells its current by the power with which the motor seems to brake: only the water can sustain it,
+//!   and a stream gives no more than Betz's share of what flows through the disc;
+//! - a drive with a speed loop by the speed it was told.
+
+use kort_proto::messages::DriveKind;
+use kort_thruster::parameters::{Parameter, Parameters};
+use kort_thruster::rig::Rig;
+
+use crate::settings::Limits;
+
+/// How long back-EMF or told speed may point the other way, s: longer than any drive and shaft take to turn round.
+const OPPOSED_S: f64 = 0.5;
+/// Share of full drive below which a direction says nothing.
+const SMALL: f64 = 0.05;
+/// Doubt of the voltage across the winding.
+const WINDING_DOUBT: f64 = 0.3;
+/// Braking impulse in what the shaft carries by its stated inertia: once stops it, and the inertia may be three times as
+/// large as stated.
+const STOPS: f64 = 3.0;
+/// Fall of the shaft speed by which a shaft is turning round.
+const FALLING: f64 = 0.9;
+
+/// Share of its own slipstream at full drive, standing still, at which water can flow to a thruster: at the whole of it
+/// the thruster would push no more, and nothing that it drives goes so fast.
+const INFLOW_SHARE: f64 = 0.7;
+/// Share of the power of a stream that a free disc can take (Betz), and how much more a duct can make of it.
+const BETZ: f64 = 16.0 / 27.0;
+const DUCTED: f64 = 2.0;
+
+/// What the shaft sensor is held against.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shaft {
+    /// Inertia, kg m^2.
+    pub inertia_kg_m2: f64,
+    /// The most power with which water can turn the shaft, W; infinite where that is not known.
+    pub water_w: f64,
+}
+
+impl Shaft {
+    /// Of a rig whose largest current and shaft speed are these. Water gives what a stream of `inflow_m_s` carries, or
+    /// one of the thruster's own slipstream; a dry shaft's load is not known.
+    pub fn of(rig: &Rig, current_a: f64, speed_rad_s: f64, inflow_m_s: Option<f64>) -> Self {
+        let p = Parameters::stated(rig);
+        let inertia_kg_m2 = p.get(Parameter::InertiaKgM2);
+        if rig.propeller.is_none() {
+            return Self { inertia_kg_m2, water_w: f64::INFINITY };
+        }
+        let flux = p.get(Parameter::DensityKgM3) * p.area_m2();
+        let (thrust, torque) = p.bollard_coefficients();
+        let fastest = (p.get(Parameter::TorqueConstantNmA) * current_a / torque).sqrt().min(speed_rad_s);
+        // T = rho A v^2 / 2 with the slipstream v far behind the disc.
+        let slipstream = fastest * (2.0 * thrust / flux).sqrt();
+        let inflow = inflow_m_s.unwrap_or(INFLOW_SHARE * slipstream);
+        let water_w = DUCTED * BETZ * 0.5 * flux * inflow.powi(3);
+        Self { inertia_kg_m2, water_w: if water_w.is_finite() { water_w } else { f64::INFINITY } }
+    }
+}
+
+/// What has been seen of the direction so far.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Direction {
+    opposed_s: f64,
+    impulse_nm_s: f64,
+    fastest_rad_s: f64,
+    /// Time since the last reading of the speed.
+    gap_s: f64,
+    reversed: bool,
+}
+
+impl Direction {
+    /// Looks at a tick: the measured shaft speed (NaN where this tick has no reading) and current (NaN where the drive
+    /// tells none) under the drive that acted. True while the sensor cannot be right.
+    pub fn is_reversed(&mut self, l: &Limits, speed: f64, current: f64, drive: f64, dt_s: f64) -> bool {
+        self.gap_s += dt_s;
+        if !speed.is_finite() {
+            return self.reversed;
+        }
+        let dt_s = std::mem::take(&mut self.gap_s);
+        let opposed = match l.kind {
+            DriveKind::Voltage => back_emf_opposes(l, speed, current, drive),
+            DriveKind::Speed => {
+                let large = drive.abs().min(speed.abs()) > SMALL * l.drive_max;
+                large && drive * speed < 0.0 && self.holds_its_speed(speed)
+            }
+            DriveKind::Current | DriveKind::Duty => false,
+        };
+        self.opposed_s = if opposed { self.opposed_s + dt_s } else { 0.0 };
+        let brakes = self.brakes_without_end(l, speed, current, dt_s);
+        self.reversed = brakes || self.opposed_s > OPPOSED_S;
+        self.reversed
+    }
+
+    /// A drive that is told to turn round takes speed off the shaft.
+    fn holds_its_speed(&mut self, speed: f64) -> bool {
+        if self.opposed_s == 0.0 {
+            self.fastest_rad_s = speed.abs();
+        }
+        self.fastest_rad_s = self.fastest_rad_s.max(speed.abs());
+        speed.abs() > FALLING * self.fastest_rad_s
+    }
+
+    /// The motor seems to brake harder than water can drive, for longer than it takes to stop the shaft.
+    fn brakes_without_end(&mut self, l: &Limits, speed: f64, current: f64, dt_s: f64) -> bool {
+        let (_, torque_constant) = l.winding;
+        let torque = torque_constant * current;
+        let braking_w = -torque * speed;
+        if braking_w.is_nan() || braking_w <= l.shaft.water_w {
+            self.impulse_nm_s = 0.0;
+            if l.kind != DriveKind::Speed {
+                self.fastest_rad_s = 0.0;
+            }
+            return false;
+        }
+        self.fastest_rad_s = self.fastest_rad_s.max(speed.abs());
+        // What the water could give for ever does not count.
+        self.impulse_nm_s += torque.abs() * dt_s * (1.0 - l.shaft.water_w / braking_w);
+        self.impulse_nm_s > STOPS * l.shaft.inertia_kg_m2 * self.fastest_rad_s
+    }
+}
+
+/// Do back-EMF and sensor point in opposite directions, both beyond doubt?
+fn back_emf_opposes(l: &Limits, speed: f64, current: f64, volts: f64) -> bool {
+    let (resistance, ke) = l.winding;
+    let drop = resistance * current;
+    let emf = volts - drop;
+    let sure = emf.abs() > WINDING_DOUBT * drop.abs() + SMALL * l.drive_max;
+    sure && (ke * speed).abs() > SMALL * l.drive_max && emf * speed < 0.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::guard::tests::limits;
+
+    fn trips_after(l: Limits, speed: f64, current: f64, drive: f64) -> Option<u32> {
+        let mut direction = Direction::default();
+        (1..5000).find(|_| direction.is_reversed(&l, speed, current, drive, 1e-3))
+    }
+
+    #[test]
+    fn a_back_emf_against_the_sensor_trips_and_one_with_it_does_not() {
+        let l = Limits { kind: DriveKind::Voltage, drive_max: 100.0, winding: (1.0, 1.2), ..limits() };
+        // 60 V less 6 A through 1 ohm: 45 rad/s.
+        assert_eq!(trips_after(l, 45.0, 6.0, 60.0), None);
+        assert!(trips_after(l, -45.0, 6.0, 60.0).is_some_and(|ticks| ticks <= 502));
+        // Nearly all of the voltage is lost in the winding: its sign is not known.
+        assert_eq!(trips_after(l, -10.0, 9.0, 10.0), None);
+        let unknown = Limits { winding: (f64::NAN, 1.2), ..l };
+        assert_eq!(trips_after(unknown, -45.0, f64::NAN, 60.0), None);
+    }
+
+    #[test]
+    fn braking_beyond_what_water_gives_trips_once_the_shaft_should_have_stopped() {
+        let shaft = Shaft { inertia_kg_m2: 0.01, water_w: 100.0 };
+        let l = Limits { shaft, winding: (f64::NAN, 1.0), ..limits() };
+        // 9 N m against 50 rad/s are 450 W: 350 of them nobody gives. 3 x 0.01 x 50 / 9 x 450 / 350 = 0.214 s.
+        assert!(trips_after(l, -50.0, 9.0, 9.0).is_some_and(|ticks| (210..220).contains(&ticks)));
+        assert_eq!(trips_after(l, 50.0, 9.0, 9.0), None, "it drives");
+        assert_eq!(trips_after(l, -50.0, 1.9, 1.9), None, "a stream may turn it so");
+        assert_eq!(trips_after(limits(), -50.0, 9.0, 9.0), None, "nothing is known of the water");
+    }
+
+    #[test]
+    fn a_shaft_against_the_speed_it_was_told_trips_unless_it_turns_round() {
+        let l = Limits { kind: DriveKind::Speed, drive_max: 100.0, ..limits() };
+        assert!(trips_after(l, -60.0, f64::NAN, 60.0).is_some_and(|ticks| ticks <= 502));
+        assert_eq!(trips_after(l, 60.0, f64::NAN, 60.0), None);
+        let mut direction = Direction::default();
+        for tick in 0..3000 {
+            let speed = -60.0 + 0.04 * f64::from(tick);
+            assert!(!direction.is_reversed(&l, speed, f64::NAN, 60.0, 1e-3), "at {speed} rad/s");
+        }
+        // A drive on a wire shows a speed on every fifth tick only.
+        let mut direction = Direction::default();
+        let seldom = |tick: u32| if tick.is_multiple_of(5) { -60.0 } else { f64::NAN };
+        let tripped = (1..5000).find(|tick| direction.is_reversed(&l, seldom(*tick), f64::NAN, 60.0, 1e-3));
+        assert!(tripped.is_some_and(|tick| tick <= 510), "{tripped:?}");
+    }
+}

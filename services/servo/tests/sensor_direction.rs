@@ -1,0 +1,168 @@
+//! A shaft sensor that counts the wrong way round trips on every shipped rig, and an honest one does not: not on hard
+//! reversals, not on a propeller that a stream turns, not with an inertia far from the stated one.
+
+use std::path::PathBuf;
+
+use kort_proto::config::Config;
+use kort_proto::faults::Fault;
+use kort_proto::signals::Signals;
+use kort_scenario::Measuring;
+use kort_servo::guard::Guard;
+use kort_servo::settings::{Limits, Settings};
+use kort_thruster::models::ModelName;
+use kort_thruster::parameters::{Parameter, Parameters};
+use kort_thruster::plant::{Plant, Tick};
+use kort_thruster::rig::{AmplifierKind, Rig};
+
+const PERIOD_S: f64 = 2e-3;
+
+/// A rig on the stand, behind the servo's guard.
+struct Stand {
+    name: String,
+    rig: Rig,
+    limits: Limits,
+    /// The thruster's own slipstream at full drive, m/s.
+    slipstream_m_s: f64,
+}
+
+/// Every shipped rig.
+fn stands() -> Vec<Stand> {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../config/thrusters");
+    let mut files: Vec<PathBuf> =
+        std::fs::read_dir(folder).expect("the rigs").map(|entry| entry.expect("a rig").path()).collect();
+    files.sort();
+    files.iter().map(stand).collect()
+}
+
+fn stand(file: &PathBuf) -> Stand {
+    let rig = Rig::from_toml(&std::fs::read_to_string(file).expect("a rig")).expect("a rig");
+    // What the rig does not say is the deployment's to say.
+    let limits = match rig.amplifier.kind {
+        AmplifierKind::Speed => "limits = { speed_rad_s = 157.0 }",
+        _ if rig.amplifier.current_limit_a.is_infinite() => "limits = { current_a = 24.0 }",
+        _ => "",
+    };
+    let text = format!(
+        "[thrusters.t1]\nrig = \"{}\"\namplifier = \"simulated\"\nservo = {{ rate_hz = 500 }}\ncontroller = {{ rate_hz = 50 }}\n{limits}\n",
+        file.display()
+    );
+    let config = Config::parse(&text, None).expect("a deployment");
+    let thruster = config.thruster("t1").expect("t1");
+    let limits = Settings::new(&config, "t1", thruster, &rig).expect("settings").limits;
+    let p = Parameters::stated(&rig);
+    let scale = kort_scenario::scale(&rig, &p, limits.drive_max, PERIOD_S, 60.0);
+    let flux = p.get(Parameter::DensityKgM3) * p.area_m2();
+    let slipstream_m_s = if rig.propeller.is_some() { (2.0 * scale.thrust_n / flux).sqrt() } else { 0.0 };
+    Stand { name: rig.name.clone(), rig, limits, slipstream_m_s }
+}
+
+/// What is done to a stand.
+struct Trial<'a> {
+    /// Wish for the drive as a share of the largest, by time in s.
+    wish: &'a dyn Fn(f64) -> f64,
+    /// Inflow as a share of the slipstream.
+    inflow: f64,
+    /// True inertia as a multiple of the stated one.
+    inertia: f64,
+    /// From when on the sensor counts the other way, s.
+    reversed_s: f64,
+    until_s: f64,
+}
+
+impl Stand {
+    /// When the guard says that the sensor is reversed, s.
+    fn trips_at(&self, trial: &Trial) -> Option<f64> {
+        let mut p = Parameters::stated(&self.rig);
+        p.set(Parameter::InertiaKgM2, p.get(Parameter::InertiaKgM2) * trial.inertia);
+        let scale = kort_scenario::scale(&self.rig, &p, self.limits.drive_max, PERIOD_S, 60.0);
+        let mut plant =
+            Plant::new(ModelName::Model2, &self.rig, &p, &[], PERIOD_S).with_encoder_quantised(true);
+        let mut measuring = Measuring::new(&self.rig.sensors, scale, 1.0, 7);
+        let mut guard = Guard::new(self.limits, PERIOD_S);
+        let inflow = trial.inflow * self.slipstream_m_s;
+        let mut drive = 0.0;
+        for n in 0..(trial.until_s / PERIOD_S) as u64 {
+            let time_s = n as f64 * PERIOD_S;
+            plant.step(&Tick { time_s, command: drive, ambient_m_s: (inflow, inflow), ..Tick::default() });
+            let read = measuring.read(time_s, &plant.sensed());
+            let sign = if time_s >= trial.reversed_s { -1.0 } else { 1.0 };
+            let measured = Signals {
+                current_a: if self.rig.amplifier.kind == AmplifierKind::Speed {
+                    f64::NAN
+                } else {
+                    read.current_a
+                },
+                shaft_speed_rad_s: sign * read.shaft_speed_rad_s,
+                shaft_angle_rad: sign * read.shaft_angle_rad,
+                ..Signals::UNKNOWN
+            };
+            if guard.inspect(&measured, drive, 1) & Fault::SensorReversed.bit() != 0 {
+                return Some(time_s);
+            }
+            drive = guard.limit((trial.wish)(time_s) * self.limits.drive_max, drive).0;
+        }
+        None
+    }
+}
+
+#[test]
+fn an_honest_sensor_trips_nothing() {
+    for stand in stands() {
+        for inertia in [0.5, 1.0, 2.5] {
+            for inflow in [-0.7, -0.4, 0.0, 0.4, 0.7] {
+                for half_period_s in [0.1, 0.4, 1.5] {
+                    for level in [1.0, 0.5] {
+                        let reversals = |t: f64| {
+                            if ((t / half_period_s) as u64).is_multiple_of(2) { level } else { -level }
+                        };
+                        let trial = Trial {
+                            wish: &reversals,
+                            inflow,
+                            inertia,
+                            reversed_s: f64::INFINITY,
+                            until_s: 6.0,
+                        };
+                        let tripped = stand.trips_at(&trial);
+                        assert_eq!(
+                            tripped, None,
+                            "{}: reversals of {level} every {half_period_s} s, inflow {inflow}, inertia {inertia}",
+                            stand.name
+                        );
+                    }
+                }
+                // A stream turns the propeller, and the motor brakes or drives it at every level.
+                let staircase = |t: f64| ((t / 1.5).floor() - 10.0).clamp(-10.0, 10.0) / 10.0;
+                let trial =
+                    Trial { wish: &staircase, inflow, inertia, reversed_s: f64::INFINITY, until_s: 31.5 };
+                let tripped = stand.trips_at(&trial);
+                assert_eq!(tripped, None, "{}: staircase, inflow {inflow}, inertia {inertia}", stand.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_reversed_sensor_trips() {
+    for stand in stands() {
+        for inflow in [0.0, 0.4] {
+            for level in [1.0, -1.0] {
+                // From the start, as wired wrongly, and under way.
+                for reversed_s in [0.0, 3.0] {
+                    let inertia = 1.0;
+                    let trial =
+                        Trial { wish: &|_| level, inflow, inertia, reversed_s, until_s: reversed_s + 6.0 };
+                    let tripped = stand.trips_at(&trial);
+                    println!(
+                        "{}: level {level}, inflow {inflow}, reversed at {reversed_s} s: {tripped:?}",
+                        stand.name
+                    );
+                    assert!(
+                        tripped.is_some_and(|at| at >= reversed_s),
+                        "{}: level {level}, inflow {inflow}, from {reversed_s} s",
+                        stand.name
+                    );
+                }
+            }
+        }
+    }
+}
