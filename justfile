@@ -28,6 +28,10 @@ prove *ARGS:
 faults KILLS="1000":
     KORT_FAULT_KILLS={{KILLS}} cargo test --test faults -- --nocapture
 
+# 2,000 slow sockets from one peer: how late the servo wakes and how long stop takes, without and with them
+slow-sockets:
+    cargo test --test access slow_sockets -- --nocapture
+
 # fuzz an entry point: csv, mcap, toml, deployment, bodies or messages (nightly, cargo-fuzz)
 fuzz TARGET SECONDS="60":
     mkdir -p fuzz/corpus/{{TARGET}}

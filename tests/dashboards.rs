@@ -136,6 +136,21 @@ fn assert_all_answered(port: u16, dashboard: &Value, name: &str) {
     }
 }
 
+/// Each rule is seen to fire by a test of its own, so that none is shipped with a metric's name wrong.
+#[test]
+fn every_alert_has_a_test_in_which_it_fires() {
+    let read = |name: &str| {
+        std::fs::read_to_string(repository().join("docker/prometheus").join(name)).expect("it is shipped")
+    };
+    let (rules, tests) = (read("alerts.yml"), read("alerts_test.yml"));
+    let alerts: Vec<&str> = rules.lines().filter_map(|line| line.trim().strip_prefix("- alert: ")).collect();
+    assert!(alerts.len() > 10, "{alerts:?}");
+    for alert in alerts {
+        let fires = format!("alertname: {alert}\n        exp_alerts:\n");
+        assert!(tests.contains(&fires), "{alert}: no test fires it");
+    }
+}
+
 #[test]
 fn configuration_and_alert_rules_hold() {
     if !have("promtool") {
