@@ -32,7 +32,7 @@ faults KILLS="1000":
 slow-sockets:
     cargo test --test access slow_sockets -- --nocapture
 
-# fuzz an entry point: csv, mcap, toml, deployment, bodies or messages (nightly, cargo-fuzz)
+# fuzz an entry point: csv, mcap, toml, deployment, bodies, messages or wires (nightly, cargo-fuzz)
 fuzz TARGET SECONDS="60":
     mkdir -p fuzz/corpus/{{TARGET}}
     cargo +nightly fuzz run {{TARGET}} fuzz/corpus/{{TARGET}} $(fuzz/seeds.sh {{TARGET}}) -- -max_total_time={{SECONDS}} -rss_limit_mb=4096

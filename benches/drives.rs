@@ -3,7 +3,7 @@
 //!
 //! `cargo bench --bench drives [-- SECONDS]`
 //!
-//! - period: from one tick to the next, by the servo's own clock;
+//! - period: from one tick's wake-up to the next's, by the servo's own clock;
 //! - age: of the newest shaft speed when the guard looks at it;
 //! - command: from the controller's send until the drive has it. A controller at 250 Hz changes the drive by a little with each
 //!   command, and the emulator notes when each arrived; for the simulated drive the tick that took it counts.
@@ -18,7 +18,7 @@ use std::time::{Duration, Instant};
 use common::Site;
 use common::bench::Bench;
 use kort_emulators::vesc::Make;
-use kort_emulators::{Bench as Emulator, ODrive, Vesc};
+use kort_emulators::{Bench as Emulator, Moteus, ODrive, Vesc, moteus};
 use kort_proto::messages::{Command, Outcome, RequestKind, Telemetry};
 use kort_proto::transport::{Ticker, monotonic_ns};
 use kort_thruster::rig::Rig;
@@ -44,6 +44,9 @@ fn main() {
     let odrive = Emulator::start(ODrive::new(&rig, false)).expect("a pseudo terminal");
     let (site, emulator) = wired("odrive", "timeout_ms = 100", odrive);
     measure("odrive", site, Some(emulator), seconds);
+    let moteus = Emulator::start(Moteus::new(moteus::Make::default(), &rig)).expect("a pseudo terminal");
+    let (site, emulator) = wired("moteus", "timeout_ms = 100", moteus);
+    measure("moteus", site, Some(emulator), seconds);
 }
 
 fn measure(name: &str, site: Site, emulator: Option<Emulator>, seconds: u64) {
@@ -78,11 +81,8 @@ fn measure(name: &str, site: Site, emulator: Option<Emulator>, seconds: u64) {
         ticker.wait();
     }
     let periods = rows.windows(2).filter(|w| w[1].header.sequence == w[0].header.sequence + 1);
-    print_row(
-        name,
-        "period",
-        periods.map(|w| w[1].time_ns - w[0].time_ns + w[1].timing.lateness_ns).collect(),
-    );
+    let woke_ns = |row: &Telemetry| row.time_ns + row.timing.lateness_ns;
+    print_row(name, "period", periods.map(|w| woke_ns(&w[1]).saturating_sub(woke_ns(&w[0]))).collect());
     print_row(name, "age", rows.iter().filter(|row| row.armed != 0).map(|row| row.shaft_age_ns).collect());
     let arrived: Vec<(u64, f64)> = match &emulator {
         Some(emulator) => emulator.commands(),

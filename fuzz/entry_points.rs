@@ -53,8 +53,46 @@ pub fn deployment(text: &str) -> Result<(), String> {
     for (id, thruster) in &config.thrusters {
         kort_servo::settings::Settings::new(&config, id, thruster, &rig).map_err(|e| fail(e.to_string()))?;
         kort_servo::drives::choose(&config, id, thruster, &rig).map_err(|e| fail(e.to_string()))?;
+        kort_servo::sensors::choose(&config, id, thruster).map_err(|e| fail(e.to_string()))?;
     }
     Ok(())
+}
+
+/// What comes in on the wire of each drive: as it is, and as the content of sound frames, in pieces, at every stage of the
+/// conversation.
+pub fn wire(bytes: &[u8]) {
+    let rig = Rig::from_toml(RIG).expect("a sound rig");
+    let mut vesc = bytes.to_vec();
+    let mut odrive = bytes.to_vec();
+    let mut moteus = bytes.to_vec();
+    for part in bytes.chunks(40) {
+        kort_servo::drives::vesc::frame::frame(part, &mut vesc);
+        kort_servo::drives::odrive::text::line(&String::from_utf8_lossy(part), &mut odrive);
+        let hex: String = part.iter().map(|byte| format!("{byte:02x}")).collect();
+        moteus.extend(format!("\nrcv 100 {hex}\n").bytes());
+    }
+    for (kind, keys, heard) in
+        [("vesc", "pole_pairs = 7", vesc), ("odrive", "", odrive), ("moteus", "", moteus)]
+    {
+        let text = format!(
+            "[thrusters.t1]\nrig = \"r\"\namplifier = \"{kind}\"\n[thrusters.t1.drive]\nport = \"p\"\n{keys}\n"
+        );
+        let config = Config::parse(&text, None).expect("a sound deployment");
+        let thruster = config.thruster("t1").expect("it is there");
+        let chosen = kort_servo::drives::choose(&config, "t1", thruster, &rig).expect("a sound drive");
+        let Ok((.., mut protocol)) = chosen.on_wire() else { panic!("{kind} has no wire") };
+        let mut out = Vec::new();
+        protocol.begin();
+        protocol.ask(&mut out, &mut |_| ());
+        for piece in heard.chunks(1 + heard.len() / 5) {
+            protocol.ask(&mut out, &mut |_| ());
+            protocol.hear(piece, &mut |_| ());
+            protocol.tell(Some(1.0), &mut out);
+            protocol.hear(piece, &mut |_| ());
+            protocol.tell(None, &mut out);
+        }
+        assert!(!out.is_empty(), "{kind} says nothing");
+    }
 }
 
 /// A body or a message of a client; the error is the problem document.

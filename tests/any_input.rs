@@ -6,7 +6,7 @@ mod entry_points;
 
 use std::path::{Path, PathBuf};
 
-use entry_points::{body, deployment, description, recording};
+use entry_points::{body, deployment, description, recording, wire};
 use kort_gateway::bodies::Body;
 use proptest::prelude::*;
 use proptest::sample::Index;
@@ -98,6 +98,7 @@ fn edited(seed: &[u8], edits: &[Edit]) -> Vec<u8> {
 proptest! {
     #[test]
     fn any_bytes_at_every_entry(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
+        wire(&bytes);
         let _ = recording(&bytes);
         if let Ok(text) = std::str::from_utf8(&bytes) {
             let _ = (description(text), deployment(text));
@@ -127,6 +128,12 @@ proptest! {
         if let Ok(text) = String::from_utf8(edited(&seed, &edits)) {
             let _ = deployment(&text);
         }
+    }
+
+    #[test]
+    fn damaged_answers_of_drives(seed in any::<Index>(), edits in edits()) {
+        let seeds = files("fuzz/seeds/wires");
+        wire(&edited(one(&seeds, seed), &edits));
     }
 
     #[test]

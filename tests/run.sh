@@ -48,7 +48,7 @@ cargo test --workspace --no-fail-fast
 
 # Fuzzing where its tools are; elsewhere tests/any_input.rs stands in for it.
 if cargo +nightly fuzz --version >/dev/null 2>&1; then
-  for target in csv mcap toml deployment bodies messages; do
+  for target in csv mcap toml deployment bodies messages wires; do
     say "fuzzing $target for a minute"
     mkdir -p "fuzz/corpus/$target"
     cargo +nightly fuzz run "$target" "fuzz/corpus/$target" $(fuzz/seeds.sh "$target") -- -max_total_time=60 -rss_limit_mb=4096

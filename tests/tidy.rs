@@ -13,7 +13,7 @@ const DIRECTION: &[(&str, &[&str])] = &[
     ("crates/scenario", &["kort-thruster"]),
     ("crates/truth", &[]),
     ("crates/proof", &["kort-truth", "kort-recording"]),
-    ("crates/emulators", &["kort-thruster"]),
+    ("crates/emulators", &["kort-thruster", "kort-proto"]),
     ("proto", &[]),
     ("crates/recording", &["kort-proto"]),
     ("crates/control", &["kort-thruster"]),

@@ -4,6 +4,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod link;
+mod moteus;
 mod odrive;
 mod sensors;
 mod vesc;

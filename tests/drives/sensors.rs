@@ -29,6 +29,12 @@ fn thrusts(rows: &[Telemetry]) -> Vec<f64> {
     rows.iter().map(|row| row.signals.thrust_n).filter(|thrust| thrust.is_finite()).collect()
 }
 
+/// Time from the first row to the last.
+fn seconds(rows: &[Telemetry]) -> f64 {
+    let (first, last) = (rows.first().expect("rows"), rows.last().expect("rows"));
+    (last.time_ns - first.time_ns) as f64 * 1e-9
+}
+
 fn trips(bench: &mut Bench) -> Telemetry {
     let last = wait("the servo to trip", || drive(bench, 10).into_iter().find(|row| row.armed == 0));
     assert_eq!(last.faults, Fault::SensorLost.bit(), "{last:?}");
@@ -58,8 +64,9 @@ fn a_force_cell_that_prints_is_believed_over_the_drives_own_and_missed_when_it_i
     bench.arm();
     let rows = drive(&mut bench, 500);
     let read = thrusts(&rows);
-    // 50 lines in the second of 500 ticks; the simulated drive would show its own on every tick.
-    assert!((20..=60).contains(&read.len()), "{} readings", read.len());
+    // 50 lines a second; the simulated drive would show its own on every one of 500 ticks.
+    let rate_hz = read.len() as f64 / seconds(&rows);
+    assert!((15.0..=60.0).contains(&rate_hz), "{rate_hz} readings a second");
     assert!(read.iter().all(|thrust| (thrust - (1.0 - 2.5 * KGF_N)).abs() < 1e-9), "{read:?}");
     for mischief in [Mischief::Silent, Mischief::Garbage, Mischief::Unplugged] {
         cell.spoil(mischief);
@@ -93,8 +100,10 @@ fn a_channel_of_industrial_io_is_read_and_missed_when_it_is_gone() {
     };
     let mut bench = servo(&keys(device.path()));
     bench.arm();
-    let read = thrusts(&drive(&mut bench, 500));
-    assert!((30..=110).contains(&read.len()), "{} readings", read.len());
+    let rows = drive(&mut bench, 500);
+    let read = thrusts(&rows);
+    let rate_hz = read.len() as f64 / seconds(&rows);
+    assert!((30.0..=115.0).contains(&rate_hz), "{rate_hz} readings a second");
     assert!(read.iter().all(|thrust| (thrust - 7.0).abs() < 1e-9), "500 mV at 0.02 N/mV less 3 N: {read:?}");
     std::fs::remove_file(device.path().join("in_voltage0_raw")).unwrap();
     trips(&mut bench);

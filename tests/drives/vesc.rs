@@ -1,12 +1,13 @@
 //! VESC.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use kort_emulators::vesc::Make;
 use kort_emulators::{Bench as Emulator, Mischief, Vesc};
 use kort_proto::faults::Fault;
 use kort_proto::messages::{Command, DriveKind};
 
+use crate::common::Stack;
 use crate::link::{Case, alone, rig};
 
 /// The drive's time-out as kort sets it, and the period at which a VESC looks at it.
@@ -106,4 +107,25 @@ fn volts_are_given_as_duty_and_speed_to_its_own_loop() {
         let truth = emulator.truth();
         assert!((truth.command - drive).abs() < 0.01 * drive, "{name}: {truth:?}");
     }
+}
+
+/// A shaft sensor that counts the other way round turns a speed loop into one that runs away: what it costs is bounded
+/// by the drive's current limit, or it trips.
+#[test]
+fn a_reversed_encoder_stays_within_the_current_limit() {
+    let _alone = alone();
+    let emulator = vesc(Make { reversed_encoder: true, ..Make::default() });
+    let mut stack = Stack::start_at(case().site(&emulator));
+    stack.command(60.0, 60_000);
+    let end = Instant::now() + Duration::from_secs(4);
+    let (mut current_a, mut speed_rad_s) = (0.0f64, 0.0f64);
+    while Instant::now() < end {
+        let truth = emulator.truth();
+        current_a = current_a.max(truth.current_a.abs());
+        speed_rad_s = speed_rad_s.max(truth.shaft_speed_rad_s.abs());
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    assert!(speed_rad_s > 1.0, "it never turned, and nothing was shown");
+    // The rig's limit, and what the drive's own loop shoots over.
+    assert!(current_a < 1.1 * 9.0, "{current_a} A");
 }

@@ -5,11 +5,15 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use kort_proto::transport::{monotonic_ns, realtime};
+
 use crate::pty::Pty;
 
 /// How often the device lives.
 const STEP: Duration = Duration::from_micros(500);
 
+/// Priority of the device where the system permits, below the servo's.
+const PRIORITY: i32 = 60;
 /// Changes of the command that are kept.
 const COMMANDS_MAX: usize = 1_000_000;
 
@@ -62,7 +66,7 @@ pub enum Mischief {
     Flipped,
     /// The last answer before arrives instead of each new one.
     Stale,
-    /// Answers arrive in pieces of one to three bytes; nothing is lost.
+    /// Answers arrive in pieces of one to sixteen bytes; nothing is lost.
     Split,
     /// Noise between the answers; nothing is lost.
     Noisy,
@@ -170,6 +174,8 @@ struct Serving<D> {
 
 impl<D: Device> Serving<D> {
     fn run(mut self, pty: Pty) {
+        // A real device waits for no scheduler; where this is not permitted it is as late as the machine is busy.
+        let _ = realtime(PRIORITY, false);
         let began = Instant::now();
         let mut pty = Some(pty);
         loop {
@@ -238,7 +244,7 @@ impl<D: Device> Serving<D> {
         if mischief == Mischief::Split {
             let mut rest = frame.as_slice();
             while !rest.is_empty() {
-                let (piece, after) = rest.split_at((1 + usize::from(self.dice() % 3)).min(rest.len()));
+                let (piece, after) = rest.split_at((1 + usize::from(self.dice() % 16)).min(rest.len()));
                 pty.write(piece);
                 std::thread::sleep(Duration::from_micros(100));
                 rest = after;
@@ -253,9 +259,4 @@ impl<D: Device> Serving<D> {
         self.dice = self.dice.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
         (self.dice >> 24) as u8
     }
-}
-
-fn monotonic_ns() -> u64 {
-    let now = rustix::time::clock_gettime(rustix::time::ClockId::Monotonic);
-    now.tv_sec as u64 * 1_000_000_000 + now.tv_nsec as u64
 }

@@ -8,6 +8,7 @@
 //! whatever a firmware does that its description does not say.
 
 mod bench;
+pub mod moteus;
 pub mod odrive;
 mod printer;
 mod pty;
@@ -15,6 +16,7 @@ mod stand;
 pub mod vesc;
 
 pub use bench::{Bench, Device, Mischief, Truth};
+pub use moteus::Moteus;
 pub use odrive::ODrive;
 pub use printer::Printer;
 pub use stand::Stand;

@@ -1,6 +1,7 @@
 //! Drives. One drive, one file, behind one trait; the loop knows no hardware.
 
 mod lying;
+pub mod moteus;
 pub mod odrive;
 pub mod simulated;
 pub mod vesc;
@@ -11,9 +12,9 @@ use kort_proto::messages::DriveKind;
 use kort_thruster::rig::{AmplifierKind, Rig};
 
 use crate::devices::{At, Shown};
-#[cfg(feature = "process")]
-use crate::link::{Link, Protocol};
+use crate::link::Protocol;
 
+pub use moteus::Moteus;
 pub use odrive::ODrive;
 pub use simulated::Simulated;
 pub use vesc::Vesc;
@@ -46,10 +47,15 @@ pub enum Chosen {
     Vesc(Vesc),
     /// An ODrive on USB or a serial port.
     ODrive(ODrive),
+    /// A moteus behind an fdcanusb adapter, or on its UART.
+    Moteus(Moteus),
 }
 
+/// A drive on a wire: the wire, its unit, and what is said on it.
+pub type OnWire = (Wired, DriveKind, Box<dyn Protocol>);
+
 /// Names of the drives, as `amplifier` gives them.
-pub const ALL: [&str; 3] = ["simulated", "vesc", "odrive"];
+pub const ALL: [&str; 4] = ["simulated", "vesc", "odrive", "moteus"];
 
 /// Reads what the configuration says of the drive.
 ///
@@ -60,6 +66,7 @@ pub fn choose(config: &Config, id: &str, thruster: &Thruster, rig: &Rig) -> Resu
         "simulated" => Ok(Chosen::Simulated(Box::new(Simulated::new(config, id, thruster, rig)?))),
         "vesc" => Ok(Chosen::Vesc(Vesc::new(config, id, thruster, rig)?)),
         "odrive" => Ok(Chosen::ODrive(ODrive::new(config, id, thruster, rig)?)),
+        "moteus" => Ok(Chosen::Moteus(Moteus::new(config, id, thruster, rig)?)),
         other => Err(config.error(format!(
             "`thrusters.{id}.amplifier` = \"{other}\" is no drive\nhint: known are \"{}\"",
             ALL.join("\", \"")
@@ -67,21 +74,36 @@ pub fn choose(config: &Config, id: &str, thruster: &Thruster, rig: &Rig) -> Resu
     }
 }
 
-#[cfg(feature = "process")]
 impl Chosen {
-    /// Opens and starts it; `priority` is the loop's.
+    /// The wire of a real drive and what is said on it; the simulated one has none, and is ready.
     ///
     /// # Errors
-    /// No thread or no descriptor is to be had. A device that is not there is a fault, not an error.
-    pub fn start(self, id: &str, priority: i32) -> std::io::Result<Box<dyn Drive>> {
-        let (wired, kind, protocol): (_, _, Box<dyn Protocol>) = match self {
-            Self::Simulated(drive) => return Ok(drive),
+    /// The simulated drive.
+    pub fn on_wire(self) -> Result<OnWire, Box<dyn Drive>> {
+        Ok(match self {
+            Self::Simulated(drive) => return Err(drive),
             Self::Vesc(vesc) => (vesc.wired.clone(), vesc.kind, Box::new(vesc::Protocol::new(vesc))),
             Self::ODrive(odrive) => {
                 (odrive.wired.clone(), odrive.kind, Box::new(odrive::Protocol::new(odrive)))
             }
-        };
-        Ok(Box::new(Link::start(wired.wire(id, priority), kind, protocol)?))
+            Self::Moteus(moteus) => {
+                (moteus.wired.clone(), moteus.kind, Box::new(moteus::Protocol::new(moteus)))
+            }
+        })
+    }
+
+    /// Starts it; `priority` is the loop's.
+    ///
+    /// # Errors
+    /// No thread or no descriptor is to be had. A device that is not there is a fault, not an error.
+    #[cfg(feature = "process")]
+    pub fn start(self, id: &str, priority: i32) -> std::io::Result<Box<dyn Drive>> {
+        match self.on_wire() {
+            Ok((wired, kind, protocol)) => {
+                Ok(Box::new(crate::link::Link::start(wired.wire(id, priority), kind, protocol)?))
+            }
+            Err(drive) => Ok(drive),
+        }
     }
 }
 

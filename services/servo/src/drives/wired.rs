@@ -17,6 +17,7 @@ struct Keys {
     reversed: bool,
     identity: String,
     pole_pairs: Option<u32>,
+    address: Option<u8>,
 }
 
 impl Default for Keys {
@@ -30,6 +31,7 @@ impl Default for Keys {
             reversed: false,
             identity: String::new(),
             pole_pairs: None,
+            address: None,
         }
     }
 }
@@ -53,6 +55,8 @@ pub struct Wired {
     pub identity: String,
     /// Pole pairs of the motor, for drives that tell electrical speed.
     pub pole_pairs: Option<u32>,
+    /// Number on the bus, for drives that share one.
+    pub address: Option<u8>,
 }
 
 impl Wired {
@@ -114,6 +118,7 @@ impl Wired {
             reversed: keys.reversed,
             identity: keys.identity.to_ascii_lowercase(),
             pole_pairs: keys.pole_pairs,
+            address: keys.address,
         })
     }
 
@@ -128,6 +133,33 @@ impl Wired {
                 "`thrusters.{id}.drive.pole_pairs` = {pairs}: this drive tells the speed of the shaft itself\nhint: leave the key out"
             ))),
         }
+    }
+
+    /// For a drive that is alone on its wire.
+    ///
+    /// # Errors
+    /// [`ConfigError`] if `address` is given.
+    pub fn without_address(self, config: &Config, id: &str) -> Result<Self, ConfigError> {
+        match self.address {
+            None => Ok(self),
+            Some(address) => Err(config.error(format!(
+                "`thrusters.{id}.drive.address` = {address}: this drive is alone on its wire\nhint: leave the key out"
+            ))),
+        }
+    }
+
+    /// For a drive whose serial number kort does not read.
+    ///
+    /// # Errors
+    /// [`ConfigError`] if `identity` is given.
+    pub fn without_identity(self, config: &Config, id: &str) -> Result<Self, ConfigError> {
+        if self.identity.is_empty() {
+            return Ok(self);
+        }
+        Err(config.error(format!(
+            "`thrusters.{id}.drive.identity` = \"{}\": kort reads no serial number of this drive\nhint: leave the key out, and name the port by the adapter's: /dev/serial/by-id/…",
+            self.identity
+        )))
     }
 
     /// The wire as its thread is told it. The thread stands just below the loop that it serves.

@@ -41,7 +41,10 @@ impl ODrive {
     /// # Errors
     /// [`ConfigError`] names key, value and what is allowed.
     pub fn new(config: &Config, id: &str, thruster: &Thruster, rig: &Rig) -> Result<Self, ConfigError> {
-        let wired = Wired::new(config, id, thruster)?.without_pole_pairs(config, id)?;
+        let wired = Wired::new(config, id, thruster)?
+            .without_pole_pairs(config, id)?
+            .without_address(config, id)?
+            .without_identity(config, id)?;
         let kind = kind_of(rig);
         if !matches!(kind, DriveKind::Current | DriveKind::Speed) {
             return Err(config.error(format!(

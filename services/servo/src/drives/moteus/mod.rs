@@ -1,0 +1,64 @@
+//! A moteus controller behind an fdcanusb adapter, or on its UART, which speaks the same lines.
+//!
+//! Read for this: the register, CAN, diagnostic, UART and configuration pages of the moteus documentation (mjbots/moteus).
+//!
+//! Units on the wire: torque in N m, speed in turns a second, angle in turns, Q current in A, all as 32-bit floats. Signs are the
+//! drive's; `reversed` turns all of them. A rig of kind `current` is driven in position mode with every gain at zero and the torque
+//! fed forward, current times the *rig's* torque constant: the amperes are as right as that constant, and the Q current told
+//! shows it. `speed` is position mode with a velocity and no position. Volts it does not take.
+//!
+//! Its own watchdog: each command carries the time it is valid for (register 0x027). What the drive does after it is
+//! `servo.timeout_mode`, which must be 0, stopped: the factory's 12 would brake. kort reads it through the diagnostic channel and sets it in
+//! RAM where it differs (`conf set`, never `conf write`), and reads it again.
+//!
+//! Output off is mode 0, stopped: the shaft coasts; it also clears the drive's faults, which are `amplifier_fault` as long as they
+//! stand. A drive that leaves position mode by itself, or whose millisecond counter goes back, was reset. Lines carry a
+//! check sum wherever the far end uses one, which a UART always does; over USB the bus has its own.
+
+mod protocol;
+pub mod text;
+
+use kort_proto::config::{Config, ConfigError, Thruster};
+use kort_proto::messages::DriveKind;
+use kort_thruster::rig::Rig;
+
+pub use protocol::Protocol;
+
+use super::{Wired, kind_of};
+
+/// A moteus as the configuration describes it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Moteus {
+    /// The wire.
+    pub wired: Wired,
+    /// Unit of the drive.
+    pub kind: DriveKind,
+    /// Its number on the bus.
+    pub address: u8,
+    /// Torque of an ampere, N m/A.
+    pub torque_constant_nm_a: f64,
+}
+
+impl Moteus {
+    /// Reads the section `drive`.
+    ///
+    /// # Errors
+    /// [`ConfigError`] names key, value and what is allowed.
+    pub fn new(config: &Config, id: &str, thruster: &Thruster, rig: &Rig) -> Result<Self, ConfigError> {
+        let wired =
+            Wired::new(config, id, thruster)?.without_pole_pairs(config, id)?.without_identity(config, id)?;
+        let kind = kind_of(rig);
+        if !matches!(kind, DriveKind::Current | DriveKind::Speed) {
+            return Err(config.error(format!(
+                "`thrusters.{id}.amplifier` = \"moteus\" takes current or speed, but the rig's amplifier is of kind voltage\nhint: amplifier.kind = \"current\" in the rig, with its current_limit_a"
+            )));
+        }
+        let address = wired.address.unwrap_or(1);
+        if !(1..=126).contains(&address) {
+            return Err(config.error(format!(
+                "`thrusters.{id}.drive.address` = {address} is outside 1 to 126\nhint: 1 unless it was changed with moteus_tool"
+            )));
+        }
+        Ok(Self { wired, kind, address, torque_constant_nm_a: rig.motor.torque_constant_nm_a.value })
+    }
+}
