@@ -283,6 +283,35 @@ fn slow_sockets_do_not_lock_out_the_stop() {
     });
 }
 
+/// The event log is put aside at its size, keeps five files, and what was put aside is still told.
+#[test]
+fn the_event_log_rotates_under_way() {
+    let stack = Stack::start();
+    let folder = stack.site.folder.path().join("events");
+    let leases = || {
+        let events = stack.get("/v1/events")?;
+        Some(events.as_array()?.iter().filter(|event| event["kind"] == "lease_taken").count())
+    };
+    for round in 1..=7 {
+        // As months of service would fill it; a torn line of another's is left out.
+        let mut log = std::fs::OpenOptions::new().append(true).open(folder.join("events.jsonl")).unwrap();
+        log.write_all(&[b"x".repeat((1 << 20) + 1), b"\n".to_vec()].concat()).unwrap();
+        let (status, lease) =
+            stack.http("POST", "/lease", Some(json!({"holder": format!("round {round}")}))).unwrap();
+        assert_eq!(status, 201, "{lease}");
+        wait("the log to be put aside", || {
+            let fresh = std::fs::metadata(folder.join("events.jsonl")).ok()?;
+            (fresh.len() < 1 << 20).then_some(())
+        });
+        // The lease of 500 ms expires by itself.
+        wait("the lease to end", || stack.state()?["lease"].is_null().then_some(()));
+        assert!(leases().is_some_and(|told| told >= round.min(4)), "round {round}");
+    }
+    let files = std::fs::read_dir(&folder).unwrap().flatten();
+    let logs = files.filter(|file| file.file_name().to_string_lossy().ends_with(".jsonl")).count();
+    assert_eq!(logs, 5, "and no more");
+}
+
 /// A connection that sends half a request and goes on holding.
 fn half_a_head(port: u16) -> Option<TcpStream> {
     let mut socket = TcpStream::connect(("127.0.0.1", port)).ok()?;
