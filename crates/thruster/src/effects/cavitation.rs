@@ -36,7 +36,13 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     nonparametric: false,
     forms: &[&[0, 1], &[0, 1, 2]],
     parameters,
-    starts: |scale| [1.3, 3.0, 5.0].iter().map(|factor| vec![0.1, onset(scale, *factor), 1.0]).chain([vec![0.1, onset(scale, 2.0), -0.3]]).collect(),
+    starts: |scale| {
+        [1.3, 3.0, 5.0]
+            .iter()
+            .map(|factor| vec![0.1, onset(scale, *factor), 1.0])
+            .chain([vec![0.1, onset(scale, 2.0), -0.3]])
+            .collect()
+    },
     needs: wet,
     build: both!(|values, _| Box::new(Cavitation { loss: values[0], onset: values[1], drag: values[2] })),
 };

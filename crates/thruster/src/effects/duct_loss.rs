@@ -44,7 +44,11 @@ fn parameters(_: &Scale) -> Vec<Spec> {
 
 fn build<T: Real>(values: &[T], context: &Context<T>) -> Box<dyn Effect<T>> {
     let flux = context.parameters.get(P::DensityKgM3) * context.parameters.area_m2();
-    Box::new(DuctLoss { loss_kg_m: values[0] * 0.5 * flux, stand_kg_m: values[1] * flux, astern_kg_m: values[2] * 0.5 * flux })
+    Box::new(DuctLoss {
+        loss_kg_m: values[0] * 0.5 * flux,
+        stand_kg_m: values[1] * flux,
+        astern_kg_m: values[2] * 0.5 * flux,
+    })
 }
 
 struct DuctLoss<T> {
