@@ -346,7 +346,8 @@ impl Drop for Stack {
     fn drop(&mut self) {
         if std::thread::panicking() {
             let log = self.site.log();
-            STOOD_STILL.set(["loop_stalled", "command_timeout"].iter().any(|trip| log.contains(trip)));
+            STOOD_STILL
+                .set(["loop_stalled", "command_timeout", "drive_lost"].iter().any(|trip| log.contains(trip)));
             eprintln!("--- log of the deployment\n{log}");
         }
         let children = children(self.supervisor.id());

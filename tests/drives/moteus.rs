@@ -7,15 +7,15 @@ use kort_emulators::{Bench as Emulator, Mischief, Moteus};
 use kort_proto::faults::Fault;
 use kort_proto::messages::Command;
 
-use crate::link::{Case, alone, rig};
+use crate::link::{Case, LIFE_MS, TIMEOUT_MS, alone, rig};
 
 /// The time that each command is valid for.
-const TIMEOUT: Duration = Duration::from_millis(100 + 10);
+const TIMEOUT: Duration = Duration::from_millis(TIMEOUT_MS + 10);
 /// A reading's life in these tests, and some exchanges.
-const STALE: Duration = Duration::from_millis(150 + 30);
+const STALE: Duration = Duration::from_millis(LIFE_MS + 30);
 
 fn case() -> Case {
-    Case { kind: "moteus", keys: "timeout_ms = 100", drive: 4.0, command: Command::default() }
+    Case { kind: "moteus", keys: "", drive: 4.0, command: Command::default() }
 }
 
 fn moteus(make: Make) -> Emulator {
@@ -47,9 +47,9 @@ fn a_servo_that_dies_or_stands_still_leaves_no_torque() {
 fn a_drive_that_resets_or_reports_a_fault_ends_at_zero() {
     let _alone = alone();
     let emulator = moteus(Make { address: 5, ..Make::default() });
-    let case = Case { keys: "timeout_ms = 100, address = 5", ..case() };
+    let case = Case { keys: "address = 5", ..case() };
     let mut bench = case.servo(&emulator);
-    let soon = Duration::from_millis(180);
+    let soon = Duration::from_millis(LIFE_MS + 30);
     let reset = [Fault::DriveRestarted, Fault::DriveLost];
     case.ends_at_zero(&mut bench, &emulator, &reset, soon, || emulator.restart(), || ());
     let fault = [Fault::AmplifierFault];

@@ -6,15 +6,15 @@ use kort_emulators::{Bench as Emulator, Mischief, ODrive};
 use kort_proto::faults::Fault;
 use kort_proto::messages::Command;
 
-use crate::link::{Case, alone, rig};
+use crate::link::{Case, LIFE_MS, TIMEOUT_MS, alone, rig};
 
 /// The drive's watchdog as kort sets it.
-const TIMEOUT: Duration = Duration::from_millis(100 + 10);
+const TIMEOUT: Duration = Duration::from_millis(TIMEOUT_MS + 10);
 /// `checks.frozen_s`, and an exchange.
 const FROZEN: Duration = Duration::from_millis(500 + 20);
 
 fn case() -> Case {
-    Case { kind: "odrive", keys: "timeout_ms = 100", drive: 4.0, command: Command::default() }
+    Case { kind: "odrive", keys: "", drive: 4.0, command: Command::default() }
 }
 
 fn odrive(read_only: bool) -> Emulator {
@@ -46,7 +46,7 @@ fn a_drive_that_resets_or_reports_a_fault_ends_at_zero() {
     let _alone = alone();
     let emulator = odrive(false);
     let mut bench = case().servo(&emulator);
-    let soon = Duration::from_millis(180);
+    let soon = Duration::from_millis(LIFE_MS + 30);
     let reset = [Fault::DriveRestarted, Fault::DriveLost];
     case().ends_at_zero(&mut bench, &emulator, &reset, soon, || emulator.restart(), || ());
     let fault = [Fault::AmplifierFault];

@@ -123,6 +123,12 @@ impl Serving {
             self.hear(bytes.get(..n).unwrap_or_default());
             let silent_ns = monotonic_ns().saturating_sub(self.told.stamp_ns.max(self.guarded_ns));
             if self.told.guarded && silent_ns > self.wire.reading_life_ns {
+                // Perhaps it still hears, though it is not heard: off, while it is known how it wants to be spoken to.
+                if std::mem::take(&mut self.driving) {
+                    out.clear();
+                    self.protocol.tell(None, &mut out);
+                    port.send(&out)?;
+                }
                 // Whoever answers next may have been reset, or be another one.
                 self.begin();
             }
@@ -133,7 +139,7 @@ impl Serving {
             out.clear();
             if !self.told.guarded {
                 if std::mem::take(&mut self.driving) {
-                    // Perhaps it still hears, though it is not heard: off.
+                    // It was reset, or is not to be driven any more: off.
                     self.protocol.tell(None, &mut out);
                 } else if now >= ask_next {
                     ask_next = now + ASK_AGAIN;
