@@ -105,7 +105,8 @@ fn a_crashed_clients_lease_is_taken_over_aloud_and_a_refused_command_renews_noth
         while !stack.state().unwrap()["lease"].is_null() {
             let (status, _) =
                 ask(port, "PUT", &format!("{T1}/setpoint"), &[("Lease-Id", id)], r#"{"thrust_n": 5}"#);
-            assert_eq!(status, 409);
+            // 503 where the machine holds the servo up: refused too.
+            assert!(matches!(status, 409 | 503), "{status}");
             assert!(began.elapsed() < Duration::from_secs(6), "refused commands keep the lease alive");
         }
     });
