@@ -14,7 +14,8 @@ mod sensors;
 mod shared_memory;
 mod table;
 
-use table::{Stalls, Table};
+use common::Stalls;
+use table::Table;
 
 /// Makes a fault, and notes what follows from it.
 type Fault = fn(&mut Table);
