@@ -52,82 +52,91 @@ fn arms_again(bench: &mut Bench) {
 #[test]
 fn a_force_cell_that_prints_is_believed_over_the_drives_own_and_missed_when_it_is_silent() {
     let _alone = alone();
-    let cell = Emulator::start(Printer::new(2.5, 50.0)).unwrap();
-    let keys = |required: bool| {
-        format!(
-            "kind = \"serial_line\", port = {:?}, reading_life_ms = 300, required = {required}, \
+    crate::common::in_real_time(|| {
+        let cell = Emulator::start(Printer::new(2.5, 50.0)).unwrap();
+        let keys = |required: bool| {
+            format!(
+                "kind = \"serial_line\", port = {:?}, reading_life_ms = 300, required = {required}, \
              signals = {{ thrust_n = {{ column = 2, unit = \"kgf\", scale = -1.0, offset = 1.0 }} }}",
-            cell.port()
-        )
-    };
-    let mut bench = servo(&keys(true));
-    bench.arm();
-    let rows = drive(&mut bench, 500);
-    let read = thrusts(&rows);
-    // 50 lines a second; the simulated drive would show its own on every one of 500 ticks.
-    let rate_hz = read.len() as f64 / seconds(&rows);
-    assert!((15.0..=60.0).contains(&rate_hz), "{rate_hz} readings a second");
-    assert!(read.iter().all(|thrust| (thrust - (1.0 - 2.5 * KGF_N)).abs() < 1e-9), "{read:?}");
-    for mischief in [Mischief::Silent, Mischief::Garbage, Mischief::Unplugged] {
-        cell.spoil(mischief);
-        trips(&mut bench);
-        cell.spoil(Mischief::None);
-        arms_again(&mut bench);
-        assert!(drive(&mut bench, 50).iter().all(|row| row.armed != 0), "{mischief:?}");
-    }
-    drop(bench);
-    // One that can be done without.
-    let mut bench = servo(&keys(false));
-    bench.arm();
-    cell.spoil(Mischief::Silent);
-    let rows = drive(&mut bench, 500);
-    assert!(rows.last().unwrap().armed != 0, "{:?}", rows.last());
-    assert!(thrusts(&rows[250..]).is_empty(), "what is not measured is shown");
+                cell.port()
+            )
+        };
+        let mut bench = servo(&keys(true));
+        bench.arm();
+        let rows = drive(&mut bench, 500);
+        let read = thrusts(&rows);
+        // 50 lines a second; the simulated drive would show its own on every one of 500 ticks.
+        let rate_hz = read.len() as f64 / seconds(&rows);
+        assert!((15.0..=60.0).contains(&rate_hz), "{rate_hz} readings a second");
+        assert!(read.iter().all(|thrust| (thrust - (1.0 - 2.5 * KGF_N)).abs() < 1e-9), "{read:?}");
+        for mischief in [Mischief::Silent, Mischief::Garbage, Mischief::Unplugged] {
+            cell.spoil(mischief);
+            trips(&mut bench);
+            cell.spoil(Mischief::None);
+            arms_again(&mut bench);
+            assert!(drive(&mut bench, 50).iter().all(|row| row.armed != 0), "{mischief:?}");
+        }
+        drop(bench);
+        // One that can be done without.
+        let mut bench = servo(&keys(false));
+        bench.arm();
+        cell.spoil(Mischief::Silent);
+        let rows = drive(&mut bench, 500);
+        assert!(rows.last().unwrap().armed != 0, "{:?}", rows.last());
+        assert!(thrusts(&rows[250..]).is_empty(), "what is not measured is shown");
+    });
 }
 
 #[test]
 fn a_channel_of_industrial_io_is_read_and_missed_when_it_is_gone() {
     let _alone = alone();
-    let device = tempfile::tempdir().unwrap();
-    let put = |name: &str, text: &str| std::fs::write(device.path().join(name), text).unwrap();
-    put("in_voltage0_raw", "1000\n");
-    put("in_voltage0_scale", "0.5\n");
-    let keys = |path: &Path| {
-        format!(
-            "kind = \"iio\", path = {path:?}, rate_hz = 100, reading_life_ms = 300, \
+    crate::common::in_real_time(|| {
+        let device = tempfile::tempdir().unwrap();
+        let put = |name: &str, text: &str| std::fs::write(device.path().join(name), text).unwrap();
+        put("in_voltage0_raw", "1000\n");
+        put("in_voltage0_scale", "0.5\n");
+        let keys = |path: &Path| {
+            format!(
+                "kind = \"iio\", path = {path:?}, rate_hz = 100, reading_life_ms = 300, \
              signals = {{ thrust_n = {{ channel = \"in_voltage0\", scale = 0.02, offset = -3.0 }} }}"
-        )
-    };
-    let mut bench = servo(&keys(device.path()));
-    bench.arm();
-    let rows = drive(&mut bench, 500);
-    let read = thrusts(&rows);
-    let rate_hz = read.len() as f64 / seconds(&rows);
-    assert!((30.0..=115.0).contains(&rate_hz), "{rate_hz} readings a second");
-    assert!(read.iter().all(|thrust| (thrust - 7.0).abs() < 1e-9), "500 mV at 0.02 N/mV less 3 N: {read:?}");
-    std::fs::remove_file(device.path().join("in_voltage0_raw")).unwrap();
-    trips(&mut bench);
-    let log = wait("the reason", || Some(bench.site.log()).filter(|log| log.contains("in_voltage0_raw")));
-    assert!(log.contains("hint:"), "{log}");
-    put("in_voltage0_raw", "1100\n");
-    arms_again(&mut bench);
-    let read = thrusts(&drive(&mut bench, 200));
-    assert!(read.iter().all(|thrust| (thrust - 8.0).abs() < 1e-9) && !read.is_empty(), "{read:?}");
+            )
+        };
+        let mut bench = servo(&keys(device.path()));
+        bench.arm();
+        let rows = drive(&mut bench, 500);
+        let read = thrusts(&rows);
+        let rate_hz = read.len() as f64 / seconds(&rows);
+        assert!((30.0..=115.0).contains(&rate_hz), "{rate_hz} readings a second");
+        assert!(
+            read.iter().all(|thrust| (thrust - 7.0).abs() < 1e-9),
+            "500 mV at 0.02 N/mV less 3 N: {read:?}"
+        );
+        std::fs::remove_file(device.path().join("in_voltage0_raw")).unwrap();
+        trips(&mut bench);
+        let log = wait("the reason", || Some(bench.site.log()).filter(|log| log.contains("in_voltage0_raw")));
+        assert!(log.contains("hint:"), "{log}");
+        put("in_voltage0_raw", "1100\n");
+        arms_again(&mut bench);
+        let read = thrusts(&drive(&mut bench, 200));
+        assert!(read.iter().all(|thrust| (thrust - 8.0).abs() < 1e-9) && !read.is_empty(), "{read:?}");
+    });
 }
 
 /// A force cell that needs its line asked for would be silent without: it is asked, and at its rate.
 #[test]
 fn an_instrument_is_asked_at_its_rate() {
     let _alone = alone();
-    let cell = Emulator::start(Printer::new(1.0, 20.0)).unwrap();
-    let keys = format!(
-        "kind = \"serial_line\", port = {:?}, ask = \"R\\n\", rate_hz = 20, signals = {{ thrust_n = {{ column = 2, unit = \"kgf\" }} }}",
-        cell.port()
-    );
-    let mut bench = servo(&keys);
-    bench.arm();
-    let (before, began) = (cell.heard(), Instant::now());
-    drive(&mut bench, 1000);
-    let asked_hz = (cell.heard() - before) as f64 / 2.0 / began.elapsed().as_secs_f64();
-    assert!((5.0..=22.0).contains(&asked_hz), "asked {asked_hz} times a second");
+    crate::common::in_real_time(|| {
+        let cell = Emulator::start(Printer::new(1.0, 20.0)).unwrap();
+        let keys = format!(
+            "kind = \"serial_line\", port = {:?}, ask = \"R\\n\", rate_hz = 20, signals = {{ thrust_n = {{ column = 2, unit = \"kgf\" }} }}",
+            cell.port()
+        );
+        let mut bench = servo(&keys);
+        bench.arm();
+        let (before, began) = (cell.heard(), Instant::now());
+        drive(&mut bench, 1000);
+        let asked_hz = (cell.heard() - before) as f64 / 2.0 / began.elapsed().as_secs_f64();
+        assert!((5.0..=22.0).contains(&asked_hz), "asked {asked_hz} times a second");
+    });
 }

@@ -32,84 +32,110 @@ fn the_service_drives_it_and_records() {
 #[test]
 fn every_fault_of_the_wire_ends_at_zero() {
     let _alone = alone();
-    case().endures_its_wire(
-        &vesc(Make::default()),
-        TIMEOUT,
-        &[Fault::SensorFrozen],
-        FROZEN,
-        &[Mischief::Split, Mischief::Noisy],
-    );
+    crate::common::in_real_time(|| {
+        case().endures_its_wire(
+            &vesc(Make::default()),
+            TIMEOUT,
+            &[Fault::SensorFrozen],
+            FROZEN,
+            &[Mischief::Split, Mischief::Noisy],
+        );
+    });
 }
 
 #[test]
 fn a_servo_that_dies_or_stands_still_leaves_no_torque() {
     let _alone = alone();
-    case().outlives_its_servo(&vesc(Make::default()), TIMEOUT);
+    crate::common::in_real_time(|| {
+        case().outlives_its_servo(&vesc(Make::default()), TIMEOUT);
+    });
 }
 
 #[test]
 fn a_drive_that_resets_or_reports_a_fault_ends_at_zero() {
     let _alone = alone();
-    let emulator = vesc(Make::default());
-    let mut bench = case().servo(&emulator);
-    let soon = Duration::from_millis(LIFE_MS + 30);
-    let reset = [Fault::DriveRestarted, Fault::DriveLost];
-    case().ends_at_zero(&mut bench, &emulator, &reset, soon, || emulator.restart(), || ());
-    let fault = [Fault::AmplifierFault];
-    case().ends_at_zero(&mut bench, &emulator, &fault, soon, || emulator.report(4), || emulator.report(0));
-    assert!(bench.site.log().contains("fault 4: absolute over-current"), "{}", bench.site.log());
-    // So quick a reset that no answer is missed shows by what the drive counts.
-    drop(bench);
-    let emulator = vesc(Make { boot_s: 0.0, ..Make::default() });
-    let mut bench = case().servo(&emulator);
-    case().ends_at_zero(&mut bench, &emulator, &[Fault::DriveRestarted], soon, || emulator.restart(), || ());
+    crate::common::in_real_time(|| {
+        let emulator = vesc(Make::default());
+        let mut bench = case().servo(&emulator);
+        let soon = Duration::from_millis(LIFE_MS + 30);
+        let reset = [Fault::DriveRestarted, Fault::DriveLost];
+        case().ends_at_zero(&mut bench, &emulator, &reset, soon, || emulator.restart(), || ());
+        let fault = [Fault::AmplifierFault];
+        case().ends_at_zero(
+            &mut bench,
+            &emulator,
+            &fault,
+            soon,
+            || emulator.report(4),
+            || emulator.report(0),
+        );
+        assert!(bench.site.log().contains("fault 4: absolute over-current"), "{}", bench.site.log());
+        // So quick a reset that no answer is missed shows by what the drive counts.
+        drop(bench);
+        let emulator = vesc(Make { boot_s: 0.0, ..Make::default() });
+        let mut bench = case().servo(&emulator);
+        case().ends_at_zero(
+            &mut bench,
+            &emulator,
+            &[Fault::DriveRestarted],
+            soon,
+            || emulator.restart(),
+            || (),
+        );
+    });
 }
 
 #[test]
 fn it_is_not_armed_without_its_time_out() {
     let _alone = alone();
-    let off = Make { stored_timeout_ms: 0, read_only: true, ..Make::default() };
-    case().cannot_be_armed(&vesc(off), "does not take its settings");
-    let old = Make { firmware: (5, 2), ..Make::default() };
-    case().cannot_be_armed(&vesc(old), "firmware 5.02");
-    let other = Case { keys: "pole_pairs = 7, identity = \"0011\"", ..case() };
-    other.cannot_be_armed(&vesc(Make::default()), "two drives swapped?");
+    crate::common::in_real_time(|| {
+        let off = Make { stored_timeout_ms: 0, read_only: true, ..Make::default() };
+        case().cannot_be_armed(&vesc(off), "does not take its settings");
+        let old = Make { firmware: (5, 2), ..Make::default() };
+        case().cannot_be_armed(&vesc(old), "firmware 5.02");
+        let other = Case { keys: "pole_pairs = 7, identity = \"0011\"", ..case() };
+        other.cannot_be_armed(&vesc(Make::default()), "two drives swapped?");
+    });
 }
 
 /// What is stored stays; what is in force until the next power-off is what was asked for.
 #[test]
 fn a_time_out_that_is_too_long_is_set_until_the_next_power_off() {
     let _alone = alone();
-    let make = Make { stored_timeout_ms: 5000, stored_brake_current_a: 4.0, ..Make::default() };
-    case().outlives_its_servo(&vesc(make), TIMEOUT);
+    crate::common::in_real_time(|| {
+        let make = Make { stored_timeout_ms: 5000, stored_brake_current_a: 4.0, ..Make::default() };
+        case().outlives_its_servo(&vesc(make), TIMEOUT);
+    });
 }
 
 /// Duty for a rig that is driven by volts, and the drive's own speed loop.
 #[test]
 fn volts_are_given_as_duty_and_speed_to_its_own_loop() {
     let _alone = alone();
-    for (name, kind, drive) in
-        [("t200-vehicle", DriveKind::Voltage, 6.0), ("speed-drive", DriveKind::Speed, 30.0)]
-    {
-        let emulator = Emulator::start(Vesc::new(Make::default(), &rig(name))).unwrap();
-        let command = Command { kind: kind as u32, ..Command::default() };
-        let case = Case { drive, command, ..case() };
-        let site = case.site(&emulator);
-        let config = std::fs::read_to_string(site.config()).unwrap();
-        let config = config
-            .replace("whitcomb-yoerger-1999", name)
-            .replace("{ full_drive_s = 0.005 }", "{ full_drive_s = 0.5, speed_rad_s = 500.0 }");
-        std::fs::write(site.config(), config).unwrap();
-        let mut bench = crate::common::bench::Bench::start_at(site);
-        bench.zero = command;
-        // A machine that stands still trips it: then once more.
-        let there = (0..6).any(|_| {
-            case.turn(&mut bench, &emulator);
-            case.drive_for(&mut bench, 500);
-            (emulator.truth().command - drive).abs() < 0.01 * drive
-        });
-        assert!(there, "{name}: {:?}", emulator.truth());
-    }
+    crate::common::in_real_time(|| {
+        for (name, kind, drive) in
+            [("t200-vehicle", DriveKind::Voltage, 6.0), ("speed-drive", DriveKind::Speed, 30.0)]
+        {
+            let emulator = Emulator::start(Vesc::new(Make::default(), &rig(name))).unwrap();
+            let command = Command { kind: kind as u32, ..Command::default() };
+            let case = Case { drive, command, ..case() };
+            let site = case.site(&emulator);
+            let config = std::fs::read_to_string(site.config()).unwrap();
+            let config = config
+                .replace("whitcomb-yoerger-1999", name)
+                .replace("{ full_drive_s = 0.005 }", "{ full_drive_s = 0.5, speed_rad_s = 500.0 }");
+            std::fs::write(site.config(), config).unwrap();
+            let mut bench = crate::common::bench::Bench::start_at(site);
+            bench.zero = command;
+            // A machine that stands still trips it: then once more.
+            let there = (0..6).any(|_| {
+                case.turn(&mut bench, &emulator);
+                case.drive_for(&mut bench, 500);
+                (emulator.truth().command - drive).abs() < 0.01 * drive
+            });
+            assert!(there, "{name}: {:?}", emulator.truth());
+        }
+    });
 }
 
 /// A shaft sensor that counts the other way round turns a speed loop into one that runs away: what it costs is bounded

@@ -231,11 +231,10 @@ impl<D: Device> Serving<D> {
             Mischief::Unplugged | Mischief::Silent => return,
             Mischief::Garbage => frame.iter_mut().for_each(|byte| *byte = self.dice()),
             Mischief::Truncated => frame.truncate(frame.len() / 2),
+            // One in eight, wherever it begins: a single one may fall where it changes nothing (a digit's case).
             Mischief::Flipped => {
-                let at = usize::from(self.dice()) % frame.len().max(1);
-                if let Some(byte) = frame.get_mut(at) {
-                    *byte ^= 1 << (self.dice() % 7);
-                }
+                let first = usize::from(self.dice() % 8);
+                frame.iter_mut().skip(first).step_by(8).for_each(|byte| *byte ^= 1);
             }
             Mischief::Stale => frame.clone_from(&self.last),
             Mischief::Noisy => pty.write(&[self.dice() | 0x80, self.dice() | 0x80]),
