@@ -15,7 +15,7 @@ pub mod bench;
 mod stalls;
 mod watch;
 #[allow(unused_imports)]
-pub use stalls::Stalls;
+pub use stalls::{STOOD_STILL, Stalls, in_real_time};
 #[allow(unused_imports)]
 pub use watch::{Watch, at_zero};
 
@@ -137,31 +137,6 @@ impl Drop for Site {
         }
         // Owning clears what killed processes left in shared memory.
         let _ = self.deployment().own();
-    }
-}
-
-thread_local! {
-    static STOOD_STILL: std::cell::Cell<bool> = const { std::cell::Cell::new(false) };
-}
-
-/// A thread that wakes so much too late was held up by the machine, ms: half a time-out of a service asked by HTTP.
-const HELD_UP_MS: f64 = 50.0;
-
-/// Runs a test of live processes again, up to twice, where it failed and a servo said that its loop or its controller
-/// stood still, or a thread that only sleeps was held up: then the machine was suspended or overloaded for longer than
-/// a drive may wait, the trip to zero is what the service promises, and what the test asks about was not to be seen.
-pub fn in_real_time(test: impl Fn()) {
-    let stalls = Stalls::watch();
-    for again in [true, true, false] {
-        STOOD_STILL.set(false);
-        stalls.take_ms();
-        match std::panic::catch_unwind(std::panic::AssertUnwindSafe(&test)) {
-            Err(_) if again && (STOOD_STILL.get() || stalls.take_ms() > HELD_UP_MS) => {
-                eprintln!("the machine stood still; once more")
-            }
-            Err(failure) => std::panic::resume_unwind(failure),
-            Ok(()) => return,
-        }
     }
 }
 

@@ -180,7 +180,7 @@ fn what_was_found_is_written_and_read_back() {
     let read = Rig::from_toml(&written).unwrap();
     assert_eq!(read.effects[0].parameters[0].1, Quantity { value: 0.0612346, tol: Some(0.03) });
     assert_eq!(read.effects[0].value("stribeck_speed_rad_s"), 1.5);
-    assert_eq!(read.effects[1].values().collect::<Vec<_>>(), [-0.01, 0.0, 0.0]);
+    assert_eq!(read.effects[1].values().collect::<Vec<_>>(), [-0.01, 0.0, 0.0, 0.0]);
     // Written again, it stays.
     assert_eq!(Rig::with_effects_toml(&written, &found).unwrap(), written);
     let unknown = [FoundEffect { effect: "gremlins", parameters: Vec::new() }];
