@@ -29,7 +29,7 @@ pub struct Decision {
 
 /// A rival stands near a name from this share of its probability on: odds of five to one part them.
 const NEAR: f64 = 0.2;
-/// From this probability on a name is believed.
+/// From this probability on, among all that was fitted, a name is believed.
 const BELIEVED: f64 = 0.7;
 /// A remainder below this share of what was to be explained is of no practical size.
 const PRACTICAL: f64 = 0.1;
@@ -43,7 +43,7 @@ pub struct Circumstances {
     pub broke_down: bool,
     /// Share of the squared error above the noise that the likeliest set's names leave.
     pub left: f64,
-    /// Factor on names beside a nameless term.
+    /// Factor on names beside what has no name: a nameless term, or more error than noise.
     pub beside_unknown: f64,
     /// Whether the likeliest set leaves more than noise of such sensors can be.
     pub more_than_noise: bool,
@@ -55,6 +55,16 @@ pub fn decide(explanations: &[Explanation], circumstances: Circumstances) -> Dec
     let best = explanations.first().map_or(&empty, |e| &e.set);
     let term = best.iter().copied().find(|id| is_term(id));
     let members: Vec<&'static str> = best.iter().copied().filter(|id| !is_term(id)).collect();
+    // How likely a name is among all that was fitted, and whether it stands in a world that the catalogue holds.
+    let among_names = |effect: &str| presence(explanations, effect, 1.0);
+    let stated = |effect: &str| {
+        let factor = circumstances.beside_unknown;
+        if circumstances.more_than_noise {
+            factor * among_names(effect)
+        } else {
+            presence(explanations, effect, factor)
+        }
+    };
     let mut named: Vec<Named> = Vec::new();
     for member in &members {
         let taken = |id: &&'static str| named.iter().any(|n| n.effect == *id);
@@ -64,12 +74,12 @@ pub fn decide(explanations: &[Explanation], circumstances: Circumstances) -> Dec
         for effect in &place {
             named.push(Named {
                 effect,
-                probability: presence(explanations, effect, circumstances.beside_unknown),
+                probability: stated(effect),
                 rivals: place.iter().copied().filter(|id| id != effect).collect(),
             });
         }
     }
-    let believed = |n: &Named| n.probability >= BELIEVED && n.rivals.is_empty();
+    let believed = |n: &Named| among_names(n.effect) >= BELIEVED && n.rivals.is_empty();
     let verdict = if circumstances.broke_down
         // Steady data cannot part physics from parameters; that something changed in mid-run they show.
         || circumstances.thin && term.is_none() && !named.iter().any(believed)

@@ -8,7 +8,7 @@ use kort_identify::Quadratic;
 use kort_identify::fit::Fit;
 use kort_identify::hypothesis::{Free, Member};
 use kort_identify::simulate::Problem;
-use kort_thruster::effects::Descriptor;
+use kort_thruster::effects::{Descriptor, Scale};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -29,6 +29,36 @@ impl Probe {
         let still = |lines: &DVector<f64>| lines.amax() < INERT;
         self.sizes.iter().all(|s| still(&s.1)) && self.always.as_ref().is_none_or(still)
     }
+}
+
+/// In how many ways an effect may act here: its forms, for each whole number that a fit holds (an order of the shaft's
+/// angle). A set with one of them has that share of the effect's prior, or the many would be had for nothing. Forms
+/// of what does nothing here are none.
+pub fn ways(effect: &Descriptor, scale: &Scale, probes: &[Probe]) -> usize {
+    let specs = (effect.parameters)(scale);
+    let acts = |j: &usize| {
+        specs[*j].shape
+            || probes.iter().any(|p| p.sizes.iter().any(|(size, lines)| size == j && lines.amax() >= INERT))
+    };
+    let mut forms: Vec<Vec<usize>> = Vec::new();
+    for form in effect.forms(&specs) {
+        let form: Vec<usize> = form.into_iter().filter(acts).collect();
+        if form.iter().any(|j| !specs[*j].shape) && !forms.contains(&form) {
+            forms.push(form);
+        }
+    }
+    let mut held: Vec<Vec<f64>> = Vec::new();
+    for probe in probes {
+        let numbers =
+            probe.member.values.iter().zip(&specs).filter(|(_, s)| s.held && s.shape).map(|(v, _)| *v);
+        let numbers: Vec<f64> = numbers.collect();
+        if !held.contains(&numbers) {
+            held.push(numbers);
+        }
+    }
+    // What does nothing to the baseline at all may act beside others, in any form.
+    let forms = if forms.is_empty() { effect.forms(&specs).len() } else { forms.len() };
+    forms * held.len().max(1)
 }
 
 /// Largest line of an action, in full scales, that counts as none.
@@ -134,7 +164,7 @@ pub fn promises(problem: &Problem, parent: &Fit, known: &[DMatrix<f64>], probes:
 fn of_probe(problem: &Problem, parent: &Fit, known: &[DMatrix<f64>], probe: &Probe) -> Option<Promise> {
     let specs = (probe.member.effect.parameters)(&problem.scale);
     // Forms of the same sizes differ in their shapes, about which a size alone tells nothing: all of them are
-    // free until the fit has shown which it needs ([`Search`](crate::search::Search) narrows them).
+    // free until the fit has shown which it needs ([`Search`](crate::search::Search) tries the other forms then).
     let mut forms: Vec<(Vec<usize>, Vec<usize>)> = Vec::new();
     for form in probe.member.effect.forms(&specs) {
         let sizes: Vec<usize> =

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use crate::constants::{Constants, SearchConstants};
 use crate::flexible::{TERMS, is_term};
-use crate::probe::{Probe, probe};
+use crate::probe::{Probe, probe, ways};
 use crate::screen::{Screened, screen};
 
 /// A set of effects by name, in order of the alphabet.
@@ -23,6 +23,8 @@ const MOST_EFFECTS: usize = 8;
 const SCREEN_DOUBT: f64 = 0.15;
 /// Iterations of an exact fit.
 const ITERATIONS: usize = 12;
+/// Forms are changed as long as that lowers a cost by this.
+const ENOUGH: f64 = 0.3;
 
 /// The search's memory.
 pub struct Search<'a, 'p> {
@@ -34,7 +36,10 @@ pub struct Search<'a, 'p> {
     pub fits: BTreeMap<Set, Fit>,
     screens: BTreeMap<Set, Vec<Screened>>,
     dropped: BTreeSet<(Set, Set)>,
+    reshaped: BTreeSet<(Set, u64)>,
     probes: Vec<Vec<Probe>>,
+    /// In how many ways each effect may act here.
+    ways: Vec<usize>,
     constants: SearchConstants,
     temper: f64,
 }
@@ -48,7 +53,9 @@ impl<'a, 'p> Search<'a, 'p> {
             fits: BTreeMap::new(),
             screens: BTreeMap::new(),
             dropped: BTreeSet::new(),
+            reshaped: BTreeSet::new(),
             probes: Vec::new(),
+            ways: Vec::new(),
             constants: constants.search,
             temper: constants.posterior.temper,
         }
@@ -64,14 +71,16 @@ impl<'a, 'p> Search<'a, 'p> {
         set.iter().map(|id| self.rarity_of(id)).sum()
     }
 
-    /// An effect is one of the catalogue, more or less common. What has no name is as likely as one of them,
+    /// An effect is one of the catalogue, more or less common, in one of the ways in which it may act. What has no name is as likely as one of them,
     /// at one of the places where it may be.
     fn rarity_of(&self, id: &str) -> f64 {
         if is_term(id) {
             return (TERMS.len() as f64).ln();
         }
-        let commonness = self.descriptor(id).map_or(1.0, |d| d.commonness);
-        (self.effects.len().max(1) as f64 / commonness).ln()
+        let place = self.effects.iter().position(|e| e.id == id);
+        let commonness = place.map_or(1.0, |k| self.effects[k].commonness);
+        let ways = place.and_then(|k| self.ways.get(k)).copied().unwrap_or(1);
+        ((self.effects.len().max(1) * ways) as f64 / commonness).ln()
     }
 
     /// What one more member adds to a cost before any data. Costs are tempered as a whole where they become
@@ -111,6 +120,8 @@ impl<'a, 'p> Search<'a, 'p> {
         }
         progress("trying every effect");
         self.probes = self.effects.par_iter().map(|e| probe(self.problem, baseline, e)).collect();
+        let ways = |(e, probes): (&&Descriptor, &Vec<Probe>)| ways(e, &self.problem.scale, probes);
+        self.ways = self.effects.iter().zip(&self.probes).map(ways).collect();
         self.climb(best, progress)
     }
 
@@ -119,18 +130,25 @@ impl<'a, 'p> Search<'a, 'p> {
         let mut best = from;
         loop {
             progress(&format!("on top of {}", words(&best)));
+            let before = self.cost(&best);
             let mut next = best.clone();
             if best.len() < MOST_EFFECTS {
                 next = self.forward(&best);
             }
-            if next == best {
-                return best;
+            if next != best {
+                next = self.swap(next, progress);
+                next = self.backward(next);
+                self.reshape(&next);
             }
-            next = self.swap(next, progress);
-            next = self.backward(next);
-            self.narrow(&next);
-            if self.cost(&next) >= self.cost(&best) - 1e-9 {
-                return best;
+            if self.cost(&next) >= before - 1e-9 {
+                // What stands near the end gets the same chance.
+                progress(&format!("other forms of what is near {}", words(&best)));
+                let near = self.near(&best);
+                near.iter().for_each(|set| self.reshape(set));
+                next = self.better(best.clone(), near);
+                if self.cost(&next) >= before - 1e-9 {
+                    return best;
+                }
             }
             best = next;
         }
@@ -182,40 +200,74 @@ impl<'a, 'p> Search<'a, 'p> {
         }
     }
 
-    /// Fits a set anew with each member in its narrower forms: shapes that the data do not speak of stay at their
-    /// prior means. The cheapest is kept.
-    fn narrow(&mut self, set: &Set) {
-        let Some(from) = self.fits.get(set) else { return };
-        let members = self.problem.members(&from.hypothesis, &from.values);
-        let mut tried: Vec<Vec<Member>> = Vec::new();
-        for (k, member) in members.iter().enumerate() {
-            let specs = (member.effect.parameters)(&self.problem.scale);
-            let free = |j: &usize| !member.held.contains(j);
-            let now: Vec<usize> = (0..specs.len()).filter(free).collect();
-            for form in member.effect.forms(&specs) {
-                if form.len() >= now.len() || !form.iter().all(free) {
-                    continue;
-                }
-                let mut narrower = member.clone();
-                for j in now.iter().filter(|j| !form.contains(j)) {
-                    narrower.held.push(*j);
-                    narrower.values[*j] = if specs[*j].shape { specs[*j].mean } else { 0.0 };
-                }
-                let mut all = members.clone();
-                all[k] = narrower;
-                tried.push(all);
+    /// Fits a set anew with each member in its other forms, until none helps: a screen sees only how a form begins,
+    /// and shapes that the data do not speak of are better left at their prior means. The cheapest is kept.
+    fn reshape(&mut self, set: &Set) {
+        while let Some(from) = self.fits.get(set) {
+            let before = from.cost();
+            if !self.reshaped.insert((set.clone(), before.to_bits())) {
+                return;
+            }
+            let fitted: Vec<Fit> = self
+                .other_forms(from)
+                .par_iter()
+                .map(|members| {
+                    let (hypothesis, columns) = self.problem.recompose(from, members);
+                    self.problem.settle(&hypothesis, &columns, &from.actions, ITERATIONS)
+                })
+                .collect();
+            for fit in fitted {
+                self.keep(set.clone(), fit);
+            }
+            if self.fits[set].cost() > before - ENOUGH {
+                return;
             }
         }
-        let fitted: Vec<Fit> = tried
-            .par_iter()
-            .map(|members| {
-                let (hypothesis, columns) = self.problem.recompose(from, members);
-                self.problem.settle(&hypothesis, &columns, &from.actions, ITERATIONS)
-            })
-            .collect();
-        for fit in fitted {
-            self.keep(set.clone(), fit);
+    }
+
+    /// The members of a fit with one of them in another of its forms. What a form leaves out stays at its prior mean,
+    /// what it adds begins where the catalogue says.
+    fn other_forms(&self, fit: &Fit) -> Vec<Vec<Member>> {
+        let members = self.problem.members(&fit.hypothesis, &fit.values);
+        let mut others = Vec::new();
+        for (k, member) in members.iter().enumerate() {
+            let specs = (member.effect.parameters)(&self.problem.scale);
+            let never = |j: &usize| specs[*j].held && specs[*j].shape;
+            let now: Vec<usize> = (0..specs.len()).filter(|j| !member.held.contains(j)).collect();
+            for mut form in member.effect.forms(&specs) {
+                form.retain(|j| !never(j));
+                form.sort_unstable();
+                if form == now || form.is_empty() {
+                    continue;
+                }
+                let mut other = member.clone();
+                other.held = (0..specs.len()).filter(|j| !form.contains(j)).collect();
+                for j in (0..specs.len()).filter(|j| !never(j) && now.contains(j) != form.contains(j)) {
+                    other.values[j] = match (form.contains(&j), specs[j].shape) {
+                        (true, _) => specs[j].start,
+                        (false, true) => specs[j].mean,
+                        (false, false) => 0.0,
+                    };
+                }
+                let mut all = members.clone();
+                all[k] = other;
+                others.push(all);
+            }
         }
+        others
+    }
+
+    /// Sets of a set's size that are likely enough to be stated beside it.
+    fn near(&self, set: &Set) -> Vec<Set> {
+        let bar = self.cost(set) + self.constants.rivals;
+        let near = |other: &&Set| other.len() == set.len() && self.cost(other) < bar;
+        self.fits.keys().filter(near).cloned().collect()
+    }
+
+    /// How far a cost may be off that gains so much: what a screen promises is off by a share of it where the
+    /// response bends.
+    fn doubt(&self, gain: f64) -> f64 {
+        self.constants.rivals + SCREEN_DOUBT * gain.max(0.0)
     }
 
     fn better(&self, set: Set, others: Vec<Set>) -> Set {
@@ -270,8 +322,7 @@ impl<'a, 'p> Search<'a, 'p> {
         };
         let screened = &self.screens[set];
         let best = screened.first().map_or(f64::INFINITY, |s| s.cost);
-        // What a screen promises is off by a share of the gain where the response bends.
-        let doubt = self.constants.rivals + SCREEN_DOUBT * (parent.cost() - best).max(0.0);
+        let doubt = self.doubt(parent.cost() - best);
         let prior = 2.0 * self.temper * self.rarity(set);
         let chosen: Vec<&Screened> = screened
             .iter()

@@ -4,7 +4,7 @@
 //! never below the *form error*: our equations are not exact, and a few percent of a signal, or of an
 //! effect's own action, must not count against a good name. A band of one structural error holds many
 //! lines and few facts: it counts as at most so many. The lowest bands may not explain a constant away:
-//! noise rises towards low frequency no faster than its neighbour allows.
+//! noise rises towards low frequency no faster than a random walk does.
 //!
 //! Whittle 1953 (Ark. Mat. 2:423); tempering after Gruenwald & van Ommen 2017 (Bayesian Anal. 12:1069).
 
@@ -26,8 +26,48 @@ pub struct Criterion {
     pub timing_s: f64,
 }
 
-/// How fast noise may rise towards low frequency: by this times the square of the frequencies' ratio.
-const RISE: f64 = 3.0;
+impl Criterion {
+    /// Independent facts in a band.
+    fn facts(&self, band: &Band) -> f64 {
+        let n = band.lines.len() as f64;
+        n * self.facts_a_band / (n + self.facts_a_band)
+    }
+}
+
+/// The likeliest levels that rise towards low frequency no faster than a random walk's, `1/f^2`, and lie on or above
+/// the floor. Over the walk's own course levels may only fall with falling frequency, which pooling neighbours that
+/// violate it solves exactly (Barlow et al. 1972, Statistical Inference under Order Restrictions, 1.2).
+fn likeliest(bands: &[Band], powers: &[f64], floor: &[f64], facts: &[f64]) -> Vec<f64> {
+    struct Pool {
+        bands: usize,
+        facts: f64,
+        level: f64,
+    }
+    let mut out = Vec::with_capacity(bands.len());
+    let mut first = 0;
+    while first < bands.len() {
+        let last = (first..bands.len()).find(|b| !bands[*b].continues).unwrap_or(bands.len() - 1);
+        let walk = |b: usize| bands[b].hz.powi(-2);
+        let mut pools: Vec<Pool> = Vec::new();
+        for b in first..=last {
+            let mut pool = Pool { bands: 1, facts: facts[b], level: powers[b].max(floor[b]) / walk(b) };
+            while let Some(lower) = pools.pop_if(|lower| lower.level > pool.level) {
+                let facts = pool.facts + lower.facts;
+                pool = Pool {
+                    bands: pool.bands + lower.bands,
+                    facts,
+                    level: (pool.facts * pool.level + lower.facts * lower.level) / facts,
+                };
+            }
+            pools.push(pool);
+        }
+        let levels = pools.iter().flat_map(|p| std::iter::repeat_n(p.level, p.bands));
+        out.extend(levels.zip(first..).map(|(level, b)| (level * walk(b)).max(floor[b])));
+        first = last + 1;
+    }
+    out
+}
+
 /// Variance below which nothing is told apart, in squares of the full scale: rounding of the computation.
 const ROUNDING: f64 = 1e-14;
 
@@ -87,26 +127,16 @@ pub struct Noise {
 impl Noise {
     /// Of a residual with these mean squares by band.
     pub fn of(bands: &[Band], powers: &[f64], floor: &Floor, criterion: &Criterion) -> Self {
-        let mut level = vec![0.0; bands.len()];
-        for b in (0..bands.len()).rev() {
-            let least = floor.0[b];
-            let mut seen = powers[b].max(least);
-            if bands[b].continues {
-                let ratio = bands[b + 1].hz / bands[b].hz;
-                seen = seen.min(RISE * ratio * ratio * level[b + 1]).max(least);
-            }
-            level[b] = seen;
-        }
+        let facts: Vec<f64> = bands.iter().map(|band| criterion.facts(band)).collect();
+        let level = likeliest(bands, powers, &floor.0, &facts);
         let mut misfit = 0.0;
         let weight = bands
             .iter()
             .zip(&level)
-            .zip(powers)
-            .map(|((band, level), power)| {
-                let n = band.lines.len() as f64;
-                let facts = n * criterion.facts_a_band / (n + criterion.facts_a_band);
+            .zip(powers.iter().zip(&facts))
+            .map(|((band, level), (power, facts))| {
                 misfit += facts * (level.ln() + power / level - 1.0);
-                facts / (n * level)
+                facts / (band.lines.len() as f64 * level)
             })
             .collect();
         Self { level, weight, misfit }
@@ -142,14 +172,40 @@ mod tests {
     }
 
     #[test]
-    fn a_constant_error_cannot_hide_in_its_own_noise() {
+    fn a_constant_error_hides_in_noise_only_as_far_as_a_random_walk_goes() {
         let floor = Floor::of_signal(&bands(), &CRITERION);
         let mut powers = vec![1e-6; 12];
-        let quiet = Noise::of(&bands(), &powers, &floor, &CRITERION).misfit;
+        let quiet = Noise::of(&bands(), &powers, &floor, &CRITERION);
         powers[0] = 1e-2;
         let biased = Noise::of(&bands(), &powers, &floor, &CRITERION);
-        assert!(biased.level[0] < 1e-5, "{:?}", biased.level);
-        assert!(biased.misfit > quiet + 1000.0);
+        for pair in biased.level.windows(2) {
+            assert!(pair[0] < pair[1] * 1.585_f64.powi(2) * 1.001, "{:?}", biased.level);
+        }
+        // Free, the band's own level would cost 7.5 ln 1e4 = 69.
+        assert!(biased.misfit > quiet.misfit + 2.0 * 69.0, "{} after {}", biased.misfit, quiet.misfit);
+    }
+
+    #[test]
+    fn a_walk_costs_no_more_than_white_noise_of_its_own_level() {
+        let floor = Floor::of_signal(&bands(), &CRITERION);
+        let powers: Vec<f64> = bands().iter().map(|b| 1e-6 / (b.hz * b.hz)).collect();
+        let walk = Noise::of(&bands(), &powers, &floor, &CRITERION);
+        for (level, power) in walk.level.iter().zip(&powers) {
+            assert!((level / power - 1.0).abs() < 1e-3, "{level} for {power}");
+        }
+    }
+
+    #[test]
+    fn less_error_never_costs_more() {
+        let floor = Floor::of_signal(&bands(), &CRITERION);
+        let powers: Vec<f64> = (0..12).map(|k| 1e-6 * [1.0, 300.0, 9.0, 4e3][k % 4]).collect();
+        let before = Noise::of(&bands(), &powers, &floor, &CRITERION).misfit;
+        for k in 0..12 {
+            let mut less = powers.clone();
+            less[k] *= 0.5;
+            let after = Noise::of(&bands(), &less, &floor, &CRITERION).misfit;
+            assert!(after <= before + 1e-9, "band {k}: {after} after {before}");
+        }
     }
 
     #[test]

@@ -60,6 +60,7 @@ pub fn scale(all: &[Prepared], rig: &Rig) -> Scale {
         inertia_kg_m2,
         tick_s: all.first().map_or(0.002, |p| p.tick_s),
         duration_s: all.iter().map(Prepared::duration_s).fold(0.0, f64::max),
+        angle_recorded: all.iter().all(|p| p.stimulus.ticks.iter().any(|t| t.shaft_angle_rad.is_some())),
     }
 }
 

@@ -39,7 +39,7 @@ const SIZES: &[(&str, &str, &[&str], Unit)] = &[
     ("supply_sag", "source_resistance_ohm", &["source_resistance_ohm"], Unit::Same),
     ("command_dead_band", "half_width", &["half_width"], Unit::Same),
     ("clock_skew", "thrust_delay_s", &["thrust_delay_s"], Unit::Same),
-    ("clock_skew", "speed_delay_s", &["speed_delay_s"], Unit::Same),
+    ("clock_skew", "speed_delay_s", &["encoder_delay_s"], Unit::Same),
 ];
 
 /// One size held against the key.

@@ -13,9 +13,10 @@ const LONGEST_S: f64 = 0.5;
 pub const DESCRIPTOR: Descriptor = Descriptor {
     id: "clock_skew",
     path: Path::Sensor,
-    what: "one channel is logged late against the others and the command: another clock, a buffer, a slow bus",
-    equation: "y_c(t) = y_c(t - d_c), d_c >= 0 [s] for thrust, shaft speed, flow and shaft angle; a channel logged early shows as the others late",
-    signature: "one channel is shifted by the same time at all frequencies and amplitudes, its levels fit",
+    what: "one instrument is logged late against the others and the command: another clock, a buffer, a slow bus",
+    equation: "y(t) = y(t - d (1 + g (t - t0))), d >= 0 [s], g [1/s], for one instrument: the force cell, the encoder (speed \
+               and angle), the flow meter, or a bench with a clock of its own (thrust, torque and flow)",
+    signature: "one channel, or all of one instrument, is shifted by the same time at all frequencies and amplitudes, its levels fit",
     confused_with: &[
         "transport_delay",
         "thrust_sensor_lag",
@@ -28,23 +29,32 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     commonness: 0.7,
     shifts_time: true,
     nonparametric: false,
-    forms: &[&[0], &[1], &[2], &[3], &[0, 1], &[0, 2], &[0, 3], &[1, 2], &[1, 3], &[2, 3], &[0, 1, 2, 3]],
+    forms: &[&[0], &[1], &[2], &[3], &[0, 4], &[1, 4], &[2, 4], &[3, 4]],
     parameters,
-    starts: |_| vec![vec![0.04; 4], vec![0.12; 4]],
+    starts: |_| [0.04, 0.12].iter().map(|delay| vec![*delay, *delay, *delay, *delay, 0.0]).collect(),
     needs,
     build: both!(|values, context| {
-        let past = || History::new(LONGEST_S, context.tick_s);
         Box::new(ClockSkew {
-            delay_s: [values[0], values[1], values[2], values[3]],
-            past: [past(), past(), past(), past()],
+            delay_s: [values[0] + values[3], values[1], values[2] + values[3], values[1], values[3]],
+            drift_1_s: values[4],
+            since_s: None,
+            past: std::array::from_fn(|_| History::new(LONGEST_S, context.tick_s)),
         })
     }),
 };
 
-/// Screening looks at each channel's delay alone.
-fn parameters(_: &Scale) -> Vec<Spec> {
+/// Screening looks at each instrument's delay alone. A clock that runs wrong by as much as its lateness over the
+/// recording is common.
+fn parameters(scale: &Scale) -> Vec<Spec> {
     let delay = |name| Spec::strength(name, "s", 0.01, 0.0, LONGEST_S).sigma(0.03);
-    vec![delay("thrust_delay_s"), delay("speed_delay_s"), delay("flow_delay_s"), delay("angle_delay_s")]
+    let once = 1.0 / scale.duration_s;
+    vec![
+        delay("thrust_delay_s"),
+        delay("encoder_delay_s"),
+        delay("flow_delay_s"),
+        delay("bench_delay_s"),
+        Spec::shape("drift_1_s", "1/s", 0.0, -once, 5.0 * once).prior(0.0, once),
+    ]
 }
 
 fn needs(_: &Rig, available: &Available) -> Result<(), &'static str> {
@@ -58,8 +68,11 @@ fn needs(_: &Rig, available: &Available) -> Result<(), &'static str> {
 }
 
 struct ClockSkew<T> {
-    delay_s: [T; 4],
-    past: [History<T>; 4],
+    /// Of thrust, shaft speed, flow, shaft angle and torque.
+    delay_s: [T; 5],
+    drift_1_s: T,
+    since_s: Option<f64>,
+    past: [History<T>; 5],
 }
 
 impl<T: Real> Effect<T> for ClockSkew<T> {
@@ -67,16 +80,19 @@ impl<T: Real> Effect<T> for ClockSkew<T> {
         Hooks::SENSE
     }
 
-    fn sense(&mut self, _: &Tick, sensed: &mut Sensed<T>) {
+    fn sense(&mut self, tick: &Tick, sensed: &mut Sensed<T>) {
+        let passed = tick.time_s - *self.since_s.get_or_insert(tick.time_s);
+        let grown = (self.drift_1_s * passed + 1.0).max(T::ZERO);
         let channels = [
             &mut sensed.thrust_n,
             &mut sensed.shaft_speed_rad_s,
             &mut sensed.flow_m_s,
             &mut sensed.shaft_angle_rad,
+            &mut sensed.torque_n_m,
         ];
         for ((channel, past), delay) in channels.into_iter().zip(&mut self.past).zip(self.delay_s) {
             past.push(*channel);
-            *channel = past.ago(delay);
+            *channel = past.ago(delay * grown);
         }
     }
 }

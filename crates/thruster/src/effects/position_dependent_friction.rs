@@ -1,9 +1,8 @@
 //! Friction that varies over the turn: a bent shaft, an uneven seal or screw.
 
-use super::{Available, Descriptor, Effect, Hooks, Path, Scale, Spec, angle_recorded, free_shaft};
+use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, free_shaft};
 use crate::plant::{Balance, Local};
 use crate::real::Real;
-use crate::rig::Rig;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -24,9 +23,12 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: |scale| {
         let mean = 0.06 * scale.torque_n_m;
+        if !scale.angle_recorded {
+            return vec![vec![mean, 0.0, 0.0, 0.0, 0.0]];
+        }
         vec![vec![mean, 0.4, 0.4, 0.1, 0.1], vec![mean, -0.4, -0.4, 0.1, 0.1]]
     },
-    needs,
+    needs: free_shaft,
     build: both!(|values, _| {
         Box::new(PositionDependentFriction {
             mean_n_m: values[0],
@@ -36,9 +38,14 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     }),
 };
 
+/// Where no angle was recorded, a simulated one loses the phase within seconds: only the mean is left, which dry
+/// friction has too.
 fn parameters(scale: &Scale) -> Vec<Spec> {
     let torque = scale.torque_n_m;
-    let wave = |name| Spec::shape(name, "1", 0.3, -2.0, 2.0).prior(0.0, 0.5);
+    let wave = |name| {
+        let spec = Spec::shape(name, "1", 0.3, -2.0, 2.0).prior(0.0, 0.5);
+        if scale.angle_recorded { spec } else { Spec { start: 0.0, held: true, ..spec } }
+    };
     vec![
         Spec::strength("mean_friction_n_m", "N m", 0.05 * torque, 0.0, torque).sigma(0.1 * torque),
         wave("once_sin_share"),
@@ -46,11 +53,6 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
         wave("twice_sin_share"),
         wave("twice_cos_share"),
     ]
-}
-
-fn needs(rig: &Rig, available: &Available) -> Result<(), &'static str> {
-    free_shaft(rig, available)?;
-    angle_recorded(rig, available)
 }
 
 struct PositionDependentFriction<T> {

@@ -25,6 +25,8 @@ pub struct Scale {
     pub tick_s: f64,
     /// Length of the recording, s.
     pub duration_s: f64,
+    /// Whether the shaft angle was recorded, so that what follows it can be kept in phase.
+    pub angle_recorded: bool,
 }
 
 impl Scale {
@@ -41,6 +43,7 @@ impl Scale {
         inertia_kg_m2: 1.0,
         tick_s: 0.002,
         duration_s: 1.0,
+        angle_recorded: true,
     };
 }
 

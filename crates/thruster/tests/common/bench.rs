@@ -69,6 +69,7 @@ impl Bench {
             inertia_kg_m2: 0.01,
             tick_s: TICK_S,
             duration_s: DURATION_S,
+            angle_recorded: true,
         };
         Self { rig, stimulus: Stimulus { ticks, logs }, scale }
     }

@@ -32,7 +32,7 @@ fn run<T: Real>(effect: &Descriptor, values: &[T]) -> Vec<T> {
 fn with<T: Real>(id: &str, delay_s: T) -> (&'static Descriptor, Vec<T>) {
     let effect = find(id).unwrap();
     match id {
-        "clock_skew" => (effect, vec![T::ZERO, delay_s, T::ZERO, T::ZERO]),
+        "clock_skew" => (effect, vec![T::ZERO, delay_s, T::ZERO, T::ZERO, T::ZERO]),
         _ => (effect, vec![delay_s]),
     }
 }
