@@ -184,6 +184,7 @@ proptest! {
             (Body::Setpoint, r#"{"thrust_n": 25.0"#),
             (Body::Lease, r#"{"holder": "bench""#),
             (Body::Controller, r#"{"controller": "velocity_servo""#),
+            (Body::Rig, r#"{"revision": 1"#),
             (Body::Recording, r#"{"name": "x""#),
             (Body::Message, r#"{"setpoint": {"thrust_n": 1}, "lease_id": "x""#),
         ] {

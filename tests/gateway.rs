@@ -605,11 +605,19 @@ fn the_openapi_document_names_every_route_and_each_answers() {
             "/v1/thrusters/{id}/setpoint",
             "/v1/thrusters/{id}/controller",
             "/v1/thrusters/{id}/stream",
+            "/v1/thrusters/{id}/rig",
+            "/v1/thrusters/{id}/rig/rollback",
+            "/v1/thrusters/{id}/rig/revisions",
+            "/v1/thrusters/{id}/rig/revisions/{number}",
         ] {
             assert!(document["paths"][route].is_object(), "{route} is not documented");
         }
         for (path, methods) in document["paths"].as_object().unwrap() {
-            let real = path.replace("{id}", "t1").replace("{name}", "none").replace("{code}", "4");
+            let real = path
+                .replace("{id}", "t1")
+                .replace("{name}", "none")
+                .replace("{code}", "4")
+                .replace("{number}", "1");
             for method in methods.as_object().unwrap().keys() {
                 let answer = send(port, &method.to_uppercase(), &real, &[], b"");
                 let documented = &document["paths"][path][method]["responses"][answer.status.to_string()];

@@ -9,6 +9,10 @@ use std::process::Command;
 
 use common::Stack;
 
+/// What no schema can say: which texts are a rig description. Such a body is refused with 422 for its meaning.
+const BY_MEANING: &str = "[[operations]]\ninclude-path = \"/v1/thrusters/{id}/rig\"\ninclude-method = \"POST\"\n\
+    checks.positive_data_acceptance.enabled = false\n";
+
 #[test]
 fn schemathesis_finds_no_answer_that_the_document_does_not_promise() {
     let program = std::env::var("KORT_SCHEMATHESIS").unwrap_or_else(|_| "schemathesis".into());
@@ -17,6 +21,7 @@ fn schemathesis_finds_no_answer_that_the_document_does_not_promise() {
         return;
     }
     let stack = Stack::start();
+    std::fs::write(stack.site.folder.path().join("schemathesis.toml"), BY_MEANING).unwrap();
     let run = || {
         let done = Command::new(&program)
             .args(["run", &format!("http://127.0.0.1:{}/openapi.json", stack.site.port)])
@@ -33,5 +38,5 @@ fn schemathesis_finds_no_answer_that_the_document_does_not_promise() {
         (passed, words, talk) = run();
     }
     assert!(passed, "{words}{}", String::from_utf8_lossy(&talk));
-    assert!(words.contains("24 selected"), "every operation is tried: {words}");
+    assert!(words.contains("29 selected"), "every operation is tried: {words}");
 }

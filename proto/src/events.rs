@@ -43,6 +43,20 @@ pub enum EventKind {
     Commanded,
     /// The control law or its parameters were changed.
     ControllerChanged,
+    /// Another revision of the rig description is in force.
+    RigChanged,
+    /// The revision of the rig description before is in force again.
+    RigRolledBack,
+    /// A diagnosis was begun.
+    DiagnosisStarted,
+    /// A diagnosis is done.
+    DiagnosisDone,
+    /// A diagnosis came to nothing.
+    DiagnosisFailed,
+    /// A diagnosis was ended on request.
+    DiagnosisCancelled,
+    /// A diagnosis was deleted.
+    DiagnosisDeleted,
     /// Latched faults were cleared.
     FaultsCleared,
     /// A fault was latched: a stop that nobody asked for, if the drive was armed.

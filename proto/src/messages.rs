@@ -93,6 +93,8 @@ enumeration! {
         SetController = 4 "set-controller",
         /// Ramp the setpoint to zero and hold it there, whoever commands: the service is about to end.
         Rest = 5 "rest",
+        /// Go on with the revision of the rig description that lies beside the shared memory.
+        SetRig = 6 "set-rig",
     }
 }
 
@@ -227,8 +229,7 @@ message! { "kort.Setpoint",
         header: Header,
         /// Counts accepted operator commands of this gateway session.
         generation: u64,
-        /// When the operator's command was accepted, on CLOCK_MONOTONIC, ns. Only one given
-        /// after the servo was armed counts: an old setpoint is never resumed.
+        /// When the operator's command was accepted, CLOCK_MONOTONIC, ns. Only one given after the arming counts.
         given_at_ns: u64,
         /// End of the lease on CLOCK_MONOTONIC, ns; zero without a lease.
         lease_until_ns: u64,
@@ -352,6 +353,8 @@ message! { "kort.ControllerState",
         setpoints_invalid: u64,
         /// What the observer believes.
         estimates: Estimates,
+        /// Revision of the rig description that it runs on.
+        rig_revision: u64,
         /// The estimator's parameters.
         parameters: [Parameter; PARAMETERS],
         /// How many are used.
@@ -368,8 +371,7 @@ message! { "kort.ControllerState",
         law_count: u32,
         /// Path that is off against the rig as stated, from 1 in the order of [`PATHS`]; zero without an alarm.
         mismatch_path: u32,
-        /// How near each path is to an alarm, in the order of [`PATHS`]: 1 and above is one; NaN while it is learnt what
-        /// is usual.
+        /// How near each path is to an alarm, as [`PATHS`]: 1 and above is one; NaN while what is usual is learnt.
         mismatch_level: [f64; 5],
         /// Time since the mismatch began, s.
         mismatch_since_s: f64,
@@ -382,14 +384,15 @@ message! { "kort.ControllerState",
 pub const PATHS: [&str; 5] = ["drive", "shaft", "blade", "flow", "sensor"];
 
 message! { "kort.Request",
-    /// Gateway (or supervisor) to servo and controller. Every process that the kind concerns
-    /// answers with one [`Reply`]: arm, servo; disarm and clear-faults, both; set-controller,
-    /// controller. A request older than [`REQUEST_LIFE_NS`] is not acted upon.
+    /// Gateway (or supervisor) to servo and controller. Whom the kind concerns answers with one [`Reply`]: arm, servo;
+    /// disarm and clear-faults, both; the rest, controller. One older than [`REQUEST_LIFE_NS`] is not acted upon.
     Request {
         /// Sequence, stamp, session of the sender.
         header: Header,
         /// Chosen by the sender, comes back in the reply.
         id: u64,
+        /// Revision of the rig description to go on with.
+        rig_revision: u64,
         /// [`RequestKind`]
         kind: u32,
         /// How many parameters are used.
@@ -464,8 +467,8 @@ macro_rules! messages {
 
 messages!(Setpoint, Command, Telemetry, ControllerState, Request, Reply);
 
-/// Only *new* messages pass: keeps one sender's session, and asks for a growing sequence, a stamp
-/// that is not older than `life_ns` and not in the future. A new session passes if it is younger.
+/// Only *new* messages pass: of one sender's session, of a growing sequence, stamped within `life_ns` and not in the
+/// future. A new session passes if it is younger.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Freshness {
     session: u64,

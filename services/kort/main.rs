@@ -2,6 +2,7 @@
 //! out. This file parses and dispatches; every subcommand lives in a folder of its own.
 
 mod check;
+mod job;
 mod token;
 mod up;
 
@@ -163,7 +164,12 @@ fn dispatch(command: Command) -> Result<ExitCode, ExitCode> {
         }
         Command::Check(args) => Ok(check::run(&args)),
         Command::Token(command) => token::run(command),
-        Command::Lab(command) => Ok(kort_lab::run(command)),
+        Command::Lab(command) => {
+            if let Some(parent) = command.job_of() {
+                job::begin(parent)?;
+            }
+            Ok(kort_lab::run(command))
+        }
     }
 }
 

@@ -116,24 +116,32 @@ impl Controller {
         })
     }
 
-    /// A controller for another revision of the rig that goes on where this one is: the command, what the observer
-    /// believes, and the reference's ramp; it learns its coefficients anew.
+    /// A controller for another revision of the rig that goes on where this one is.
     ///
     /// # Errors
     /// [`ModelError`] as of [`Controller::new`]; this one then stays as it is.
     pub fn revised(&self, rig: &Rig, period_s: f64) -> Result<Self, ModelError> {
         let mut next = Self::new(rig, &self.config, period_s)?;
-        if let Some(last) = &self.estimate {
-            next.observer = Observer::after(self.config.observer, &next.model, &self.config.observers, last);
-            next.estimate = Some(*last);
-        }
-        next.mode = self.mode;
-        (next.thrust_rate, next.current_rate) = (self.thrust_rate, self.current_rate);
-        (next.current_a, next.drive_a) = (self.current_a, self.drive_a);
-        (next.sent_a, next.newest) = (self.sent_a, self.newest);
-        (next.last_speed_rad_s, next.gated) = (self.last_speed_rad_s, 0);
-        next.bumpless.arm();
+        next.go_on_from(self);
         Ok(next)
+    }
+
+    /// Goes on where another revision's controller is: its configuration, the command, what its observer believes, and
+    /// the reference's ramp; coefficients are learnt anew. Neither allocates nor blocks.
+    pub fn go_on_from(&mut self, before: &Self) {
+        if self.config != before.config {
+            self.configure(&before.config);
+        }
+        if let Some(last) = &before.estimate {
+            self.observer = Observer::after(self.config.observer, &self.model, &self.config.observers, last);
+            self.estimate = Some(*last);
+        }
+        self.mode = before.mode;
+        (self.thrust_rate, self.current_rate) = (before.thrust_rate, before.current_rate);
+        (self.current_a, self.drive_a) = (before.current_a, before.drive_a);
+        (self.sent_a, self.newest) = (before.sent_a, before.newest);
+        (self.last_speed_rad_s, self.gated) = (before.last_speed_rad_s, 0);
+        self.bumpless.arm();
     }
 
     /// The configuration in force.

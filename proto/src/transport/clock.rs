@@ -96,6 +96,18 @@ pub fn ordinary() {
     }
 }
 
+/// Lets the calling thread, and those that it starts from now on, run only where nothing else wants the processor.
+///
+/// Returns what was not permitted, in words fit for a warning.
+pub fn idle() -> Option<String> {
+    // SAFETY: as above.
+    let done = unsafe {
+        let parameter = libc::sched_param { sched_priority: 0 };
+        libc::sched_setscheduler(0, libc::SCHED_IDLE, &parameter)
+    };
+    (done != 0).then(|| format!("SCHED_IDLE is not permitted ({})", std::io::Error::last_os_error()))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

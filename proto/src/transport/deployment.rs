@@ -261,7 +261,7 @@ impl Deployment {
     }
 
     /// A file beside the root, so that clearing the root leaves it.
-    fn beside(&self, extension: &str) -> PathBuf {
+    pub(super) fn beside(&self, extension: &str) -> PathBuf {
         let mut name = self.root.file_name().unwrap_or_default().to_os_string();
         name.push(".");
         name.push(extension);
@@ -362,7 +362,7 @@ fn allow_files(thrusters: u64) -> Result<(), TransportError> {
 }
 
 /// A file or folder of the deployment, if it is there already, must be this user's, and nobody else may write it.
-fn ours_alone(path: &Path) -> Result<(), TransportError> {
+pub(super) fn ours_alone(path: &Path) -> Result<(), TransportError> {
     let Ok(about) = fs::symlink_metadata(path) else { return Ok(()) };
     let foreign = |why: String| Err(TransportError::Foreign { path: path.to_path_buf(), why });
     if about.file_type().is_symlink() {

@@ -4,10 +4,11 @@
 mod clock;
 mod deployment;
 mod ports;
+mod rig;
 mod room;
 mod watched;
 
-pub use clock::{Ticker, monotonic_ns, ordinary, realtime};
+pub use clock::{Ticker, idle, monotonic_ns, ordinary, realtime};
 pub use deployment::{Deployment, Owner, TransportError};
 pub use ports::{
     ControllerPorts, GatewayPorts, Inbox, Outbox, ServoPorts, SupervisorPorts, Ticks, Waker, create_services,

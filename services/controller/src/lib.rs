@@ -10,6 +10,8 @@ pub mod slew;
 #[cfg(test)]
 mod tests;
 pub mod tick;
+#[cfg(feature = "process")]
+mod workshop;
 
 #[cfg(feature = "process")]
 pub use process::{ControllerError, check, run};

@@ -7,13 +7,15 @@ use std::time::Duration;
 
 use kort_control::{ControllerConfig, LawKind, ModelError};
 use kort_proto::config::{Config, ConfigError, Thruster};
-use kort_proto::messages::{Command, Timing};
+use kort_proto::messages::{Command, RequestKind, Timing};
+use kort_proto::revision;
 use kort_proto::transport::{ControllerPorts, Deployment, TransportError, monotonic_ns, realtime};
 use kort_thruster::rig::Rig;
 use thiserror::Error;
 use tracing::{info, warn};
 
 use crate::tick::Tick;
+use crate::workshop::Workshop;
 
 /// Telemetry samples read at one wake-up at most.
 const SAMPLES: usize = 64;
@@ -59,6 +61,9 @@ pub enum ControllerError {
     /// Signals cannot be watched.
     #[error("signals cannot be watched: {0}")]
     Signals(#[from] std::io::Error),
+    /// The workshop's thread cannot be started.
+    #[error("a thread cannot be started: {0}")]
+    Thread(std::io::Error),
 }
 
 /// Could the controller of this thruster start? Reads everything it reads.
@@ -89,6 +94,8 @@ pub fn run(config: &Config, deployment: &Deployment, id: &str, latched: u64) -> 
     for signal in END_SIGNALS {
         signal_hook::flag::register(signal, Arc::clone(&stop))?;
     }
+    // Before this thread becomes a real-time one: designing a controller must not keep a tick waiting.
+    let workshop = Workshop::start(deployment, id, period_ns).map_err(ControllerError::Thread)?;
     if thruster.controller.priority > 0 {
         for missing in realtime(thruster.controller.priority, false) {
             warn!("{missing}");
@@ -108,14 +115,15 @@ pub fn run(config: &Config, deployment: &Deployment, id: &str, latched: u64) -> 
         let tick = Tick::new(&rig, &law, period_ns, monotonic_ns())
             .map_err(|error| ControllerError::Model { file: file.clone(), error })?
             .with_rise(thruster.controller.setpoint_rise_s)
-            .with_latched(latched);
+            .with_latched(latched)
+            .with_revision(revision::of(&text));
         info!(
             thruster = id,
             law = law.law.name(),
             rate_hz = 1e9 / period_ns as f64,
             "controller runs, at zero"
         );
-        serve(tick, &mut ports, thruster, deployment, &stop);
+        serve(tick, &mut ports, &workshop, thruster, deployment, &stop);
     }
     info!(thruster = id, "controller ends, servo stopped");
     Ok(())
@@ -146,6 +154,7 @@ fn law(config: &Config, id: &str, thruster: &Thruster) -> Result<ControllerConfi
 fn serve(
     mut tick: Tick,
     ports: &mut ControllerPorts,
+    workshop: &Workshop,
     thruster: &Thruster,
     deployment: &Deployment,
     stop: &AtomicBool,
@@ -178,9 +187,16 @@ fn serve(
         }
         for _ in 0..REQUESTS {
             let Some(request) = ports.request.next() else { break };
-            if let Some(reply) = tick.request(&request, woke_ns) {
+            let reply = match RequestKind::from_u32(request.kind) {
+                Some(RequestKind::SetRig) if tick.is_for_now(&request, woke_ns) => workshop.order(request),
+                _ => tick.request(&request, woke_ns),
+            };
+            if let Some(reply) = reply {
                 let _ = ports.reply.send(reply);
             }
+        }
+        if let Some(reply) = workshop.fit(&mut tick) {
+            let _ = ports.reply.send(reply);
         }
         let command = tick.tick(woke_ns);
         let command = if stopping { Command { drive: 0.0, stop: 1, ..command } } else { command };

@@ -17,6 +17,9 @@ use kort_thruster::rig::{AmplifierKind, Rig};
 
 use crate::slew::{Slew, rise_s};
 
+mod revision;
+pub use revision::Revision;
+
 /// After the lease's end the setpoint falls to zero in this time, then the servo is stopped: all
 /// within 500 ms.
 const LEASE_RAMP_NS: u64 = 400_000_000;
@@ -36,6 +39,7 @@ const READING_LIFE_NS: u64 = 250_000_000;
 pub struct Tick {
     controller: Controller,
     config: ControllerConfig,
+    rig_revision: u64,
     kind: DriveKind,
     period_ns: u64,
     started_ns: u64,
@@ -99,11 +103,8 @@ impl Tick {
         Ok(Self {
             controller: Controller::new(rig, config, period_ns as f64 * 1e-9)?,
             config: *config,
-            kind: match rig.amplifier.kind {
-                AmplifierKind::Current => DriveKind::Current,
-                AmplifierKind::Voltage => DriveKind::Voltage,
-                AmplifierKind::Speed => DriveKind::Speed,
-            },
+            rig_revision: 0,
+            kind: drive_kind(rig),
             period_ns,
             started_ns,
             gateway: Freshness::default(),
@@ -343,17 +344,23 @@ impl Tick {
         }
     }
 
-    /// Acts on a request; `None` if it is not for the controller, or too old to be meant for now.
-    pub fn request(&mut self, request: &Request, now_ns: u64) -> Option<Reply> {
+    /// Is a request meant for now, and for this controller?
+    pub fn is_for_now(&self, request: &Request, now_ns: u64) -> bool {
         let sent = request.header.stamp_ns;
-        if sent < self.started_ns || now_ns.saturating_sub(sent) > REQUEST_LIFE_NS {
+        sent >= self.started_ns && now_ns.saturating_sub(sent) <= REQUEST_LIFE_NS
+    }
+
+    /// Acts on a request; `None` if it is not for the controller, or too old to be meant for now. Another revision of
+    /// the rig is designed beside the tick, and comes by [`Tick::adopt`].
+    pub fn request(&mut self, request: &Request, now_ns: u64) -> Option<Reply> {
+        if !self.is_for_now(request, now_ns) {
             return None;
         }
         let answer = |outcome, words: std::fmt::Arguments| {
             Some(Reply::to(request, Process::Controller, outcome, words))
         };
         match RequestKind::from_u32(request.kind)? {
-            RequestKind::Arm => None,
+            RequestKind::Arm | RequestKind::SetRig => None,
             RequestKind::Rest => {
                 let since_ns = self.ending.map_or(now_ns, |ending| ending.since_ns);
                 self.ending = Some(Ending { since_ns, cause: None, hold: true });
@@ -437,6 +444,7 @@ impl Tick {
             thrust_max_n: self.controller.model().thrust_max_n,
             speed_max_rad_s: self.controller.model().speed_max_rad_s,
             setpoints_invalid: self.invalid,
+            rig_revision: self.rig_revision,
             ..ControllerState::default()
         };
         let mismatch = self.controller.mismatch();
@@ -529,4 +537,13 @@ impl Tick {
 /// The control crate's limits in the bits of [`Limit`]; both list them in the same order.
 fn bits(limits: LimitSet) -> u64 {
     u64::from(limits.0) << FIRST_OF_CONTROL
+}
+
+/// How the rig's drive is commanded.
+fn drive_kind(rig: &Rig) -> DriveKind {
+    match rig.amplifier.kind {
+        AmplifierKind::Current => DriveKind::Current,
+        AmplifierKind::Voltage => DriveKind::Voltage,
+        AmplifierKind::Speed => DriveKind::Speed,
+    }
 }

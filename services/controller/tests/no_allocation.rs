@@ -4,7 +4,7 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
 use kort_control::{ControllerConfig, EstimatorKind, LawKind};
-use kort_controller::tick::Tick;
+use kort_controller::tick::{Revision, Tick};
 use kort_proto::messages::{Header, Setpoint, SetpointKind, Telemetry};
 use kort_proto::signals::Signals;
 use kort_thruster::rig::Rig;
@@ -34,11 +34,17 @@ static ALLOCATOR: Counting = Counting;
 #[test]
 fn no_law_allocates_in_its_tick() {
     let rig = Rig::from_toml(include_str!("../../../config/thrusters/whitcomb-yoerger-1999.toml")).unwrap();
+    let known = "\n[[effects]]\neffect = \"coulomb_friction\"\ncoulomb_torque_n_m = 0.3\n\
+        [[effects]]\neffect = \"amplifier_lag\"\nextra_lag_s = 0.01\n";
+    let text = include_str!("../../../config/thrusters/whitcomb-yoerger-1999.toml").to_owned() + known;
+    let revised = Rig::from_toml(&text).unwrap();
     const PERIOD: u64 = 4_000_000;
     for law in LawKind::ALL {
         let config = ControllerConfig { estimator: EstimatorKind::Rls, ..ControllerConfig::with_law(law) };
         let mut now = 1_000_000_000;
         let mut tick = Tick::new(&rig, &config, PERIOD, now).unwrap();
+        // Designed beside the tick, taken over in it.
+        let mut revision = Revision::new(&revised, PERIOD, 2).unwrap();
         let before = COUNT.with(Cell::get);
         let mut driven = false;
         for i in 1..500u64 {
@@ -75,6 +81,9 @@ fn no_law_allocates_in_its_tick() {
                 },
                 now,
             );
+            if i % 100 == 0 {
+                tick.adopt(&mut revision).unwrap();
+            }
             driven |= tick.tick(now).drive != 0.0;
             let _ = std::hint::black_box(tick.state());
         }

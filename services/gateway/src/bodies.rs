@@ -2,7 +2,7 @@
 
 use crate::extract::{Json, OptionalJson};
 use crate::problem::Problem;
-use crate::routes::bodies::{ControllerRequest, LeaseRequest, RecordingRequest, incoming};
+use crate::routes::bodies::{ControllerRequest, LeaseRequest, RecordingRequest, RigRequest, incoming};
 use crate::view::Setpoint;
 
 /// What a client sends.
@@ -14,6 +14,8 @@ pub enum Body {
     Lease,
     /// `PUT …/controller`
     Controller,
+    /// `POST …/rig`
+    Rig,
     /// `POST /v1/recordings`
     Recording,
     /// A text message of the stream.
@@ -22,8 +24,8 @@ pub enum Body {
 
 impl Body {
     /// Every kind.
-    pub const ALL: [Body; 5] =
-        [Body::Setpoint, Body::Lease, Body::Controller, Body::Recording, Body::Message];
+    pub const ALL: [Body; 6] =
+        [Body::Setpoint, Body::Lease, Body::Controller, Body::Rig, Body::Recording, Body::Message];
 
     /// Reads the bytes.
     ///
@@ -34,6 +36,7 @@ impl Body {
             Body::Setpoint => Json::<Setpoint>::from_bytes(bytes).map(drop),
             Body::Lease => Json::<LeaseRequest>::from_bytes(bytes).map(drop),
             Body::Controller => Json::<ControllerRequest>::from_bytes(bytes).map(drop),
+            Body::Rig => Json::<RigRequest>::from_bytes(bytes).map(drop),
             Body::Recording => OptionalJson::<RecordingRequest>::from_bytes(bytes).map(drop),
             // A message that is not UTF-8 is no message of the stream: the connection is closed before.
             Body::Message => std::str::from_utf8(bytes).map_or(Ok(()), |text| incoming(text).map(drop)),

@@ -88,6 +88,8 @@ fn needed(method: &Method, path: &str) -> Option<Role> {
     match *method {
         _ if is_open(path) => None,
         Method::GET | Method::HEAD | Method::OPTIONS => Some(Role::Viewer),
+        // A rig description is configuration.
+        _ if path.ends_with("/rig") || path.ends_with("/rig/rollback") => Some(Role::Admin),
         _ => Some(Role::Pilot),
     }
 }
@@ -136,6 +138,9 @@ mod tests {
     fn what_changes_something_needs_a_pilot_and_the_page_nobody() {
         assert_eq!(needed(&Method::POST, "/v1/stop"), Some(Role::Pilot));
         assert_eq!(needed(&Method::DELETE, "/v1/recordings"), Some(Role::Pilot));
+        assert_eq!(needed(&Method::POST, "/v1/thrusters/t1/rig"), Some(Role::Admin));
+        assert_eq!(needed(&Method::POST, "/v1/thrusters/t1/rig/rollback"), Some(Role::Admin));
+        assert_eq!(needed(&Method::GET, "/v1/thrusters/t1/rig"), Some(Role::Viewer));
         assert_eq!(needed(&Method::GET, "/metrics"), Some(Role::Viewer));
         assert_eq!(needed(&Method::GET, "/v1/events"), Some(Role::Viewer));
         assert_eq!(needed(&Method::GET, "/"), None);

@@ -24,6 +24,7 @@ mod openapi;
 mod problem;
 mod process;
 mod record;
+mod rig;
 mod routes;
 mod serve;
 mod settings;
@@ -53,8 +54,10 @@ use connections::Connections;
 use durations::Durations;
 use events::Events;
 use gate::Gate;
+use openapi::Document;
 use problem::{Kind, Problem};
 use record::{Recorder, Subject};
+use rig::RigDesk;
 use settings::Deployed;
 pub use settings::Settings;
 use tally::Tally;
@@ -87,6 +90,14 @@ pub enum GatewayError {
     /// The folder of the event log cannot be used.
     #[error("gateway.events = {}: {error}\nhint: name a folder this user can write", folder.display())]
     Events {
+        /// The folder.
+        folder: PathBuf,
+        /// The system's words.
+        error: std::io::Error,
+    },
+    /// The folder of the rigs' revisions cannot be used.
+    #[error("gateway.rigs = {}: {error}\nhint: name a folder this user can write", folder.display())]
+    Rigs {
         /// The folder.
         folder: PathBuf,
         /// The system's words.
@@ -133,7 +144,7 @@ fn bind_hint(error: &std::io::Error) -> &'static str {
 #[derive(Debug)]
 pub(crate) struct App {
     thrusters: Vec<Arc<Thruster>>,
-    rigs: Vec<(String, String)>,
+    rigs: Vec<Arc<RigDesk>>,
     tallies: Vec<Arc<Tally>>,
     recorder: Arc<Recorder>,
     events: Arc<Events>,
@@ -146,7 +157,7 @@ pub(crate) struct App {
     answers: [AtomicU64; 4],
     durations: Durations,
     stopping: watch::Receiver<bool>,
-    document: OnceLock<Bytes>,
+    document: OnceLock<Document>,
     patterns: OnceLock<Vec<String>>,
 }
 
@@ -165,10 +176,15 @@ impl App {
 
     /// What a recording of this thruster holds.
     fn subject(&self, id: &str) -> Result<Subject, Problem> {
-        let thruster = Arc::clone(self.thruster(id)?);
-        let at = self.thrusters.iter().position(|other| other.id == id);
-        let rig = at.and_then(|at| self.rigs.get(at)).cloned().unwrap_or_default();
-        Ok(Subject { thruster, rig })
+        Ok(Subject { thruster: Arc::clone(self.thruster(id)?), rig: Arc::clone(self.rig(id)?) })
+    }
+
+    /// The rig description of this thruster.
+    fn rig(&self, id: &str) -> Result<&Arc<RigDesk>, Problem> {
+        let thruster = self.thruster(id)?;
+        let at = self.thrusters.iter().position(|other| Arc::ptr_eq(other, thruster));
+        at.and_then(|at| self.rigs.get(at))
+            .ok_or_else(|| Problem::new(Kind::Internal, format!("thruster {id:?} has no rig description")))
     }
 
     fn tallies(&self) -> &[Arc<Tally>] {
@@ -239,13 +255,17 @@ impl App {
     }
 
     /// The OpenAPI document, once the routes are known.
-    fn publish(&self, document: &OpenApi) {
+    fn publish(&self, document: OpenApi) {
         let _ = self.patterns.set(document.paths.paths.keys().cloned().collect());
-        let _ = self.document.set(serde_json::to_vec_pretty(document).unwrap_or_default().into());
+        let _ = self.document.set(Document(document));
     }
 
+    /// The OpenAPI document, with the setpoints that are allowed now.
     fn document(&self) -> Bytes {
-        self.document.get().cloned().unwrap_or_default()
+        let Some(Document(document)) = self.document.get() else { return Bytes::new() };
+        let mut document = document.clone();
+        openapi::finish(&mut document, self);
+        serde_json::to_vec_pretty(&document).unwrap_or_default().into()
     }
 
     fn count_answer(&self, status: u16) {
@@ -298,6 +318,8 @@ pub fn check(settings: &Settings) -> Result<(), GatewayError> {
     std::fs::create_dir_all(&folder).map_err(|error| GatewayError::Recordings { folder, error })?;
     let events = settings.events.clone();
     std::fs::create_dir_all(&events).map_err(|error| GatewayError::Events { folder: events, error })?;
+    let rigs = settings.rigs.clone();
+    std::fs::create_dir_all(&rigs).map_err(|error| GatewayError::Rigs { folder: rigs, error })?;
     tokens(settings)?;
     certificate(settings)?;
     Ok(())
@@ -371,7 +393,7 @@ async fn serve(
 
     let mut app = App {
         thrusters: Vec::new(),
-        rigs: thrusters.iter().map(|deployed| deployed.rig.clone()).collect(),
+        rigs: Vec::new(),
         tallies: Vec::new(),
         recorder: Arc::clone(&recorder),
         events: Arc::clone(&events),
@@ -388,15 +410,22 @@ async fn serve(
         patterns: OnceLock::new(),
     };
     let mut links = Vec::new();
-    for Deployed { id, range, heartbeat, servo_silence, motor, .. } in &thrusters {
+    for deployed in thrusters {
+        let Deployed { id, range, heartbeat, servo_silence, motor, .. } = &deployed;
         let (thruster, asks) = Thruster::new(id, *range, *servo_silence, Arc::clone(&events));
-        let (thruster, tally) = (Arc::new(thruster), Arc::new(Tally::new(*motor)));
+        let (thruster, tally, heartbeat) = (Arc::new(thruster), Arc::new(Tally::new(*motor)), *heartbeat);
+        let rig = RigDesk::open(&settings.rigs, Arc::clone(&thruster), deployment.clone(), deployed)
+            .map_err(|error| GatewayError::Rigs { folder: settings.rigs.clone(), error })?;
+        app.rigs.push(Arc::new(rig));
         app.thrusters.push(Arc::clone(&thruster));
         app.tallies.push(Arc::clone(&tally));
         let events = Arc::clone(&events);
-        links.push(bus::Link { thruster, tally, asks, heartbeat: *heartbeat, events });
+        links.push(bus::Link { thruster, tally, asks, heartbeat, events });
     }
     let app = Arc::new(app);
+    for rig in &app.rigs {
+        tokio::spawn(Arc::clone(rig).keep_in_force());
+    }
 
     let stop_bus = Arc::new(AtomicBool::new(false));
     let pulse = Arc::new(Pulse::new());

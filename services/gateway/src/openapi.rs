@@ -11,6 +11,15 @@ use crate::App;
 use crate::problem::Kind;
 use crate::view::SetpointRange;
 
+/// The document as the routes make it; [`finish`] adds what may change.
+pub struct Document(pub OpenApi);
+
+impl std::fmt::Debug for Document {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Document {{ paths: {} }}", self.0.paths.paths.len())
+    }
+}
+
 /// Title, tags and the table of errors.
 pub fn opening() -> OpenApi {
     let mut info = Info::new("kort", env!("CARGO_PKG_VERSION"));
@@ -18,6 +27,7 @@ pub fn opening() -> OpenApi {
     let tags = [
         ("thrusters", "What is known of each thruster"),
         ("command", "Lease, arming, setpoint, control law"),
+        ("rig", "The rig description in force, its revisions, and the way back"),
         ("recordings", "Recordings of the live signals"),
         ("health", "Health and metrics"),
         ("console", "The operator's console"),
@@ -77,7 +87,7 @@ fn description() -> String {
         "Thrust control for marine thrusters. SI units throughout, the unit ends each name; positive is ahead.\n\n\
          To move a thruster: `POST …/lease`, `POST …/arm`, `PUT …/setpoint` with header `Lease-Id`, again before the \
          lease runs out. When the lease ends, thrust is ramped to zero. `POST /v1/stop` stops everything, from any pilot.\n\n\
-         Roles: a viewer reads, a pilot commands, an admin changes recordings of others too.\n\n\
+         Roles: a viewer reads, a pilot commands, an admin changes rig descriptions, and recordings of others.\n\n\
          Every error is an RFC 9457 problem document, `application/problem+json`, with one of these types:\n\n\
          | `type` | status | meaning |\n| --- | --- | --- |\n",
     );
@@ -91,7 +101,7 @@ fn description() -> String {
 /// What only the configuration knows: the range of setpoints, and which thrusters there are.
 pub fn finish(document: &mut OpenApi, app: &App) {
     let range = |pick: fn(&SetpointRange) -> f64| {
-        app.thrusters().iter().map(|thruster| pick(&thruster.range)).fold(f64::INFINITY, f64::min)
+        app.thrusters().iter().map(|thruster| pick(&thruster.range())).fold(f64::INFINITY, f64::min)
     };
     let ids: Vec<&str> = app.thrusters().iter().map(|thruster| thruster.id.as_str()).collect();
     for item in document.paths.paths.values_mut() {

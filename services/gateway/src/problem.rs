@@ -23,6 +23,7 @@ pub enum Kind {
     UnknownRoute,
     UnknownThruster,
     UnknownRecording,
+    UnknownRevision,
     UnknownFault,
     MethodNotAllowed,
     RequestTimeout,
@@ -36,18 +37,20 @@ pub enum Kind {
     BodyTooLarge,
     UnsupportedMediaType,
     InvalidField,
+    InvalidRig,
     OutOfRange,
     UnknownController,
     UpgradeRequired,
     Internal,
     RecordingFailed,
+    StorageFailed,
     NotReady,
     Overloaded,
 }
 
 impl Kind {
     /// All kinds, for the documentation and the tests.
-    pub const ALL: [Kind; 33] = [
+    pub const ALL: [Kind; 36] = [
         Kind::MalformedJson,
         Kind::MalformedPath,
         Kind::MalformedQuery,
@@ -61,6 +64,7 @@ impl Kind {
         Kind::UnknownRoute,
         Kind::UnknownThruster,
         Kind::UnknownRecording,
+        Kind::UnknownRevision,
         Kind::UnknownFault,
         Kind::MethodNotAllowed,
         Kind::RequestTimeout,
@@ -74,11 +78,13 @@ impl Kind {
         Kind::BodyTooLarge,
         Kind::UnsupportedMediaType,
         Kind::InvalidField,
+        Kind::InvalidRig,
         Kind::OutOfRange,
         Kind::UnknownController,
         Kind::UpgradeRequired,
         Kind::Internal,
         Kind::RecordingFailed,
+        Kind::StorageFailed,
         Kind::NotReady,
         Kind::Overloaded,
     ];
@@ -103,6 +109,7 @@ impl Kind {
             Kind::UnknownRoute => (S::NOT_FOUND, "unknown-route", "No such route"),
             Kind::UnknownThruster => (S::NOT_FOUND, "unknown-thruster", "No such thruster"),
             Kind::UnknownRecording => (S::NOT_FOUND, "unknown-recording", "No such recording"),
+            Kind::UnknownRevision => (S::NOT_FOUND, "unknown-revision", "No such revision of the rig"),
             Kind::UnknownFault => (S::NOT_FOUND, "unknown-fault", "No such fault code"),
             Kind::MethodNotAllowed => {
                 (S::METHOD_NOT_ALLOWED, "method-not-allowed", "This route has no such method")
@@ -126,6 +133,9 @@ impl Kind {
             Kind::InvalidField => {
                 (S::UNPROCESSABLE_ENTITY, "invalid-field", "A field is missing, unknown or of the wrong type")
             }
+            Kind::InvalidRig => {
+                (S::UNPROCESSABLE_ENTITY, "invalid-rig", "The rig description cannot be used")
+            }
             Kind::OutOfRange => {
                 (S::UNPROCESSABLE_ENTITY, "out-of-range", "A value is outside its allowed range")
             }
@@ -136,6 +146,9 @@ impl Kind {
             Kind::Internal => (S::INTERNAL_SERVER_ERROR, "internal", "The gateway failed"),
             Kind::RecordingFailed => {
                 (S::INSUFFICIENT_STORAGE, "recording-failed", "The recording cannot be written")
+            }
+            Kind::StorageFailed => {
+                (S::INSUFFICIENT_STORAGE, "storage-failed", "The service cannot keep its files")
             }
             Kind::NotReady => (S::SERVICE_UNAVAILABLE, "not-ready", "Servo or controller is away"),
         }
@@ -201,6 +214,11 @@ impl Problem {
     pub fn allowed(mut self, allowed: impl IntoIterator<Item = impl Into<String>>) -> Problem {
         self.allowed = allowed.into_iter().map(Into::into).collect();
         self
+    }
+
+    /// Is it of this kind?
+    pub fn is(&self, kind: Kind) -> bool {
+        self.type_uri.strip_prefix("urn:kort:problem:") == Some(kind.entry().1)
     }
 
     /// The HTTP status code.

@@ -24,6 +24,7 @@ use utoipa::ToSchema;
 
 use crate::events::Events;
 use crate::problem::{Kind, Problem};
+use crate::rig::RigDesk;
 use crate::settings::RecordingLimits;
 use crate::thruster::{Thruster, lock};
 use crate::token::{Identity, Role};
@@ -87,8 +88,8 @@ pub enum RecordingState {
 pub struct Subject {
     /// The thruster: its state goes along.
     pub thruster: Arc<Thruster>,
-    /// File and text of its rig description.
-    pub rig: (String, String),
+    /// Its rig description: a file holds the one in force when it was begun.
+    pub rig: Arc<RigDesk>,
 }
 
 /// Starts, stops, lists and deletes recordings.

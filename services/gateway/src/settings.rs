@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use kort_control::model::ControlModel;
 use kort_proto::config::{Config, ConfigError};
-use kort_thruster::rig::Rig;
+use kort_thruster::rig::{AmplifierKind, Rig};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer};
 
@@ -25,6 +25,8 @@ pub struct Settings {
     pub recordings: PathBuf,
     /// Folder of the event log, likewise.
     pub events: PathBuf,
+    /// Folder of the rigs' revisions, likewise.
+    pub rigs: PathBuf,
     /// File of the tokens, likewise; `kort token new` writes it.
     pub tokens: PathBuf,
     /// Ask for a token on loopback too; beyond it one is always asked for.
@@ -83,6 +85,7 @@ impl Default for Settings {
             bind: SocketAddr::from(([127, 0, 0, 1], 8080)),
             recordings: PathBuf::from("kort-state/recordings"),
             events: PathBuf::from("kort-state/events"),
+            rigs: PathBuf::from("kort-state/rigs"),
             tokens: PathBuf::from("kort-state/tokens.toml"),
             require_tokens: false,
             hosts: Vec::new(),
@@ -182,6 +185,25 @@ pub struct Deployed {
     pub heartbeat: Duration,
     /// What turns its measured signals into power.
     pub motor: Motor,
+    /// Kind of its drive.
+    pub drive: AmplifierKind,
+    /// Largest shaft speed that the configuration allows, rad/s.
+    pub speed_limit_rad_s: Option<f64>,
+}
+
+impl Deployed {
+    /// Largest setpoints with this model of the thruster.
+    pub fn range_of(&self, model: &ControlModel) -> SetpointRange {
+        range(Some(model), self.speed_limit_rad_s)
+    }
+}
+
+fn range(model: Option<&ControlModel>, speed_limit_rad_s: Option<f64>) -> SetpointRange {
+    let limit = speed_limit_rad_s.unwrap_or(f64::MAX);
+    SetpointRange {
+        thrust_n: hundredths(model.map_or(0.0, |model| model.thrust_max_n)),
+        speed_rad_s: hundredths(limit.min(model.map_or(f64::MAX, |model| model.speed_max_rad_s))),
+    }
 }
 
 /// The thrusters of the deployment.
@@ -197,24 +219,27 @@ pub fn thrusters(config: &Config) -> Result<Vec<Deployed>, ConfigError> {
             let rig = Rig::from_toml(&text)
                 .map_err(|error| ConfigError { file: file.clone(), message: error.to_string() })?;
             let heartbeat = Duration::from_nanos(thruster.controller_period_ns());
-            let speed_limit = thruster
+            let speed_limit_rad_s = thruster
                 .limits
                 .get("speed_rad_s")
                 .and_then(|v| v.as_float().or(v.as_integer().map(|v| v as f64)));
             let model = ControlModel::from_rig(&rig, heartbeat.as_secs_f64());
-            let range = SetpointRange {
-                thrust_n: hundredths(model.as_ref().map_or(0.0, |model| model.thrust_max_n)),
-                speed_rad_s: hundredths(
-                    speed_limit
-                        .unwrap_or(f64::MAX)
-                        .min(model.map_or(f64::MAX, |model| model.speed_max_rad_s)),
-                ),
-            };
+            let range = range(model.as_ref().ok(), speed_limit_rad_s);
             let servo_silence = Duration::from_nanos(
                 (5 * thruster.servo_period_ns()).max(2 * thruster.controller_period_ns()),
             );
             let motor = Motor::of(&rig);
-            Ok(Deployed { id: id.clone(), rig: (file, text), servo_silence, range, heartbeat, motor })
+            let drive = rig.amplifier.kind;
+            Ok(Deployed {
+                id: id.clone(),
+                rig: (file, text),
+                servo_silence,
+                range,
+                heartbeat,
+                motor,
+                drive,
+                speed_limit_rad_s,
+            })
         })
         .collect()
 }

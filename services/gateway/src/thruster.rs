@@ -35,6 +35,8 @@ pub struct Ask {
     pub request: Request,
     /// Who must answer.
     pub expects: Vec<Process>,
+    /// And within which time.
+    pub within: Duration,
     /// Where the answers go; fewer than expected if time ran out.
     pub answer: oneshot::Sender<Vec<Reply>>,
 }
@@ -44,8 +46,7 @@ pub struct Ask {
 pub struct Thruster {
     /// Name in the configuration.
     pub id: String,
-    /// Largest setpoints.
-    pub range: SetpointRange,
+    range: Mutex<SetpointRange>,
     desk: Mutex<Desk>,
     heard: Mutex<Heard>,
     asks: mpsc::SyncSender<Ask>,
@@ -72,7 +73,7 @@ impl Thruster {
         let (asks, inbox) = mpsc::sync_channel(64);
         let thruster = Thruster {
             id: id.to_owned(),
-            range,
+            range: Mutex::new(range),
             desk: Mutex::new(Desk::new(id)),
             heard: Mutex::new(Heard { servo_silence, ..Heard::default() }),
             asks,
@@ -80,6 +81,16 @@ impl Thruster {
             rendered: Mutex::new(((u64::MAX, u64::MAX, false), Bytes::new())),
         };
         (thruster, inbox)
+    }
+
+    /// Largest setpoints.
+    pub fn range(&self) -> SetpointRange {
+        *lock(&self.range)
+    }
+
+    /// Another revision of the rig allows other setpoints.
+    pub fn set_range(&self, range: SetpointRange) {
+        *lock(&self.range) = range;
     }
 
     /// The desk, for the bus and the metrics.
@@ -130,7 +141,7 @@ impl Thruster {
 
     /// Puts a setpoint in force.
     pub fn command(&self, lease: Option<&str>, setpoint: Setpoint) -> Result<(Lease, Instant), Problem> {
-        check_range(setpoint, self.range)?;
+        check_range(setpoint, self.range())?;
         let now = Instant::now();
         let heard = self.heard();
         let mut desk = self.desk();
@@ -195,7 +206,7 @@ impl Thruster {
     }
 
     /// Something was done: it is noted, and the lease it was done with lives on.
-    fn did(&self, who: &str, lease: Option<&str>, kind: EventKind, what: &str) {
+    pub fn did(&self, who: &str, lease: Option<&str>, kind: EventKind, what: &str) {
         let mut desk = self.desk();
         let who = match (lease, desk.lease.holder()) {
             (Some(_), Some(holder)) => holder,
@@ -331,9 +342,10 @@ impl Thruster {
             controller: controller.map(|c| c.law.as_str().to_owned()),
             observer: controller.map(|c| c.observer.as_str().to_owned()).filter(|name| !name.is_empty()),
             estimator: controller.map(|c| c.estimator.as_str().to_owned()).filter(|name| !name.is_empty()),
+            rig_revision: controller.map(|c| kort_proto::revision::name(c.rig_revision)),
             estimator_frozen: controller.is_some_and(|c| c.estimator_frozen != 0),
             setpoint: desk.setpoint().unwrap_or(Setpoint::ThrustN(0.0)),
-            range: self.range,
+            range: self.range(),
             commanded: Values::of_signals(SignalKind::Command, &signals),
             measured: Values::of_signals(SignalKind::Measured, &signals),
             estimated: Estimated {
@@ -377,8 +389,19 @@ impl Thruster {
 
     /// Sends a request and waits for everybody's answer.
     async fn ask(&self, request: Request, expects: &[Process], refused: Kind) -> Result<(), Problem> {
+        self.ask_within(request, expects, refused, ANSWER_WITHIN).await
+    }
+
+    /// As [`Self::ask`], for what may take its time.
+    pub async fn ask_within(
+        &self,
+        request: Request,
+        expects: &[Process],
+        refused: Kind,
+        within: Duration,
+    ) -> Result<(), Problem> {
         let (answer, answers) = oneshot::channel();
-        let ask = Ask { request, expects: expects.to_vec(), answer };
+        let ask = Ask { request, expects: expects.to_vec(), within, answer };
         let replies = match self.asks.try_send(ask) {
             Ok(()) => answers.await.unwrap_or_default(),
             Err(_) => Vec::new(),
@@ -399,14 +422,14 @@ impl Thruster {
             None => Ok(()),
             Some(silent) => Err(Problem::new(
                 Kind::NotReady,
-                format!("the {} did not answer within {} ms", silent.name(), ANSWER_WITHIN.as_millis()),
+                format!("the {} did not answer within {} ms", silent.name(), within.as_millis()),
             )
             .hint("GET /readyz says whether it is there")),
         }
     }
 
     /// Waits a moment until what was done shows in the state too.
-    async fn settle(&self, done: impl Fn(&Heard, Instant) -> bool) {
+    pub async fn settle(&self, done: impl Fn(&Heard, Instant) -> bool) {
         for _ in 0..100 {
             if done(&self.heard(), Instant::now()) {
                 return;

@@ -26,6 +26,9 @@ pub struct ThrusterState {
     pub observer: Option<String>,
     /// Estimator that runs beside it; null while the controller is away.
     pub estimator: Option<String>,
+    /// Revision of the rig description that the controller runs on, as recordings name it; null while it is away.
+    #[schema(example = "8f3a0c94d1b2e675")]
+    pub rig_revision: Option<String>,
     /// Is the estimator frozen for want of excitation?
     pub estimator_frozen: bool,
     /// Setpoint in force.

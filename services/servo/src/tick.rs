@@ -210,7 +210,7 @@ impl Servo {
                     )
                 }
             }
-            RequestKind::SetController | RequestKind::Rest => None,
+            RequestKind::SetController | RequestKind::SetRig | RequestKind::Rest => None,
         }
     }
 

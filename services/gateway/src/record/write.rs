@@ -235,7 +235,7 @@ impl Job {
 fn create(folder: &Path, info: &RecordingInfo, subject: &Subject, began: SystemTime) -> io::Result<Mcap> {
     let columns: Vec<&str> = SIGNALS.iter().map(|signal| signal.name).collect();
     let origin_ns = began.duration_since(SystemTime::UNIX_EPOCH).map_or(0, |d| d.as_nanos() as u64);
-    let (rig_file, rig) = &subject.rig;
+    let (rig_file, rig, revision) = subject.rig.in_force();
     let about = BTreeMap::from(
         [
             ("kort_version", env!("CARGO_PKG_VERSION")),
@@ -245,9 +245,10 @@ fn create(folder: &Path, info: &RecordingInfo, subject: &Subject, began: SystemT
             ("owner", &info.owner),
             ("started", &info.started),
             ("rate_hz", &info.rate_hz.to_string()),
-            ("rig", rig),
-            ("rig_file", rig_file),
-            ("rig_revision", &revision(rig)),
+            ("rig", &rig),
+            ("rig_file", &rig_file),
+            ("rig_revision", &revision.revision),
+            ("rig_number", &revision.number.to_string()),
         ]
         .map(|(name, value)| (name.to_owned(), value.to_owned())),
     );
@@ -257,12 +258,6 @@ fn create(folder: &Path, info: &RecordingInfo, subject: &Subject, began: SystemT
     file.flush()?;
     write_info(folder, info)?;
     Ok(file)
-}
-
-/// A rig description is told apart by its content.
-fn revision(rig: &str) -> String {
-    use sha2::{Digest, Sha256};
-    Sha256::digest(rig.as_bytes()).iter().take(8).map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// A recording leaves some space to others.

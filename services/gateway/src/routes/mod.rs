@@ -10,6 +10,7 @@ mod health;
 mod lease;
 mod metrics;
 mod recordings;
+mod rig;
 mod setpoint;
 mod stop;
 mod stream;
@@ -22,6 +23,7 @@ pub mod bodies {
     pub use super::controller::ControllerRequest;
     pub use super::lease::LeaseRequest;
     pub use super::recordings::RecordingRequest;
+    pub use super::rig::RigRequest;
     pub use super::stream::parse as incoming;
 }
 
@@ -41,7 +43,7 @@ use crate::{App, BODY_BYTES_MAX, gate, openapi};
 
 /// Everything the gateway answers.
 pub fn router(app: Arc<App>) -> Router {
-    let (routes, mut document) = OpenApiRouter::with_openapi(openapi::opening())
+    let (routes, document) = OpenApiRouter::with_openapi(openapi::opening())
         .merge(thrusters::routes())
         .merge(lease::routes())
         .merge(arming::routes())
@@ -49,6 +51,7 @@ pub fn router(app: Arc<App>) -> Router {
         .merge(stop::routes())
         .merge(events::routes())
         .merge(controller::routes())
+        .merge(rig::routes())
         .merge(stream::routes())
         .merge(recordings::routes())
         .merge(faults::routes())
@@ -57,8 +60,7 @@ pub fn router(app: Arc<App>) -> Router {
         .merge(console::routes())
         .merge(docs::routes())
         .split_for_parts();
-    openapi::finish(&mut document, &app);
-    app.publish(&document);
+    app.publish(document);
     routes
         .merge(docs::pages())
         .fallback(unknown_route)

@@ -36,9 +36,17 @@ pub struct Diagnose {
     /// Write the report as one self-contained page
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
+    /// A job of the service, which has this process id: each step on a line of its own, nothing else disturbed
+    #[arg(long, value_name = "PID", hide = true)]
+    job: Option<u32>,
 }
 
 impl Diagnose {
+    /// The service's process that this is a job of.
+    pub fn job_of(&self) -> Option<u32> {
+        self.job
+    }
+
     /// Does it.
     ///
     /// # Errors
@@ -47,8 +55,11 @@ impl Diagnose {
         let loaded = self.input.load()?;
         let options =
             Options { model: self.input.model, seed: self.input.seed, with: self.input.known_effects()? };
-        let spinner = progress::spinner();
-        let told = |text: &str| spinner.set_message(text.to_string());
+        let spinner = self.job.is_none().then(progress::spinner);
+        let told = |text: &str| match &spinner {
+            Some(spinner) => spinner.set_message(text.to_string()),
+            None => eprintln!("step: {text}"),
+        };
         let diagnosis = self.input.on_threads(|| diagnose(&loaded.series, &loaded.rig, &options, &told))?;
         drop(spinner);
         let mut diagnosis = diagnosis.map_err(Failure::input)?;

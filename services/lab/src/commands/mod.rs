@@ -35,6 +35,14 @@ pub enum Command {
 }
 
 impl Command {
+    /// The service's process that this is a job of: it gives way to everything else, and ends with it.
+    pub fn job_of(&self) -> Option<u32> {
+        match self {
+            Command::Diagnose(diagnose) => diagnose.job_of(),
+            _ => None,
+        }
+    }
+
     /// Does it.
     pub fn run(self) -> Result<Outcome, Failure> {
         match self {

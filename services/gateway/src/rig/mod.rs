@@ -1,0 +1,272 @@
+//! The rig description in force, thruster by thruster: put in force while the thruster drives, every revision kept,
+//! and the way back.
+
+mod book;
+mod difference;
+
+use std::io;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use kort_control::model::ControlModel;
+use kort_proto::events::EventKind;
+use kort_proto::messages::{Process, Request, RequestKind};
+use kort_proto::revision;
+use kort_proto::transport::Deployment;
+use kort_thruster::rig::{AmplifierKind, Rig};
+use serde::Serialize;
+use tokio::sync::Mutex;
+use utoipa::ToSchema;
+
+use crate::problem::{Kind, Problem};
+use crate::settings::Deployed;
+use crate::thruster::Thruster;
+use crate::view::SetpointRange;
+
+pub use book::{Book, Entry, Making, Revision};
+pub use difference::Change;
+
+/// A controller has read, designed and taken over a revision within this time, or is taken to be away.
+const TAKEN_WITHIN: Duration = Duration::from_secs(6);
+/// How often it is looked for whether the controller runs on the revision in force.
+const LOOK_EVERY: Duration = Duration::from_millis(500);
+
+/// The rig description of one thruster.
+#[derive(Debug)]
+pub struct RigDesk {
+    thruster: Arc<Thruster>,
+    deployment: Deployment,
+    deployed: Deployed,
+    book: Book,
+    /// One revision at a time.
+    turn: Mutex<()>,
+}
+
+/// What putting a revision in force came to.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct Revised {
+    /// Is it in force now? False after a dry run, and where it was in force already.
+    pub applied: bool,
+    /// The entry in force now.
+    pub in_force: Entry,
+    /// What differs from what was in force before.
+    pub difference: Vec<Change>,
+}
+
+/// Who wants a revision in force.
+#[derive(Clone, Debug)]
+pub struct Asker {
+    /// Name of the token.
+    pub who: String,
+    /// The lease shown.
+    pub lease: Option<String>,
+}
+
+impl RigDesk {
+    /// Opens the book of a thruster under `folder`, and lets setpoints go as far as the revision in force allows.
+    ///
+    /// # Errors
+    /// The folder cannot be read or written.
+    pub fn open(
+        folder: &Path,
+        thruster: Arc<Thruster>,
+        deployment: Deployment,
+        deployed: Deployed,
+    ) -> io::Result<RigDesk> {
+        let name = |text: &str| Rig::from_toml(text).map(|rig| rig.name).unwrap_or_default();
+        let (_, text) = &deployed.rig;
+        let book = Book::open(&folder.join(&deployed.id), text, &name(text))?;
+        let desk = RigDesk { thruster, deployment, deployed, book, turn: Mutex::new(()) };
+        if let Ok(range) = desk.check(&desk.book.current().1).map(|(_, range)| range) {
+            desk.thruster.set_range(range);
+        }
+        Ok(desk)
+    }
+
+    /// Every revision, and which is in force.
+    pub fn book(&self) -> &Book {
+        &self.book
+    }
+
+    /// Name of the file or entry, and text of the revision in force: what recordings hold.
+    pub fn in_force(&self) -> (String, Arc<str>, Entry) {
+        let (entry, text) = self.book.current();
+        let file = match entry.source.as_str() {
+            "deployment" => self.deployed.rig.0.clone(),
+            source => format!("revision {} ({source})", entry.number),
+        };
+        (file, text, entry)
+    }
+
+    /// Puts a text in force: checked, compared, and taken over by the controller without a step of the drive. A dry
+    /// run only checks and compares.
+    pub async fn revise(
+        &self,
+        asker: &Asker,
+        text: &str,
+        making: Making,
+        dry_run: bool,
+    ) -> Result<Revised, Problem> {
+        let _turn = self.turn.lock().await;
+        let (before, text_before) = self.book.current();
+        let (rig, range) = self.check(text)?;
+        let difference = difference::between(&text_before, text);
+        if dry_run || *text_before == *text {
+            return Ok(Revised { applied: false, in_force: before, difference });
+        }
+        self.thruster.desk().may(asker.lease.as_deref(), Instant::now())?;
+        self.thruster.ready()?;
+        self.book.keep(text).map_err(|error| self.not_kept(&error))?;
+        self.take_over(text).await?;
+        let entered = self.book.enter(text, &rig.name, making);
+        let in_force = self.or_back(entered, &text_before).await?;
+        self.thruster.set_range(range);
+        let words = format!(
+            "put revision {} of the rig in force ({}, from {}): {}",
+            in_force.number,
+            in_force.revision,
+            in_force.source,
+            difference::words(&difference)
+        );
+        self.thruster.did(&asker.who, asker.lease.as_deref(), EventKind::RigChanged, &words);
+        Ok(Revised { applied: true, in_force, difference })
+    }
+
+    /// Goes back to the revision that was in force before this one.
+    pub async fn roll_back(&self, asker: &Asker) -> Result<Revised, Problem> {
+        let _turn = self.turn.lock().await;
+        let (now, text_now) = self.book.current();
+        let back = now.before.and_then(|number| self.book.revision(number)).ok_or_else(|| {
+            Problem::new(
+                Kind::Refused,
+                format!("nothing was in force on {} before revision {}", self.thruster.id, now.number),
+            )
+            .hint("GET …/rig/revisions lists every revision; POST …/rig puts any of them in force")
+        })?;
+        let (in_force, text) = back;
+        let (_, range) = self.check(&text)?;
+        self.thruster.desk().may(asker.lease.as_deref(), Instant::now())?;
+        self.thruster.ready()?;
+        self.take_over(&text).await?;
+        self.or_back(self.book.turn_to(in_force.number), &text_now).await?;
+        self.thruster.set_range(range);
+        let difference = difference::between(&text_now, &text);
+        let words = format!(
+            "went back from revision {} of the rig to {} ({}): {}",
+            now.number,
+            in_force.number,
+            in_force.revision,
+            difference::words(&difference)
+        );
+        self.thruster.did(&asker.who, asker.lease.as_deref(), EventKind::RigRolledBack, &words);
+        Ok(Revised { applied: true, in_force, difference })
+    }
+
+    /// Sees to it that the controller runs on the revision in force: one that was restarted begins with the
+    /// deployment's own.
+    pub async fn keep_in_force(self: Arc<Self>) {
+        let mut refused = None;
+        loop {
+            tokio::time::sleep(LOOK_EVERY).await;
+            let Ok(_turn) = self.turn.try_lock() else { continue };
+            let (entry, text) = self.book.current();
+            let wanted = revision::of(&text);
+            let running = self.thruster.heard().controller(Instant::now()).map(|state| state.rig_revision);
+            if running.is_none_or(|running| running == wanted) || refused == Some(wanted) {
+                continue;
+            }
+            let id = &self.thruster.id;
+            match self.take_over(&text).await {
+                Ok(()) => {
+                    let words = format!(
+                        "the controller runs on revision {} of the rig again ({})",
+                        entry.number, entry.revision
+                    );
+                    self.thruster.did("gateway", None, EventKind::RigChanged, &words);
+                }
+                // A controller that is not there yet is asked again, one that refuses is not.
+                Err(problem) if problem.is(Kind::NotReady) => (),
+                Err(problem) => {
+                    tracing::error!(thruster = id, ?problem, "the rig's revision in force is not taken");
+                    refused = Some(wanted);
+                }
+            }
+        }
+    }
+
+    /// Checks a text as `kort check` and the controller do; the rig, and how far setpoints may go with it.
+    fn check(&self, text: &str) -> Result<(Rig, SetpointRange), Problem> {
+        let rig = Rig::from_toml(text).map_err(|error| invalid(&error.to_string()))?;
+        let model = ControlModel::from_rig(&rig, self.deployed.heartbeat.as_secs_f64())
+            .map_err(|error| invalid(&error.to_string()))?;
+        let drive = self.deployed.drive;
+        if rig.amplifier.kind != drive {
+            return Err(Problem::new(
+                Kind::Refused,
+                format!(
+                    "`amplifier.kind` = {:?} is not the kind of the drive that {} runs: {:?}",
+                    kind(rig.amplifier.kind),
+                    self.thruster.id,
+                    kind(drive)
+                ),
+            )
+            .hint("a drive of another kind is deployed with the configuration, and needs a restart"));
+        }
+        Ok((rig, self.deployed.range_of(&model)))
+    }
+
+    /// Hands a text to the controller and waits until it runs on it.
+    async fn take_over(&self, text: &str) -> Result<(), Problem> {
+        self.deployment.put_rig(&self.thruster.id, text).map_err(|error| {
+            Problem::new(Kind::StorageFailed, error.to_string().replace("\nhint:", "; hint:"))
+        })?;
+        let rig_revision = revision::of(text);
+        let request = Request { kind: RequestKind::SetRig as u32, rig_revision, ..Request::default() };
+        self.thruster.ask_within(request, &[Process::Controller], Kind::Refused, TAKEN_WITHIN).await?;
+        self.thruster
+            .settle(|heard, now| {
+                heard.controller(now).is_some_and(|state| state.rig_revision == rig_revision)
+            })
+            .await;
+        Ok(())
+    }
+
+    /// What was put in force but cannot be noted down is taken back.
+    async fn or_back<T>(&self, noted: io::Result<T>, text_before: &str) -> Result<T, Problem> {
+        match noted {
+            Ok(done) => Ok(done),
+            Err(error) => {
+                self.take_over(text_before).await?;
+                Err(self.not_kept(&error))
+            }
+        }
+    }
+
+    fn not_kept(&self, error: &io::Error) -> Problem {
+        Problem::new(
+            Kind::StorageFailed,
+            format!(
+                "the rig's revision of {} cannot be kept: {error}; nothing has changed",
+                self.thruster.id
+            ),
+        )
+        .hint("see that the folder of gateway.rigs can be written and has space")
+    }
+}
+
+fn kind(kind: AmplifierKind) -> &'static str {
+    match kind {
+        AmplifierKind::Current => "current",
+        AmplifierKind::Voltage => "voltage",
+        AmplifierKind::Speed => "speed",
+    }
+}
+
+/// The words of a check: what is wrong, and the way out.
+fn invalid(words: &str) -> Problem {
+    match words.split_once("hint:") {
+        Some((what, hint)) => Problem::new(Kind::InvalidRig, what.trim()).hint(hint.trim()),
+        None => Problem::new(Kind::InvalidRig, words.trim()),
+    }
+}

@@ -1,0 +1,27 @@
+//! Work that the service started in a process of its own: behind everything else on the machine, and not without it.
+
+use std::process::ExitCode;
+
+use kort_proto::transport::idle;
+use rustix::process::{Pid, Signal, getppid, nice, set_parent_process_death_signal};
+
+use crate::{FAILED, fail};
+
+/// Makes this process a job of its parent: it runs only where nothing else wants the processor, and ends with it.
+///
+/// # Errors
+/// The parent is gone already.
+pub fn begin(parent: u32) -> Result<(), ExitCode> {
+    let _ = set_parent_process_death_signal(Some(Signal::KILL));
+    // The parent may have ended before the line above.
+    let theirs = i32::try_from(parent).ok().and_then(Pid::from_raw);
+    if theirs.is_none() || getppid() != theirs {
+        return Err(fail(FAILED, &format!("process {parent} did not start this one, or is gone")));
+    }
+    // Where the one is not permitted the other still helps.
+    let _ = nice(19);
+    if let Some(words) = idle() {
+        eprintln!("warning: {words}");
+    }
+    Ok(())
+}
