@@ -57,11 +57,10 @@ struct RevisionView {
 pub struct RigRequest {
     /// A whole rig description, TOML.
     #[serde(default)]
-    #[schema(nullable = false)]
     toml: Option<String>,
     /// Number of a revision that is kept.
     #[serde(default)]
-    #[schema(nullable = false, minimum = 1)]
+    #[schema(minimum = 1)]
     revision: Option<u32>,
     /// Words to keep with it.
     #[serde(default)]
