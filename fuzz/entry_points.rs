@@ -7,6 +7,7 @@ use kort_gateway::bodies::Body;
 use kort_lab::check::Kind;
 use kort_proto::config::Config;
 use kort_recording::{ColumnMap, Recording};
+use kort_servo::drives::Chosen;
 use kort_thruster::rig::Rig;
 
 const NAME: &str = "any.input";
@@ -80,7 +81,7 @@ pub fn wire(bytes: &[u8]) {
         let config = Config::parse(&text, None).expect("a sound deployment");
         let thruster = config.thruster("t1").expect("it is there");
         let chosen = kort_servo::drives::choose(&config, "t1", thruster, &rig).expect("a sound drive");
-        let Ok((.., mut protocol)) = chosen.on_wire() else { panic!("{kind} has no wire") };
+        let Chosen::OnWire(_, mut protocol) = chosen else { panic!("{kind} has no wire") };
         let mut out = Vec::new();
         protocol.begin();
         protocol.ask(&mut out, &mut |_| ());

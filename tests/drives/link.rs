@@ -1,16 +1,15 @@
 //! What is asked of every drive on a wire, whatever it speaks.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use kort_emulators::{Bench as Emulator, Mischief};
 use kort_proto::faults::Fault;
 use kort_proto::messages::{Command, Outcome, RequestKind, Telemetry};
-
-use crate::common::bench::Bench;
 use kort_thruster::rig::Rig;
 use serde_json::json;
 
+use crate::common::bench::Bench;
 use crate::common::{PERIOD_NS, Site, Stack, kill, wait};
 
 /// Added to every bound: what a machine shared with others may hold a process up.
@@ -18,9 +17,15 @@ const SLACK: Duration = Duration::from_nanos(2 * PERIOD_NS);
 
 /// How long a reading stands in these tests, longer than by default: what a pseudo terminal carries waits for a
 /// kernel's worker without priority, which a busy machine holds up.
-pub const LIFE_MS: u64 = 300;
+const LIFE_MS: u64 = 300;
 /// Time-out of the drive in these tests, as long for the same reason.
-pub const TIMEOUT_MS: u64 = 300;
+const TIMEOUT_MS: u64 = 300;
+/// After it the drive itself takes the torque away; it may look at it every 10 ms only.
+const TIMEOUT: Duration = Duration::from_millis(TIMEOUT_MS + 10);
+/// A reading's life, and some exchanges: silence is noticed.
+pub const SILENCE: Duration = Duration::from_millis(LIFE_MS + 30);
+/// `checks.frozen_s`, and an exchange: readings that repeat themselves are noticed.
+pub const FROZEN: Duration = Duration::from_millis(500 + 20);
 /// Faults that a machine makes which stands still.
 const HELD_UP: u64 = Fault::DriveLost.bit()
     | Fault::SensorNotFinite.bit()
@@ -30,9 +35,10 @@ const HELD_UP: u64 = Fault::DriveLost.bit()
 /// One deployment at a time: emulators beside each other would hold each other up.
 static ALONE: Mutex<()> = Mutex::new(());
 
-/// Waits until no other test runs a deployment.
-pub fn alone() -> MutexGuard<'static, ()> {
-    ALONE.lock().unwrap_or_else(PoisonError::into_inner)
+/// Runs a test when no other one runs a deployment, and once more where the machine stood still.
+pub fn alone(test: impl Fn()) {
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    crate::common::in_real_time(test);
 }
 
 /// A rig that the repository describes.
@@ -190,22 +196,19 @@ impl Case {
     pub fn endures_its_wire(
         &self,
         emulator: &Emulator,
-        timeout: Duration,
         stale: &[Fault],
         frozen: Duration,
         harmless: &[Mischief],
     ) {
         let mut bench = self.servo(emulator);
-        // A reading's life, and some exchanges.
-        let silence = Duration::from_millis(LIFE_MS + 30);
         let lost: &[Fault] = &[Fault::DriveLost];
         for (mischief, faults, bound) in [
-            (Mischief::Silent, lost, silence),
-            (Mischief::Garbage, lost, silence),
-            (Mischief::Truncated, lost, silence),
-            (Mischief::Flipped, lost, silence),
+            (Mischief::Silent, lost, SILENCE),
+            (Mischief::Garbage, lost, SILENCE),
+            (Mischief::Truncated, lost, SILENCE),
+            (Mischief::Flipped, lost, SILENCE),
             (Mischief::Stale, stale, frozen),
-            (Mischief::Unplugged, lost, timeout),
+            (Mischief::Unplugged, lost, TIMEOUT),
         ] {
             println!("{mischief:?}");
             self.ends_at_zero(
@@ -232,8 +235,20 @@ impl Case {
         }
     }
 
+    /// A reset, and a fault of the drive's own, of which the log has these words. A reset takes that fault along.
+    pub fn resets_and_reports(&self, emulator: &Emulator, code: u32, words: &str) {
+        let mut bench = self.servo(emulator);
+        let reset = [Fault::DriveRestarted, Fault::DriveLost];
+        self.ends_at_zero(&mut bench, emulator, &reset, SILENCE, || emulator.restart(), || ());
+        let fault = [Fault::AmplifierFault];
+        let report = || emulator.report(code);
+        self.ends_at_zero(&mut bench, emulator, &fault, SILENCE, report, || emulator.report(0));
+        assert!(bench.site.log().contains(words), "{}", bench.site.log());
+        self.ends_at_zero(&mut bench, emulator, &fault, SILENCE, report, || emulator.restart());
+    }
+
     /// A servo that is killed or stands still: the drive's own time-out ends it.
-    pub fn outlives_its_servo(&self, emulator: &Emulator, timeout: Duration) {
+    pub fn outlives_its_servo(&self, emulator: &Emulator) {
         for signal in ["STOP", "KILL"] {
             let mut bench = self.servo(emulator);
             self.turn(&mut bench, emulator);
@@ -242,7 +257,7 @@ impl Case {
             wait("zero at the motor", || (emulator.truth().command == 0.0).then_some(()));
             let took = emulator.driven().expect("it drove").saturating_duration_since(began);
             println!("{} SIG{signal}: zero at the motor after {} ms", self.kind, took.as_millis());
-            assert!(took <= timeout + SLACK, "SIG{signal}: {took:?} beyond {timeout:?}");
+            assert!(took <= TIMEOUT + SLACK, "SIG{signal}: {took:?} beyond {TIMEOUT:?}");
             kill(bench.servo.id(), "KILL");
         }
     }

@@ -8,12 +8,7 @@ use kort_proto::faults::Fault;
 use kort_proto::messages::{Command, DriveKind};
 
 use crate::common::Stack;
-use crate::link::{Case, LIFE_MS, TIMEOUT_MS, alone, rig};
-
-/// The drive's time-out as kort sets it, and the period at which a VESC looks at it.
-const TIMEOUT: Duration = Duration::from_millis(TIMEOUT_MS + 10);
-/// `checks.frozen_s`, and an exchange.
-const FROZEN: Duration = Duration::from_millis(500 + 20);
+use crate::link::{Case, FROZEN, SILENCE, alone, rig};
 
 fn case() -> Case {
     Case { kind: "vesc", keys: "pole_pairs = 7", drive: 4.0, command: Command::default() }
@@ -25,70 +20,37 @@ fn vesc(make: Make) -> Emulator {
 
 #[test]
 fn the_service_drives_it_and_records() {
-    let _alone = alone();
-    crate::common::in_real_time(|| case().serves(&vesc(Make::default())));
+    alone(|| case().serves(&vesc(Make::default())));
 }
 
 #[test]
 fn every_fault_of_the_wire_ends_at_zero() {
-    let _alone = alone();
-    crate::common::in_real_time(|| {
-        case().endures_its_wire(
-            &vesc(Make::default()),
-            TIMEOUT,
-            &[Fault::SensorFrozen],
-            FROZEN,
-            &[Mischief::Split, Mischief::Noisy],
-        );
+    alone(|| {
+        let harmless = [Mischief::Split, Mischief::Noisy];
+        case().endures_its_wire(&vesc(Make::default()), &[Fault::SensorFrozen], FROZEN, &harmless);
     });
 }
 
 #[test]
 fn a_servo_that_dies_or_stands_still_leaves_no_torque() {
-    let _alone = alone();
-    crate::common::in_real_time(|| {
-        case().outlives_its_servo(&vesc(Make::default()), TIMEOUT);
-    });
+    alone(|| case().outlives_its_servo(&vesc(Make::default())));
 }
 
 #[test]
 fn a_drive_that_resets_or_reports_a_fault_ends_at_zero() {
-    let _alone = alone();
-    crate::common::in_real_time(|| {
-        let emulator = vesc(Make::default());
-        let mut bench = case().servo(&emulator);
-        let soon = Duration::from_millis(LIFE_MS + 30);
-        let reset = [Fault::DriveRestarted, Fault::DriveLost];
-        case().ends_at_zero(&mut bench, &emulator, &reset, soon, || emulator.restart(), || ());
-        let fault = [Fault::AmplifierFault];
-        case().ends_at_zero(
-            &mut bench,
-            &emulator,
-            &fault,
-            soon,
-            || emulator.report(4),
-            || emulator.report(0),
-        );
-        assert!(bench.site.log().contains("fault 4: absolute over-current"), "{}", bench.site.log());
+    alone(|| {
+        case().resets_and_reports(&vesc(Make::default()), 4, "fault 4: absolute over-current");
         // So quick a reset that no answer is missed shows by what the drive counts.
-        drop(bench);
         let emulator = vesc(Make { boot_s: 0.0, ..Make::default() });
         let mut bench = case().servo(&emulator);
-        case().ends_at_zero(
-            &mut bench,
-            &emulator,
-            &[Fault::DriveRestarted],
-            soon,
-            || emulator.restart(),
-            || (),
-        );
+        let reset = [Fault::DriveRestarted];
+        case().ends_at_zero(&mut bench, &emulator, &reset, SILENCE, || emulator.restart(), || ());
     });
 }
 
 #[test]
 fn it_is_not_armed_without_its_time_out() {
-    let _alone = alone();
-    crate::common::in_real_time(|| {
+    alone(|| {
         let off = Make { stored_timeout_ms: 0, read_only: true, ..Make::default() };
         case().cannot_be_armed(&vesc(off), "does not take its settings");
         let old = Make { firmware: (5, 2), ..Make::default() };
@@ -101,18 +63,16 @@ fn it_is_not_armed_without_its_time_out() {
 /// What is stored stays; what is in force until the next power-off is what was asked for.
 #[test]
 fn a_time_out_that_is_too_long_is_set_until_the_next_power_off() {
-    let _alone = alone();
-    crate::common::in_real_time(|| {
+    alone(|| {
         let make = Make { stored_timeout_ms: 5000, stored_brake_current_a: 4.0, ..Make::default() };
-        case().outlives_its_servo(&vesc(make), TIMEOUT);
+        case().outlives_its_servo(&vesc(make));
     });
 }
 
 /// Duty for a rig that is driven by volts, and the drive's own speed loop.
 #[test]
 fn volts_are_given_as_duty_and_speed_to_its_own_loop() {
-    let _alone = alone();
-    crate::common::in_real_time(|| {
+    alone(|| {
         for (name, kind, drive) in
             [("t200-vehicle", DriveKind::Voltage, 6.0), ("speed-drive", DriveKind::Speed, 30.0)]
         {
@@ -142,8 +102,7 @@ fn volts_are_given_as_duty_and_speed_to_its_own_loop() {
 /// by the drive's current limit, or it trips.
 #[test]
 fn a_reversed_encoder_stays_within_the_current_limit() {
-    let _alone = alone();
-    crate::common::in_real_time(reversed_encoder);
+    alone(reversed_encoder);
 }
 
 fn reversed_encoder() {

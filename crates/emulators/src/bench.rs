@@ -11,9 +11,10 @@ use crate::pty::Pty;
 
 /// How often the device lives.
 const STEP: Duration = Duration::from_micros(500);
-
 /// Priority of the device where the system permits, below the servo's.
 const PRIORITY: i32 = 60;
+/// The device's name in its folder.
+const PORT: &str = "port";
 /// Changes of the command that are kept.
 const COMMANDS_MAX: usize = 1_000_000;
 
@@ -101,8 +102,9 @@ impl Bench {
     pub fn start(device: impl Device + 'static) -> std::io::Result<Self> {
         let folder = tempfile::tempdir()?;
         let shared = Arc::new(Mutex::new(Shared::default()));
-        let pty = Pty::new(&folder.path().join("port"))?;
-        let (link, theirs) = (folder.path().join("port"), Arc::clone(&shared));
+        let link = folder.path().join(PORT);
+        let pty = Pty::new(&link)?;
+        let theirs = Arc::clone(&shared);
         let thread = std::thread::Builder::new()
             .name("emulator".into())
             .spawn(move || Serving { device, link, shared: theirs, last: Vec::new(), dice: 1 }.run(pty))?;
@@ -111,7 +113,7 @@ impl Bench {
 
     /// The device's name, which stays when it is plugged in again.
     pub fn port(&self) -> PathBuf {
-        self.folder.path().join("port")
+        self.folder.path().join(PORT)
     }
 
     /// Spoils the wire from now on, or mends it.

@@ -277,12 +277,7 @@ impl Device for Moteus {
     }
 
     fn truth(&self) -> Truth {
-        Truth {
-            command: self.asked(),
-            current_a: self.stand.current_a(),
-            shaft_speed_rad_s: self.stand.shaft_speed_rad_s(),
-            thrust_n: self.stand.thrust_n(),
-        }
+        self.stand.truth(self.asked())
     }
 }
 

@@ -11,7 +11,11 @@ use crate::stand::Stand;
 
 /// Time from power to the first answer, s.
 const BOOT_S: f64 = 0.3;
+/// Bit of the axis's error.
 const WATCHDOG_EXPIRED: u64 = 0x800;
+/// States of the axis.
+const IDLE: u32 = 1;
+const CLOSED_LOOP: u32 = 8;
 
 /// An emulated ODrive with a thruster on its first axis.
 pub struct ODrive {
@@ -47,7 +51,7 @@ impl ODrive {
             properties: stored(),
             read_only,
             error: 0,
-            state: 1,
+            state: IDLE,
             torque_n_m: 0.0,
             speed_turns_s: 0.0,
             fed_s: 0.0,
@@ -60,7 +64,7 @@ impl ODrive {
     }
 
     fn command(&self) -> f64 {
-        if self.state != 8 || self.error != 0 {
+        if self.state != CLOSED_LOOP || self.error != 0 {
             return 0.0;
         }
         match self.stand.kind() {
@@ -95,7 +99,8 @@ impl ODrive {
                 let value = rest.next()?.parse::<f64>().ok()?;
                 if name == "axis0.requested_state" {
                     // Closed loop is not entered with an error standing.
-                    self.state = if value == 8.0 && self.error == 0 { 8 } else { 1 };
+                    let enters = value == f64::from(CLOSED_LOOP) && self.error == 0;
+                    self.state = if enters { CLOSED_LOOP } else { IDLE };
                 } else if let Some((_, held)) = self.properties.iter_mut().find(|(held, _)| **held == name) {
                     if !self.read_only {
                         *held = value;
@@ -159,7 +164,7 @@ impl Device for ODrive {
             self.error |= WATCHDOG_EXPIRED;
         }
         if self.error != 0 {
-            self.state = 1;
+            self.state = IDLE;
         }
         self.stand.turn_to(now_s, self.command());
         Vec::new()
@@ -167,7 +172,7 @@ impl Device for ODrive {
 
     fn restart(&mut self, now_s: f64) {
         self.properties = stored();
-        (self.error, self.state, self.torque_n_m, self.speed_turns_s) = (0, 1, 0.0, 0.0);
+        (self.error, self.state, self.torque_n_m, self.speed_turns_s) = (0, IDLE, 0.0, 0.0);
         self.answers_from_s = now_s + BOOT_S;
         self.held.clear();
     }
@@ -177,11 +182,6 @@ impl Device for ODrive {
     }
 
     fn truth(&self) -> Truth {
-        Truth {
-            command: self.command(),
-            current_a: self.stand.current_a(),
-            shaft_speed_rad_s: self.stand.shaft_speed_rad_s(),
-            thrust_n: self.stand.thrust_n(),
-        }
+        self.stand.truth(self.command())
     }
 }

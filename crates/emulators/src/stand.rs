@@ -5,6 +5,8 @@ use kort_thruster::parameters::Parameters;
 use kort_thruster::plant::{Plant, Tick};
 use kort_thruster::rig::{AmplifierKind, Rig};
 
+use crate::bench::Truth;
+
 /// Step of the simulation, s.
 const STEP_S: f64 = 1e-3;
 /// Most time caught up at once; a machine that stood still longer loses it.
@@ -70,8 +72,14 @@ impl Stand {
         self.plant.truth().shaft_angle_rad
     }
 
-    /// Thrust, N.
-    pub fn thrust_n(&self) -> f64 {
-        self.plant.truth().thrust_n
+    /// What is true while the power stage is asked for this command, in the amplifier's unit.
+    pub fn truth(&self, command: f64) -> Truth {
+        let at = self.plant.truth();
+        Truth {
+            command,
+            current_a: at.current_a,
+            shaft_speed_rad_s: at.shaft_speed_rad_s,
+            thrust_n: at.thrust_n,
+        }
     }
 }

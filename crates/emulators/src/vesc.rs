@@ -257,12 +257,7 @@ impl Device for Vesc {
     }
 
     fn truth(&self) -> Truth {
-        Truth {
-            command: self.command(),
-            current_a: self.stand.current_a(),
-            shaft_speed_rad_s: self.stand.shaft_speed_rad_s(),
-            thrust_n: self.stand.thrust_n(),
-        }
+        self.stand.truth(self.command())
     }
 }
 

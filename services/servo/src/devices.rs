@@ -134,7 +134,6 @@ impl Devices {
 mod tests {
     use super::*;
     use crate::sensors::Source;
-    use kort_proto::messages::DriveKind;
 
     const MS: u64 = 1_000_000;
 
@@ -155,9 +154,6 @@ mod tests {
     }
 
     impl Drive for Telling {
-        fn kind(&self) -> DriveKind {
-            DriveKind::Current
-        }
         fn reading_life_ns(&self) -> u64 {
             20 * MS
         }

@@ -65,13 +65,19 @@ pub enum ServoError {
 /// # Errors
 /// [`ServoError`] names file, key, value and what is allowed.
 pub fn check(config: &Config, id: &str) -> Result<(), ServoError> {
+    read(config, id).map(drop)
+}
+
+/// All that the configuration says of the thruster's servo; nothing is opened yet.
+fn read(config: &Config, id: &str) -> Result<(Settings, drives::Chosen, Vec<sensors::Chosen>), ServoError> {
     let thruster = config.thruster(id)?;
     let (file, text) = config.rig_text(id, thruster)?;
     let rig = Rig::from_toml(&text).map_err(|error| ServoError::Rig { file, error })?;
-    Settings::new(config, id, thruster, &rig)?;
-    drives::choose(config, id, thruster, &rig)?;
-    sensors::choose(config, id, thruster)?;
-    Ok(())
+    Ok((
+        Settings::new(config, id, thruster, &rig)?,
+        drives::choose(config, id, thruster, &rig)?,
+        sensors::choose(config, id, thruster)?,
+    ))
 }
 
 /// Runs the servo of one thruster until SIGTERM, SIGINT or SIGHUP. With `join` another process owns the
@@ -86,12 +92,9 @@ pub fn run(
     join: bool,
     inherited: Inherited,
 ) -> Result<(), ServoError> {
+    let (settings, drive, sensors) = read(config, id)?;
     let thruster = config.thruster(id)?;
-    let (file, text) = config.rig_text(id, thruster)?;
-    let rig = Rig::from_toml(&text).map_err(|error| ServoError::Rig { file, error })?;
-    let settings = Settings::new(config, id, thruster, &rig)?;
-    let drive = drives::choose(config, id, thruster, &rig)?;
-    let sensors = sensors::choose(config, id, thruster)?;
+    let priority = thruster.servo.priority;
     let stop = Arc::new(AtomicBool::new(false));
     for signal in END_SIGNALS {
         signal_hook::flag::register(signal, Arc::clone(&stop))?;
@@ -99,8 +102,8 @@ pub fn run(
     let owner = if join { None } else { Some(own(config, deployment, &stop)?) };
     deployment.wait_for_generation(Duration::from_secs(10))?;
     let mut ports = ServoPorts::open(deployment, id)?;
-    if thruster.servo.priority > 0 {
-        for missing in realtime(thruster.servo.priority, true) {
+    if priority > 0 {
+        for missing in realtime(priority, true) {
             warn!("{missing}");
         }
     }
@@ -110,7 +113,6 @@ pub fn run(
         amplifier = thruster.amplifier,
         "servo runs, disarmed"
     );
-    let priority = thruster.servo.priority;
     let drive = drive.start(id, priority).map_err(ServoError::Device)?;
     let sensors: Result<_, _> = sensors.into_iter().map(|sensor| sensor.start(id, priority)).collect();
     let mut devices = Devices::new(drive, sensors.map_err(ServoError::Device)?, monotonic_ns());

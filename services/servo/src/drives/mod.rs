@@ -14,10 +14,10 @@ use kort_thruster::rig::{AmplifierKind, Rig};
 use crate::devices::{At, Shown};
 use crate::link::Protocol;
 
-pub use moteus::Moteus;
-pub use odrive::ODrive;
+use moteus::Moteus;
+use odrive::ODrive;
 pub use simulated::Simulated;
-pub use vesc::Vesc;
+use vesc::Vesc;
 pub use wired::Wired;
 
 /// A drive: takes commands, and tells what it measures itself.
@@ -26,16 +26,13 @@ pub use wired::Wired;
 /// allocate or panic. Dropping a drive must switch its output off, and real hardware must have a time-out of its
 /// own for a host that goes silent.
 pub trait Drive {
-    /// Unit of the drive.
-    fn kind(&self) -> DriveKind;
-
     /// How long a reading stands before silence is `drive_lost`, ns; zero: every tick has one.
     fn reading_life_ns(&self) -> u64;
 
     /// What it shows at this tick.
     fn show(&mut self, at: At) -> Shown;
 
-    /// Sets the drive, in the unit of [`Self::kind`]; `None` switches the output stage off.
+    /// Sets the drive, in the unit of the rig's amplifier; `None` switches the output stage off.
     fn drive(&mut self, now_ns: u64, drive: Option<f64>);
 }
 
@@ -43,16 +40,9 @@ pub trait Drive {
 pub enum Chosen {
     /// A model of the rig in real time.
     Simulated(Box<Simulated>),
-    /// A VESC on a serial port or USB.
-    Vesc(Vesc),
-    /// An ODrive on USB or a serial port.
-    ODrive(ODrive),
-    /// A moteus behind an fdcanusb adapter, or on its UART.
-    Moteus(Moteus),
+    /// A drive on a wire, and what is said on it.
+    OnWire(Wired, Box<dyn Protocol>),
 }
-
-/// A drive on a wire: the wire, its unit, and what is said on it.
-pub type OnWire = (Wired, DriveKind, Box<dyn Protocol>);
 
 /// Names of the drives, as `amplifier` gives them.
 pub const ALL: [&str; 4] = ["simulated", "vesc", "odrive", "moteus"];
@@ -64,9 +54,18 @@ pub const ALL: [&str; 4] = ["simulated", "vesc", "odrive", "moteus"];
 pub fn choose(config: &Config, id: &str, thruster: &Thruster, rig: &Rig) -> Result<Chosen, ConfigError> {
     match thruster.amplifier.as_str() {
         "simulated" => Ok(Chosen::Simulated(Box::new(Simulated::new(config, id, thruster, rig)?))),
-        "vesc" => Ok(Chosen::Vesc(Vesc::new(config, id, thruster, rig)?)),
-        "odrive" => Ok(Chosen::ODrive(ODrive::new(config, id, thruster, rig)?)),
-        "moteus" => Ok(Chosen::Moteus(Moteus::new(config, id, thruster, rig)?)),
+        "vesc" => {
+            let vesc = Vesc::new(config, id, thruster, rig)?;
+            Ok(Chosen::OnWire(vesc.wired.clone(), Box::new(vesc::Protocol::new(vesc))))
+        }
+        "odrive" => {
+            let odrive = ODrive::new(config, id, thruster, rig)?;
+            Ok(Chosen::OnWire(odrive.wired.clone(), Box::new(odrive::Protocol::new(odrive))))
+        }
+        "moteus" => {
+            let moteus = Moteus::new(config, id, thruster, rig)?;
+            Ok(Chosen::OnWire(moteus.wired.clone(), Box::new(moteus::Protocol::new(moteus))))
+        }
         other => Err(config.error(format!(
             "`thrusters.{id}.amplifier` = \"{other}\" is no drive\nhint: known are \"{}\"",
             ALL.join("\", \"")
@@ -74,35 +73,18 @@ pub fn choose(config: &Config, id: &str, thruster: &Thruster, rig: &Rig) -> Resu
     }
 }
 
+#[cfg(feature = "process")]
 impl Chosen {
-    /// The wire of a real drive and what is said on it; the simulated one has none, and is ready.
-    ///
-    /// # Errors
-    /// The simulated drive.
-    pub fn on_wire(self) -> Result<OnWire, Box<dyn Drive>> {
-        Ok(match self {
-            Self::Simulated(drive) => return Err(drive),
-            Self::Vesc(vesc) => (vesc.wired.clone(), vesc.kind, Box::new(vesc::Protocol::new(vesc))),
-            Self::ODrive(odrive) => {
-                (odrive.wired.clone(), odrive.kind, Box::new(odrive::Protocol::new(odrive)))
-            }
-            Self::Moteus(moteus) => {
-                (moteus.wired.clone(), moteus.kind, Box::new(moteus::Protocol::new(moteus)))
-            }
-        })
-    }
-
     /// Starts it; `priority` is the loop's.
     ///
     /// # Errors
     /// No thread or no descriptor is to be had. A device that is not there is a fault, not an error.
-    #[cfg(feature = "process")]
     pub fn start(self, id: &str, priority: i32) -> std::io::Result<Box<dyn Drive>> {
-        match self.on_wire() {
-            Ok((wired, kind, protocol)) => {
-                Ok(Box::new(crate::link::Link::start(wired.wire(id, priority), kind, protocol)?))
+        match self {
+            Self::Simulated(drive) => Ok(drive),
+            Self::OnWire(wired, protocol) => {
+                Ok(Box::new(crate::link::Link::start(wired.wire(id, priority), protocol)?))
             }
-            Err(drive) => Ok(drive),
         }
     }
 }
@@ -113,5 +95,21 @@ pub fn kind_of(rig: &Rig) -> DriveKind {
         AmplifierKind::Current => DriveKind::Current,
         AmplifierKind::Voltage => DriveKind::Voltage,
         AmplifierKind::Speed => DriveKind::Speed,
+    }
+}
+
+/// The same for a drive that takes current or speed, and no volts.
+fn current_or_speed(
+    config: &Config,
+    id: &str,
+    thruster: &Thruster,
+    rig: &Rig,
+) -> Result<DriveKind, ConfigError> {
+    match kind_of(rig) {
+        DriveKind::Voltage => Err(config.error(format!(
+            "`thrusters.{id}.amplifier` = \"{}\" takes current or speed, but the rig's amplifier is of kind voltage\nhint: amplifier.kind = \"current\" in the rig, with its current_limit_a",
+            thruster.amplifier
+        ))),
+        kind => Ok(kind),
     }
 }

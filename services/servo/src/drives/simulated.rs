@@ -116,10 +116,6 @@ impl Simulated {
 }
 
 impl Drive for Simulated {
-    fn kind(&self) -> DriveKind {
-        self.kind
-    }
-
     fn reading_life_ns(&self) -> u64 {
         0
     }

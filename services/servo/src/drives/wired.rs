@@ -162,7 +162,7 @@ impl Wired {
         )))
     }
 
-    /// The wire as its thread is told it. The thread stands just below the loop that it serves.
+    /// The wire as its thread is told it; `priority` is the loop's.
     #[cfg(feature = "process")]
     pub fn wire(self, id: &str, priority: i32) -> crate::link::Wire {
         crate::link::Wire {
@@ -171,7 +171,7 @@ impl Wired {
             baud: self.baud,
             rate_hz: self.rate_hz,
             reading_life_ns: self.reading_life_ns,
-            priority: if priority > 0 { (priority - 1).max(1) } else { 0 },
+            priority,
             is_drive: true,
         }
     }

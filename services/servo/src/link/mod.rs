@@ -6,6 +6,7 @@
 //! drive's own time-out, and from then on exchanges a command and a question at the link's rate. A command is
 //! sent once: a servo that stands still feeds nothing, and the drive's time-out takes the torque away.
 
+mod lines;
 #[cfg(feature = "process")]
 mod port;
 #[cfg(feature = "process")]
@@ -15,6 +16,7 @@ mod wire;
 
 use kort_proto::signals::Signals;
 
+pub use lines::Lines;
 #[cfg(feature = "process")]
 pub use wire::{Link, Wire};
 
@@ -25,7 +27,7 @@ pub enum Heard {
     Known(String),
     /// A whole answer with its measurements.
     Reading(Signals),
-    /// What the device says of itself changed: its fault in words, or none any more.
+    /// What the device says of itself, with each reading: its fault in words, or none.
     Fault(Option<String>),
     /// The device was reset.
     Restarted,

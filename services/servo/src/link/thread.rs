@@ -33,6 +33,8 @@ pub(super) struct Serving {
     ending: Arc<AtomicBool>,
     /// Said last, so that what lasts is said once.
     complaint: String,
+    /// The fault that the device reports of itself.
+    fault: Option<String>,
     /// The device has said something since the port was opened.
     answered: bool,
     driving: bool,
@@ -58,6 +60,7 @@ impl Serving {
             waker,
             ending,
             complaint: String::new(),
+            fault: None,
             answered: false,
             driving: false,
             guarded_ns: 0,
@@ -67,7 +70,7 @@ impl Serving {
     pub(super) fn run(mut self) {
         if self.wire.priority > 0 {
             // What is not permitted the loop's own thread has said.
-            let _ = realtime(self.wire.priority, false);
+            let _ = realtime((self.wire.priority - 1).max(1), false);
         } else {
             ordinary();
         }
@@ -86,11 +89,8 @@ impl Serving {
 
     /// The port is gone.
     fn lost(&mut self) {
-        self.answered = false;
         self.driving = false;
-        self.told.guarded = false;
-        self.told.faults = 0;
-        self.publish();
+        self.begin();
     }
 
     /// Leaves for the tick what is known. A drive whose time-out is not confirmed, now, is not one to be armed.
@@ -100,7 +100,8 @@ impl Serving {
             (true, true) => Fault::DriveUnguarded.bit(),
             (true, false) => Fault::DriveLost.bit(),
         };
-        self.told.faults = self.told.faults & Fault::AmplifierFault.bit() | why;
+        let own = if self.fault.is_some() { Fault::AmplifierFault.bit() } else { 0 };
+        self.told.faults = own | why;
         self.tell.write(self.told);
     }
 
@@ -158,9 +159,11 @@ impl Serving {
         }
     }
 
+    /// A new conversation: what was known of the device is known no more, its fault neither.
     fn begin(&mut self) {
         self.protocol.begin();
         self.answered = false;
+        self.fault = None;
         self.told.guarded = false;
         self.publish();
     }
@@ -192,7 +195,7 @@ impl Serving {
     }
 
     fn converse(&mut self, talk: impl FnOnce(&mut dyn Protocol, &mut dyn FnMut(Heard))) {
-        let Self { protocol, wire, told, answered, complaint, guarded_ns, .. } = self;
+        let Self { protocol, wire, told, answered, complaint, fault, guarded_ns, .. } = self;
         let mut restarted = false;
         talk(protocol.as_mut(), &mut |heard| match heard {
             Heard::Known(words) => {
@@ -204,11 +207,12 @@ impl Serving {
                 told.stamp_ns = monotonic_ns();
                 told.signals = signals;
             }
-            Heard::Fault(Some(words)) => {
-                warn!("{}: {words}", wire.name);
-                told.faults |= Fault::AmplifierFault.bit();
+            Heard::Fault(reported) => {
+                if let Some(words) = reported.as_ref().filter(|_| *fault != reported) {
+                    warn!("{}: {words}", wire.name);
+                }
+                *fault = reported;
             }
-            Heard::Fault(None) => told.faults &= !Fault::AmplifierFault.bit(),
             Heard::Restarted => {
                 warn!("{} was reset", wire.name);
                 told.restarts = told.restarts.wrapping_add(1);

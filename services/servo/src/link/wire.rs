@@ -8,7 +8,6 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use kort_proto::faults::Fault;
-use kort_proto::messages::DriveKind;
 use kort_proto::signals::Signals;
 use rustix::event::{EventfdFlags, eventfd};
 use triple_buffer::{Input, Output, triple_buffer};
@@ -25,7 +24,7 @@ const PATIENCE: Duration = Duration::from_secs(1);
 /// How the wire is used.
 #[derive(Clone, Debug)]
 pub struct Wire {
-    /// For the log, for example "t1's drive".
+    /// For the log, for example "drive of t1".
     pub name: String,
     /// The device.
     pub port: PathBuf,
@@ -35,7 +34,7 @@ pub struct Wire {
     pub rate_hz: f64,
     /// How long a reading stands, ns.
     pub reading_life_ns: u64,
-    /// SCHED_FIFO priority of the thread; zero leaves the scheduler alone.
+    /// SCHED_FIFO priority of the loop, just below which the thread stands; zero leaves the scheduler alone.
     pub priority: i32,
     /// It answers to commands; a mere instrument speaks by itself.
     pub is_drive: bool,
@@ -65,7 +64,6 @@ impl Told {
 
 /// The tick's end of a wire.
 pub struct Link {
-    kind: DriveKind,
     life_ns: u64,
     commands: Input<Command>,
     told: Output<Told>,
@@ -80,7 +78,7 @@ impl Link {
     ///
     /// # Errors
     /// No thread or no descriptor is to be had.
-    pub fn start(wire: Wire, kind: DriveKind, protocol: Box<dyn Protocol>) -> std::io::Result<Self> {
+    pub fn start(wire: Wire, protocol: Box<dyn Protocol>) -> std::io::Result<Self> {
         let (commands, newest) = triple_buffer(&Command { drive: None });
         // Until the thread has confirmed something else.
         let lost = if wire.is_drive { Fault::DriveLost.bit() } else { 0 };
@@ -92,7 +90,7 @@ impl Link {
             thread::Serving::new(wire, protocol, newest, tell, Arc::clone(&waker), Arc::clone(&ending));
         let thread = std::thread::Builder::new().name("device".into()).spawn(move || serving.run())?;
         let mut link =
-            Self { kind, life_ns, commands, told, seen: Told::NOTHING, waker, ending, thread: Some(thread) };
+            Self { life_ns, commands, told, seen: Told::NOTHING, waker, ending, thread: Some(thread) };
         let end = std::time::Instant::now() + PATIENCE;
         while !link.told.read().guarded && std::time::Instant::now() < end {
             std::thread::sleep(Duration::from_millis(5));
@@ -113,10 +111,6 @@ impl Link {
 }
 
 impl Drive for Link {
-    fn kind(&self) -> DriveKind {
-        self.kind
-    }
-
     fn reading_life_ns(&self) -> u64 {
         self.life_ns
     }

@@ -55,7 +55,7 @@ impl Reader {
         }
         let mut signals = Signals::UNKNOWN;
         for (channel, open) in self.iio.channels.iter().zip(&self.open) {
-            let raw = number(&open.file).inspect_err(|_| ())?;
+            let raw = number(&open.file)?;
             if let Some(signal) = SIGNALS.get(channel.place) {
                 (signal.set)(&mut signals, channel.si((raw + open.offset) * open.scale));
             }

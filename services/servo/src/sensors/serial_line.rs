@@ -10,10 +10,8 @@ use kort_proto::signals::{SIGNALS, Signals};
 use regex::Regex;
 
 use super::Channel;
-use crate::link::{Heard, Protocol};
+use crate::link::{Heard, Lines, Protocol};
 
-/// Longest line; what is longer is none.
-const LINE_MAX: usize = 1024;
 /// Lines without a reading before the reason is said: the first one after opening is often torn.
 const BAD_LINES: u32 = 3;
 
@@ -37,7 +35,7 @@ pub struct SerialLine {
 /// Listening to an instrument.
 pub struct Listening {
     instrument: SerialLine,
-    held: Vec<u8>,
+    lines: Lines,
     known: bool,
     bad: u32,
 }
@@ -45,7 +43,7 @@ pub struct Listening {
 impl Listening {
     /// Before the first line.
     pub fn new(instrument: SerialLine) -> Self {
-        Self { instrument, held: Vec::new(), known: false, bad: 0 }
+        Self { instrument, lines: Lines::default(), known: false, bad: 0 }
     }
 
     /// The reading in a line, or which column is none.
@@ -77,9 +75,7 @@ impl Listening {
 
 impl Protocol for Listening {
     fn begin(&mut self) {
-        self.held.clear();
-        self.known = false;
-        self.bad = 0;
+        *self = Self::new(self.instrument.clone());
     }
 
     fn ask(&mut self, out: &mut Vec<u8>, _: &mut dyn FnMut(Heard)) {
@@ -91,19 +87,7 @@ impl Protocol for Listening {
     }
 
     fn hear(&mut self, bytes: &[u8], heard: &mut dyn FnMut(Heard)) {
-        for byte in bytes {
-            if !matches!(byte, b'\n' | b'\r') {
-                self.held.push(*byte);
-                if self.held.len() > LINE_MAX {
-                    self.held.clear();
-                }
-                continue;
-            }
-            let line = std::mem::take(&mut self.held);
-            let line = String::from_utf8_lossy(&line);
-            if line.trim().is_empty() {
-                continue;
-            }
+        for line in self.lines.take(bytes) {
             match self.read(&line) {
                 Ok(signals) => {
                     self.bad = 0;
@@ -184,7 +168,6 @@ mod tests {
             for value in thrusts(&mut listening, &[&bytes]) {
                 prop_assert!(value.is_finite());
             }
-            prop_assert!(listening.held.len() <= LINE_MAX);
         }
     }
 }

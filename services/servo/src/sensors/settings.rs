@@ -15,21 +15,19 @@ use super::{Channel, place};
 
 /// Names of the kinds, as `kind` gives them.
 const KINDS: [&str; 2] = ["serial_line", "iio"];
+/// Bits a second of a serial line whose section does not say.
+const BAUD: u32 = 9600;
 
 /// A section as written.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Keys {
     kind: String,
-    #[serde(default)]
-    port: PathBuf,
-    #[serde(default = "baud")]
-    baud: u32,
+    port: Option<PathBuf>,
+    baud: Option<u32>,
     pattern: Option<String>,
-    #[serde(default)]
-    ask: String,
-    #[serde(default)]
-    path: PathBuf,
+    ask: Option<String>,
+    path: Option<PathBuf>,
     #[serde(default = "rate_hz")]
     rate_hz: f64,
     #[serde(default = "life_ms")]
@@ -39,9 +37,6 @@ struct Keys {
     signals: BTreeMap<String, SignalKeys>,
 }
 
-fn baud() -> u32 {
-    9600
-}
 fn rate_hz() -> f64 {
     50.0
 }
@@ -149,15 +144,22 @@ fn read(name: &str, keys: &Keys) -> Result<Chosen, String> {
     Ok(Chosen { name: name.to_owned(), kind, gives, life_ns, required: keys.required })
 }
 
-fn serial_line(keys: &Keys) -> Result<SerialLine, String> {
-    if keys.port.as_os_str().is_empty() {
-        return Err("port` is missing\nhint: the instrument's device, for example /dev/ttyUSB0".into());
+/// Refuses a key that this kind of source does not read: it would be left unheard.
+fn not_read<T>(key: &str, given: Option<&T>, kind: &str) -> Result<(), String> {
+    match given {
+        None => Ok(()),
+        Some(_) => Err(format!("{key}` is not read where kind = \"{kind}\"\nhint: leave the key out")),
     }
-    if !(300..=12_000_000).contains(&keys.baud) {
-        return Err(format!(
-            "baud` = {} is outside 300 to 12000000\nhint: see the instrument's manual",
-            keys.baud
-        ));
+}
+
+fn serial_line(keys: &Keys) -> Result<SerialLine, String> {
+    not_read("path", keys.path.as_ref(), "serial_line")?;
+    let port = keys.port.clone().filter(|port| !port.as_os_str().is_empty());
+    let port =
+        port.ok_or("port` is missing\nhint: the instrument's device, for example /dev/ttyUSB0".to_owned())?;
+    let baud = keys.baud.unwrap_or(BAUD);
+    if !(300..=12_000_000).contains(&baud) {
+        return Err(format!("baud` = {baud} is outside 300 to 12000000\nhint: see the instrument's manual"));
     }
     let pattern = keys.pattern.as_deref().map(Regex::new).transpose().map_err(|e| {
         format!("pattern` is no regular expression: {e}\nhint: (…) around each number, for example 'F=([-+.0-9]+)'")
@@ -167,6 +169,7 @@ fn serial_line(keys: &Keys) -> Result<SerialLine, String> {
     let mut channels = Vec::new();
     for (signal, given) in &keys.signals {
         let key = format!("signals.{signal}");
+        not_read(&format!("{key}.channel"), given.channel.as_ref(), "serial_line")?;
         let from =
             given.column.ok_or_else(|| format!("{key}.column` is missing\nhint: the first column is 1"))?;
         if !(1..=columns).contains(&from) {
@@ -179,28 +182,32 @@ fn serial_line(keys: &Keys) -> Result<SerialLine, String> {
         })?;
         channels.push(channel(signal, &key, from, unit, given)?);
     }
-    Ok(SerialLine {
-        port: keys.port.clone(),
-        baud: keys.baud,
-        pattern,
-        ask: keys.ask.clone(),
-        rate_hz: keys.rate_hz,
-        channels,
-    })
+    let ask = keys.ask.clone().unwrap_or_default();
+    Ok(SerialLine { port, baud, pattern, ask, rate_hz: keys.rate_hz, channels })
 }
 
 fn iio(keys: &Keys) -> Result<Iio, String> {
-    if keys.path.as_os_str().is_empty() {
-        return Err("path` is missing\nhint: for example /sys/bus/iio/devices/iio:device0".into());
-    }
+    not_read("port", keys.port.as_ref(), "iio")?;
+    not_read("baud", keys.baud.as_ref(), "iio")?;
+    not_read("pattern", keys.pattern.as_ref(), "iio")?;
+    not_read("ask", keys.ask.as_ref(), "iio")?;
+    let path = keys.path.clone().filter(|path| !path.as_os_str().is_empty());
+    let path =
+        path.ok_or("path` is missing\nhint: for example /sys/bus/iio/devices/iio:device0".to_owned())?;
     let mut channels = Vec::new();
     for (signal, given) in &keys.signals {
         let key = format!("signals.{signal}");
-        let from = given.channel.clone().filter(|c| !c.is_empty() && !c.contains("..")).ok_or_else(|| {
+        not_read(&format!("{key}.column"), given.column.as_ref(), "iio")?;
+        let from = given.channel.clone().filter(|c| !c.is_empty()).ok_or_else(|| {
             format!(
                 "{key}.channel` is missing\nhint: in_voltage0 for in_voltage0_raw, count0/count for a counter"
             )
         })?;
+        if from.contains("..") {
+            return Err(format!(
+                "{key}.channel` = \"{from}\" leaves the device's folder\nhint: give the folder as `path`"
+            ));
+        }
         if given.scale.is_none() {
             return Err(format!(
                 "{key}.scale` is missing; it is never guessed\nhint: how many SI units a millivolt, a milliampere or a count is"
@@ -209,7 +216,7 @@ fn iio(keys: &Keys) -> Result<Iio, String> {
         let si = place(signal).and_then(|p| SIGNALS.get(p)).map_or("", |s| s.unit);
         channels.push(channel(signal, &key, from, given.unit.as_deref().unwrap_or(si), given)?);
     }
-    Ok(Iio { path: keys.path.clone(), rate_hz: keys.rate_hz, channels })
+    Ok(Iio { path, rate_hz: keys.rate_hz, channels })
 }
 
 fn channel<F>(
@@ -255,11 +262,11 @@ impl Chosen {
                     baud: line.baud,
                     rate_hz: line.rate_hz,
                     reading_life_ns: self.life_ns,
-                    priority: if priority > 0 { (priority - 1).max(1) } else { 0 },
+                    priority,
                     is_drive: false,
                 };
                 let listening = super::serial_line::Listening::new(line);
-                Box::new(Link::start(wire, kort_proto::messages::DriveKind::Current, Box::new(listening))?)
+                Box::new(Link::start(wire, Box::new(listening))?)
             }
             Kind::Iio(iio) => Box::new(super::polled::Polled::start(name, super::iio::Reader::new(iio))?),
         };
@@ -270,5 +277,77 @@ impl Chosen {
             required: self.required,
             read_ns: 0,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn chosen(sensor: &str) -> Result<Vec<Chosen>, String> {
+        let text = format!(
+            "[thrusters.t1]\nrig = \"r\"\namplifier = \"simulated\"\n[thrusters.t1.sensors.own]\n{sensor}\n"
+        );
+        let config = Config::parse(&text, None).unwrap();
+        choose(&config, "t1", config.thruster("t1").unwrap()).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn a_source_is_read_with_what_it_leaves_out() {
+        let line = "kind = \"serial_line\"\nport = \"/dev/ttyUSB0\"\nsignals = { thrust_n = { column = 2, unit = \"kgf\", scale = -1.0 } }";
+        let Kind::SerialLine(line) = &chosen(line).unwrap()[0].kind else { panic!("no serial line") };
+        assert_eq!((line.baud, line.ask.as_str(), line.channels[0].from), (BAUD, "", 2));
+        assert!((line.channels[0].scale + 9.806_65).abs() < 1e-12);
+    }
+
+    /// What a source of this kind would not read, and what it cannot do without, is refused by name with a way out.
+    #[test]
+    fn each_bad_key_is_named_with_a_hint() {
+        let line = "kind = \"serial_line\"\nport = \"p\"\n";
+        let iio = "kind = \"iio\"\npath = \"p\"\n";
+        let column = "signals = { thrust_n = { column = 1, unit = \"N\" } }";
+        let channel = "signals = { thrust_n = { channel = \"in_voltage0\", scale = 1.0 } }";
+        for (sensor, key) in [
+            (format!("kind = \"can\"\n{column}"), "kind"),
+            (format!("kind = \"serial_line\"\n{column}"), "port"),
+            (format!("{line}baud = 5\n{column}"), "baud"),
+            (format!("{line}pattern = \"(\"\n{column}"), "pattern"),
+            (format!("{line}path = \"/sys\"\n{column}"), "path"),
+            (format!("{line}{channel}"), "signals.thrust_n.channel"),
+            (format!("{line}signals = {{ thrust_n = {{ column = 1 }} }}"), "signals.thrust_n.unit"),
+            (
+                format!("{line}signals = {{ thrust_n = {{ column = 0, unit = \"N\" }} }}"),
+                "signals.thrust_n.column",
+            ),
+            (
+                format!("{line}signals = {{ thrust_n = {{ column = 1, unit = \"rpm\" }} }}"),
+                "signals.thrust_n.unit",
+            ),
+            (
+                format!("{line}signals = {{ thrust_n = {{ column = 1, unit = \"N\", scale = 0.0 }} }}"),
+                "signals.thrust_n.scale",
+            ),
+            (format!("{line}signals = {{ wind = {{ column = 1, unit = \"N\" }} }}"), "signals.wind"),
+            (format!("{line}signals = {{}}"), "signals"),
+            (format!("{line}rate_hz = 0\n{column}"), "rate_hz"),
+            (format!("{line}reading_life_ms = 1\n{column}"), "reading_life_ms"),
+            (format!("kind = \"iio\"\n{channel}"), "path"),
+            (format!("{iio}port = \"p\"\n{channel}"), "port"),
+            (format!("{iio}baud = 9600\n{channel}"), "baud"),
+            (format!("{iio}ask = \"R\"\n{channel}"), "ask"),
+            (format!("{iio}{column}"), "signals.thrust_n.column"),
+            (
+                format!("{iio}signals = {{ thrust_n = {{ channel = \"in_voltage0\" }} }}"),
+                "signals.thrust_n.scale",
+            ),
+            (
+                format!("{iio}signals = {{ thrust_n = {{ channel = \"../x\", scale = 1.0 }} }}"),
+                "signals.thrust_n.channel",
+            ),
+        ] {
+            let words = chosen(&sensor).unwrap_err();
+            let key = format!("`thrusters.t1.sensors.own.{key}`");
+            assert!(words.contains(&key) && words.contains("\nhint: "), "{sensor}\n{words}");
+        }
     }
 }

@@ -24,7 +24,7 @@ use kort_thruster::rig::Rig;
 
 pub use protocol::Protocol;
 
-use super::{Wired, kind_of};
+use super::{Wired, current_or_speed};
 
 /// A moteus as the configuration describes it.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,12 +47,7 @@ impl Moteus {
     pub fn new(config: &Config, id: &str, thruster: &Thruster, rig: &Rig) -> Result<Self, ConfigError> {
         let wired =
             Wired::new(config, id, thruster)?.without_pole_pairs(config, id)?.without_identity(config, id)?;
-        let kind = kind_of(rig);
-        if !matches!(kind, DriveKind::Current | DriveKind::Speed) {
-            return Err(config.error(format!(
-                "`thrusters.{id}.amplifier` = \"moteus\" takes current or speed, but the rig's amplifier is of kind voltage\nhint: amplifier.kind = \"current\" in the rig, with its current_limit_a"
-            )));
-        }
+        let kind = current_or_speed(config, id, thruster, rig)?;
         let address = wired.address.unwrap_or(1);
         if !(1..=126).contains(&address) {
             return Err(config.error(format!(

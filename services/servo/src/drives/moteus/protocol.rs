@@ -6,8 +6,8 @@ use kort_proto::messages::DriveKind;
 use kort_proto::signals::Signals;
 
 use super::Moteus;
-use super::text::{Lines, send};
-use crate::link::{self, Heard};
+use super::text::{receive, send};
+use crate::link::{self, Heard, Lines};
 
 // Parts of a frame; the two lowest bits of writes, reads and answers count the registers, zero: the next byte does.
 const WRITE_INT8: u8 = 0x00;
@@ -62,6 +62,8 @@ enum Stage {
 pub struct Protocol {
     moteus: Moteus,
     lines: Lines,
+    /// The far end uses check sums.
+    checked: bool,
     stage: Stage,
     asked: u32,
     known: bool,
@@ -72,7 +74,6 @@ pub struct Protocol {
     milliseconds: Option<i32>,
     on: bool,
     exchanges_on: u32,
-    fault: String,
 }
 
 impl Protocol {
@@ -81,6 +82,7 @@ impl Protocol {
         Self {
             moteus,
             lines: Lines::default(),
+            checked: false,
             stage: Stage::Asking,
             asked: 0,
             known: false,
@@ -90,13 +92,12 @@ impl Protocol {
             milliseconds: None,
             on: false,
             exchanges_on: 0,
-            fault: String::new(),
         }
     }
 
     fn send(&self, data: &[u8], answer: bool, out: &mut Vec<u8>) {
         let id = u16::from(self.moteus.address) | if answer { 0x8000 } else { 0 };
-        send(id, data, self.lines.checked, out);
+        send(id, data, self.checked, out);
     }
 
     /// A line to the diagnostic channel.
@@ -207,19 +208,18 @@ impl Protocol {
         }
         let mode = kept[MODE];
         self.exchanges_on = if self.on { self.exchanges_on.saturating_add(1) } else { 0 };
-        let fault = if mode == IN_FAULT {
-            format!("it reports fault {}\nhint: the moteus register reference, 0x00f, names it", kept[FAULT])
+        heard(Heard::Fault(if mode == IN_FAULT {
+            Some(format!(
+                "it reports fault {}\nhint: the moteus register reference, 0x00f, names it",
+                kept[FAULT]
+            ))
         } else if self.on && (mode == TIMED_OUT || self.exchanges_on > ENTERING && mode != IN_POSITION) {
-            format!(
+            Some(format!(
                 "it is in mode {mode}, not in position mode\nhint: has it been calibrated with moteus_tool?"
-            )
+            ))
         } else {
-            String::new()
-        };
-        if self.fault != fault {
-            heard(Heard::Fault(Some(fault.clone()).filter(|fault| !fault.is_empty())));
-            self.fault = fault;
-        }
+            None
+        }));
         let sign = self.moteus.wired.sign();
         heard(Heard::Reading(Signals {
             current_a: sign * kept[Q_CURRENT],
@@ -233,17 +233,7 @@ impl Protocol {
 
 impl link::Protocol for Protocol {
     fn begin(&mut self) {
-        self.lines.clear();
-        self.stage = Stage::Asking;
-        self.asked = 0;
-        self.known = false;
-        self.set = false;
-        self.said.clear();
-        self.due = 0;
-        self.milliseconds = None;
-        self.on = false;
-        self.exchanges_on = 0;
-        self.fault.clear();
+        *self = Self::new(self.moteus.clone());
     }
 
     fn ask(&mut self, out: &mut Vec<u8>, heard: &mut dyn FnMut(Heard)) {
@@ -289,9 +279,10 @@ impl link::Protocol for Protocol {
 
     fn hear(&mut self, bytes: &[u8], heard: &mut dyn FnMut(Heard)) {
         let answer = u32::from(self.moteus.address) << 8;
-        for (id, data) in self.lines.take(bytes) {
-            if id == answer {
-                self.frame(&data, heard);
+        for line in self.lines.take(bytes) {
+            match receive(&line, &mut self.checked) {
+                Some((id, data)) if id == answer => self.frame(&data, heard),
+                _ => (),
             }
         }
     }

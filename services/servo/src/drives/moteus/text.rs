@@ -6,8 +6,6 @@ use crc::{Algorithm, Crc};
 const CRC8: Algorithm<u8> =
     Algorithm { width: 8, poly: 0x97, init: 0, refin: false, refout: false, xorout: 0, check: 0, residue: 0 };
 const CRC: Crc<u8> = Crc::<u8>::new(&CRC8);
-/// Longest line; what is longer is none.
-const LINE_MAX: usize = 512;
 /// Lengths of a CAN-FD frame, and what fills it up: NOP.
 const LENGTHS: [usize; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64];
 const NOP: u8 = 0x50;
@@ -23,59 +21,29 @@ pub fn send(id: u16, data: &[u8], check: bool, out: &mut Vec<u8>) {
     out.push(b'\n');
 }
 
-/// Finds the frames received in a stream of bytes, however it is split.
-#[derive(Clone, Debug, Default)]
-pub struct Lines {
-    held: Vec<u8>,
-    /// The far end uses check sums: from the first one on, a line without is none.
-    pub checked: bool,
-}
-
-impl Lines {
-    /// Forgets everything.
-    pub fn clear(&mut self) {
-        *self = Self::default();
-    }
-
-    /// Takes bytes; identifier and data of the frames whose lines end in them.
-    pub fn take(&mut self, bytes: &[u8]) -> Vec<(u32, Vec<u8>)> {
-        let mut found = Vec::new();
-        for byte in bytes {
-            match byte {
-                b'\n' | b'\r' => {
-                    let line = std::mem::take(&mut self.held);
-                    found.extend(self.frame(&line));
-                }
-                byte if self.held.len() < LINE_MAX => self.held.push(*byte),
-                _ => self.held.clear(),
-            }
+/// The frame in a received line: identifier and data. `checked` says that the far end uses check sums, and is set by the
+/// first one: from then on a line without is none.
+pub fn receive(line: &str, checked: &mut bool) -> Option<(u32, Vec<u8>)> {
+    let words = match line.trim_end().rsplit_once('*') {
+        Some((words, sum)) => {
+            (u8::from_str_radix(sum, 16) == Ok(CRC.checksum(words.as_bytes()))).then_some(())?;
+            *checked = true;
+            words
         }
-        found
+        None if *checked => return None,
+        None => line,
+    };
+    let mut words = words.split_whitespace();
+    let (Some("rcv"), Some(id), Some(hex)) = (words.next(), words.next(), words.next()) else {
+        return None;
+    };
+    let digits = hex.as_bytes();
+    if !digits.len().is_multiple_of(2) {
+        return None;
     }
-
-    fn frame(&mut self, line: &[u8]) -> Option<(u32, Vec<u8>)> {
-        let line = std::str::from_utf8(line).ok()?.trim_end();
-        let words = match line.rsplit_once('*') {
-            Some((words, sum)) => {
-                (u8::from_str_radix(sum, 16) == Ok(CRC.checksum(words.as_bytes()))).then_some(())?;
-                self.checked = true;
-                words
-            }
-            None if self.checked => return None,
-            None => line,
-        };
-        let mut words = words.split_whitespace();
-        let (Some("rcv"), Some(id), Some(hex)) = (words.next(), words.next(), words.next()) else {
-            return None;
-        };
-        let digits = hex.as_bytes();
-        if !digits.len().is_multiple_of(2) {
-            return None;
-        }
-        let byte = |pair: &[u8]| u8::from_str_radix(std::str::from_utf8(pair).ok()?, 16).ok();
-        let data: Option<Vec<u8>> = digits.chunks(2).map(byte).collect();
-        Some((u32::from_str_radix(id, 16).ok()?, data?))
-    }
+    let byte = |pair: &[u8]| u8::from_str_radix(std::str::from_utf8(pair).ok()?, 16).ok();
+    let data: Option<Vec<u8>> = digits.chunks(2).map(byte).collect();
+    Some((u32::from_str_radix(id, 16).ok()?, data?))
 }
 
 #[cfg(test)]
@@ -91,32 +59,34 @@ mod tests {
             [0x01, 0x00, 0x0a, 0x07, 0x20, 0x60, 0x00, 0x20, 0x01, 0x50, 0xff, 0x14, 0x04, 0x00, 0x13, 0x0d];
         send(0x8001, &data, false, &mut out);
         assert_eq!(String::from_utf8(out).unwrap(), "can send 8001 01000a07206000200150ff140400130d\n");
-        let read = Lines::default().take(b"OK\nrcv 100 2404000a005000000170ff230d181400\n");
-        assert_eq!(read.len(), 1);
-        assert_eq!((read[0].0, read[0].1.len()), (0x100, 16));
+        assert_eq!(receive("OK", &mut false), None);
+        let (id, data) = receive("rcv 100 2404000a005000000170ff230d181400", &mut false).unwrap();
+        assert_eq!((id, data.len()), (0x100, 16));
         assert_eq!([CRC.checksum(&[1]), CRC.checksum(&[2]), CRC.checksum(&[0x0f])], [0x97, 0xb9, 0x96]);
     }
 
     proptest! {
+        /// A frame comes back, with a check sum and without; once there was one, a line without it or with a wrong one is none.
         #[test]
-        fn frames_survive_splitting(datas in prop::collection::vec(prop::collection::vec(any::<u8>(), 1..64), 1..5), chunk in 1usize..40, checked: bool) {
-            let mut bytes = Vec::new();
-            for data in &datas {
-                let hex: String = data.iter().map(|byte| format!("{byte:02x}")).collect();
-                let line = format!("rcv 100 {hex} ");
-                let sum = if checked { format!("*{:02X}", CRC.checksum(line.as_bytes())) } else { String::new() };
-                bytes.extend(format!("OK\r\n{line}{sum}\r\n").bytes());
-            }
-            let mut lines = Lines::default();
-            let found: Vec<Vec<u8>> = bytes.chunks(chunk).flat_map(|b| lines.take(b)).map(|(_, data)| data).collect();
-            prop_assert_eq!(found, datas);
+        fn frames_come_back(data in prop::collection::vec(any::<u8>(), 1..64), at in any::<prop::sample::Index>()) {
+            let hex: String = data.iter().map(|byte| format!("{byte:02x}")).collect();
+            let plain = format!("rcv 100 {hex} ");
+            let with_sum = format!("{plain}*{:02X}", CRC.checksum(plain.as_bytes()));
+            let mut checked = false;
+            prop_assert_eq!(receive(&plain, &mut checked), Some((0x100, data.clone())));
+            prop_assert!(!checked);
+            prop_assert_eq!(receive(&with_sum, &mut checked), Some((0x100, data)));
+            prop_assert!(checked);
+            prop_assert_eq!(receive(&plain, &mut checked), None);
+            let at = at.index(plain.len());
+            let mut changed = with_sum.into_bytes();
+            changed[at] ^= 1;
+            prop_assert_eq!(receive(&String::from_utf8_lossy(&changed), &mut checked), None);
         }
 
         #[test]
-        fn any_bytes_are_endured(bytes in prop::collection::vec(any::<u8>(), 0..2000)) {
-            let mut lines = Lines::default();
-            lines.take(&bytes);
-            prop_assert!(lines.held.len() <= LINE_MAX);
+        fn any_line_is_endured(line in any::<String>(), checked: bool) {
+            receive(&line, &mut { checked });
         }
     }
 }

@@ -24,7 +24,7 @@ use kort_thruster::rig::Rig;
 
 pub use protocol::Protocol;
 
-use super::{Wired, kind_of};
+use super::{Wired, current_or_speed};
 
 /// An ODrive as the configuration describes it.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,12 +45,7 @@ impl ODrive {
             .without_pole_pairs(config, id)?
             .without_address(config, id)?
             .without_identity(config, id)?;
-        let kind = kind_of(rig);
-        if !matches!(kind, DriveKind::Current | DriveKind::Speed) {
-            return Err(config.error(format!(
-                "`thrusters.{id}.amplifier` = \"odrive\" takes current or speed, but the rig's amplifier is of kind voltage\nhint: amplifier.kind = \"current\" in the rig, with its current_limit_a"
-            )));
-        }
+        let kind = current_or_speed(config, id, thruster, rig)?;
         Ok(Self { wired, kind })
     }
 }

@@ -6,8 +6,8 @@ use kort_proto::messages::DriveKind;
 use kort_proto::signals::Signals;
 
 use super::ODrive;
-use super::text::{Lines, line};
-use crate::link::{self, Heard};
+use super::text::{line, words};
+use crate::link::{self, Heard, Lines};
 
 /// Error bit of the axis that every silence leaves.
 const WATCHDOG_EXPIRED: u64 = 1 << 11;
@@ -63,7 +63,6 @@ pub struct Protocol {
     due: u32,
     on: bool,
     exchanges_on: u32,
-    fault: String,
 }
 
 impl Protocol {
@@ -83,7 +82,6 @@ impl Protocol {
             due: 0,
             on: false,
             exchanges_on: 0,
-            fault: String::new(),
         }
     }
 
@@ -168,22 +166,18 @@ impl Protocol {
             return heard(Heard::Restarted);
         }
         self.exchanges_on = if self.on { self.exchanges_on.saturating_add(1) } else { 0 };
-        let fault = if error != 0.0 {
-            format!(
+        heard(Heard::Fault(if error != 0.0 {
+            Some(format!(
                 "it reports axis error {:#x}\nhint: odrivetool: dump_errors(odrv0), then odrv0.clear_errors()",
                 error as u64
-            )
+            ))
         } else if self.exchanges_on > ENTERING && state != CLOSED_LOOP {
-            format!(
+            Some(format!(
                 "its axis is in state {state}, not in closed loop control\nhint: calibrate it in odrivetool"
-            )
+            ))
         } else {
-            String::new()
-        };
-        if self.fault != fault {
-            heard(Heard::Fault(Some(fault.clone()).filter(|fault| !fault.is_empty())));
-            self.fault = fault;
-        }
+            None
+        }));
         let sign = self.odrive.wired.sign();
         heard(Heard::Reading(Signals {
             current_a: sign * iq_a,
@@ -204,18 +198,7 @@ fn ask_for(properties: &[&str], out: &mut Vec<u8>) {
 
 impl link::Protocol for Protocol {
     fn begin(&mut self) {
-        self.lines.clear();
-        self.stage = Stage::Settings;
-        self.asked = 0;
-        self.known = false;
-        self.set = false;
-        self.clear = false;
-        self.moving = None;
-        self.numbers.clear();
-        self.due = 0;
-        self.on = false;
-        self.exchanges_on = 0;
-        self.fault.clear();
+        *self = Self::new(self.odrive.clone());
     }
 
     fn ask(&mut self, out: &mut Vec<u8>, heard: &mut dyn FnMut(Heard)) {
@@ -264,8 +247,9 @@ impl link::Protocol for Protocol {
     }
 
     fn hear(&mut self, bytes: &[u8], heard: &mut dyn FnMut(Heard)) {
-        for words in self.lines.take(bytes) {
-            self.line(&words, heard);
+        for line in self.lines.take(bytes) {
+            // A line whose check sum is wrong counts as one without numbers: there was one.
+            self.line(words(&line).unwrap_or_default(), heard);
         }
     }
 }

@@ -1,57 +1,19 @@
-//! Lines of the ODrive's ASCII protocol: `words*check`, the check being the exclusive or of all characters before the
+//! Check sums of the ODrive's ASCII protocol: `words*check`, the check being the exclusive or of all characters before the
 //! asterisk, in decimal.
 
-/// Longest answer; what is longer is none.
-const LINE_MAX: usize = 256;
-
-fn check(words: &[u8]) -> u8 {
-    words.iter().fold(0, |sum, byte| sum ^ byte)
+fn check(words: &str) -> u8 {
+    words.bytes().fold(0, |sum, byte| sum ^ byte)
 }
 
 /// Appends a line with its check sum.
 pub fn line(words: &str, out: &mut Vec<u8>) {
-    out.extend_from_slice(words.as_bytes());
-    out.extend_from_slice(format!("*{}\n", check(words.as_bytes())).as_bytes());
+    out.extend_from_slice(format!("{words}*{}\n", check(words)).as_bytes());
 }
 
-/// Finds the sound lines in a stream of bytes, however it is split.
-#[derive(Clone, Debug, Default)]
-pub struct Lines {
-    held: Vec<u8>,
-}
-
-impl Lines {
-    /// Forgets what is held.
-    pub fn clear(&mut self) {
-        self.held.clear();
-    }
-
-    /// Takes bytes; the words of the lines that end in them. A line whose check sum is wrong or missing is an empty one,
-    /// so that it is known that there was one.
-    pub fn take(&mut self, bytes: &[u8]) -> Vec<String> {
-        let mut found = Vec::new();
-        for byte in bytes {
-            match byte {
-                b'\r' => (),
-                b'\n' => {
-                    let line = std::mem::take(&mut self.held);
-                    if !line.is_empty() {
-                        found.push(words(&line).unwrap_or_default());
-                    }
-                }
-                byte if self.held.len() < LINE_MAX => self.held.push(*byte),
-                _ => self.held.clear(),
-            }
-        }
-        found
-    }
-}
-
-fn words(line: &[u8]) -> Option<String> {
-    let at = line.iter().rposition(|byte| *byte == b'*')?;
-    let (words, sum) = (line.get(..at)?, line.get(at + 1..)?);
-    let sum: u8 = std::str::from_utf8(sum).ok()?.trim().parse().ok()?;
-    (sum == check(words)).then(|| String::from_utf8_lossy(words).trim().to_owned())
+/// The words of a line whose check sum is right.
+pub fn words(line: &str) -> Option<&str> {
+    let (words, sum) = line.rsplit_once('*')?;
+    (sum.trim().parse() == Ok(check(words))).then(|| words.trim())
 }
 
 #[cfg(test)]
@@ -69,21 +31,15 @@ mod tests {
 
     proptest! {
         #[test]
-        fn lines_survive_splitting(texts in prop::collection::vec("[a-z0-9 .-]{1,40}", 1..6), chunk in 1usize..20) {
-            let mut bytes = Vec::new();
-            texts.iter().for_each(|text| line(text, &mut bytes));
-            let mut lines = Lines::default();
-            let found: Vec<String> = bytes.chunks(chunk).flat_map(|bytes| lines.take(bytes)).collect();
-            let texts: Vec<String> = texts.iter().map(|text| text.trim().to_owned()).collect();
-            prop_assert_eq!(found, texts);
-        }
-
-        #[test]
-        fn any_bytes_are_endured(bytes in prop::collection::vec(any::<u8>(), 0..2000)) {
-            let mut lines = Lines::default();
-            for words in lines.take(&bytes) {
-                prop_assert!(words.len() <= 3 * LINE_MAX);
-            }
+        fn words_come_back_and_a_changed_one_does_not(text in "[a-z0-9.-]{1,40}", at in any::<prop::sample::Index>()) {
+            let mut out = Vec::new();
+            line(&text, &mut out);
+            let mut sent = String::from_utf8(out).unwrap();
+            prop_assert_eq!(words(&sent), Some(text.as_str()));
+            let at = at.index(text.len());
+            let other = if &text[at..=at] == "x" { "y" } else { "x" };
+            sent.replace_range(at..=at, other);
+            prop_assert_eq!(words(&sent), None);
         }
     }
 }

@@ -33,8 +33,6 @@ pub struct Deframer {
     held: Vec<u8>,
     /// Longest payload expected: a noise byte that looks like the start of a longer frame holds nothing up.
     pub longest: usize,
-    /// Bytes that belonged to no sound frame.
-    pub skipped: u64,
 }
 
 /// What stands at the beginning of the held bytes.
@@ -49,16 +47,11 @@ enum Begin {
 
 impl Default for Deframer {
     fn default() -> Self {
-        Self { held: Vec::new(), longest: PAYLOAD_MAX, skipped: 0 }
+        Self { held: Vec::new(), longest: PAYLOAD_MAX }
     }
 }
 
 impl Deframer {
-    /// Forgets what is held.
-    pub fn clear(&mut self) {
-        self.held.clear();
-    }
-
     /// Takes bytes; the payloads of the sound frames that end in them.
     pub fn take(&mut self, bytes: &[u8]) -> Vec<Vec<u8>> {
         let mut found = Vec::new();
@@ -71,10 +64,7 @@ impl Deframer {
                     at += length;
                 }
                 Begin::Unfinished => break,
-                Begin::Nothing => {
-                    self.skipped = self.skipped.wrapping_add(1);
-                    at += 1;
-                }
+                Begin::Nothing => at += 1,
             }
         }
         self.held.drain(..at.min(self.held.len()));

@@ -62,7 +62,6 @@ pub struct Protocol {
     /// Questions whose answer is due: one that was not asked for is old.
     due: u32,
     steps: Option<u32>,
-    fault: Option<u8>,
 }
 
 impl Protocol {
@@ -78,7 +77,6 @@ impl Protocol {
             settings: Vec::with_capacity(PAYLOAD_MAX),
             due: 0,
             steps: None,
-            fault: None,
         }
     }
 
@@ -169,14 +167,11 @@ impl Protocol {
         let [fault, _id, status] = *read.0 else { return };
         self.due = 0;
         if self.steps.replace(total).is_some_and(|before| before.wrapping_sub(total) as i32 > 0) {
-            self.fault = None;
             return heard(Heard::Restarted);
         }
         // A kill switch is as good as a fault: the drive takes no command.
         let fault = if fault == 0 && status & 2 != 0 { KILL_SWITCH } else { fault };
-        if self.fault.replace(fault) != Some(fault) {
-            heard(Heard::Fault((fault != 0).then(|| fault_words(fault))));
-        }
+        heard(Heard::Fault((fault != 0).then(|| fault_words(fault))));
         let (sign, pairs) = (self.vesc.wired.sign(), self.vesc.pole_pairs);
         let temperature_c = f64::from(temperature) * 0.1;
         self.supply_v = f64::from(supply) * 0.1;
@@ -193,14 +188,8 @@ impl Protocol {
 
 impl link::Protocol for Protocol {
     fn begin(&mut self) {
-        self.deframer.clear();
-        self.deframer.longest = PAYLOAD_MAX;
-        self.stage = Stage::Version;
-        self.asked = 0;
-        self.set = false;
-        self.due = 0;
-        self.steps = None;
-        self.fault = None;
+        // The supply it told last is nearer than the rig's.
+        *self = Self { supply_v: self.supply_v, ..Self::new(self.vesc.clone()) };
     }
 
     fn ask(&mut self, out: &mut Vec<u8>, heard: &mut dyn FnMut(Heard)) {
