@@ -2,10 +2,11 @@
 
 use kort_proto::config::{Config, ConfigError, Thruster};
 use kort_proto::messages::DriveKind;
-use kort_thruster::rig::{AmplifierKind, Rig};
+use kort_thruster::rig::Rig;
 use serde::Deserialize;
 
 use crate::direction::Shaft;
+use crate::drives::kind_of;
 
 /// Ticks without a needed reading that trip where every tick has one.
 const MISSING_TICKS: u32 = 3;
@@ -24,39 +25,6 @@ struct LimitKeys {
     supply_low_v: Option<f64>,
     supply_high_v: Option<f64>,
     temperature_c: Option<f64>,
-}
-
-impl LimitKeys {
-    fn check(&self) -> Result<(), (&'static str, f64)> {
-        first_odd([
-            ("limits.current_a", self.current_a),
-            ("limits.trip_current_a", self.trip_current_a),
-            ("limits.continuous_current_a", self.continuous_current_a),
-            ("limits.thermal_time_constant_s", self.thermal_time_constant_s),
-            ("limits.speed_rad_s", self.speed_rad_s),
-            ("limits.trip_speed_rad_s", self.trip_speed_rad_s),
-            ("limits.full_drive_s", self.full_drive_s),
-            ("limits.supply_low_v", self.supply_low_v),
-            ("limits.supply_high_v", self.supply_high_v),
-            ("limits.temperature_c", self.temperature_c),
-        ])
-    }
-}
-
-impl CheckKeys {
-    fn check(&self) -> Result<(), (&'static str, f64)> {
-        first_odd([
-            ("checks.frozen_s", self.frozen_s),
-            ("checks.spike_rad_s", self.spike_rad_s),
-            ("checks.inflow_m_s", self.inflow_m_s),
-        ])
-    }
-}
-
-/// The first key that was given something that is not finite.
-fn first_odd<const N: usize>(keys: [(&'static str, Option<f64>); N]) -> Result<(), (&'static str, f64)> {
-    let odd = keys.into_iter().find_map(|(key, value)| Some((key, value.filter(|v| !v.is_finite())?)));
-    odd.map_or(Ok(()), Err)
 }
 
 /// Section `checks` as written.
@@ -105,6 +73,36 @@ pub struct Limits {
     pub shaft: Shaft,
 }
 
+impl Limits {
+    /// What is in force on a rig where the configuration says nothing else, by the largest drive, current and shaft
+    /// speed, in a loop of this period.
+    pub fn usual(rig: &Rig, drive_max: f64, current_a: f64, speed_rad_s: f64, period_s: f64) -> Self {
+        let kt = rig.motor.torque_constant_nm_a.value;
+        // Fastest honest change in one tick: full torque reversed on the bare inertia, tenfold,
+        // and some counts of the encoder.
+        let fastest = 2.0 * kt * current_a / rig.motor.inertia_kg_m2.value * period_s;
+        let count = rig.sensors.encoder_counts_per_rev.map_or(0.0, |n| std::f64::consts::TAU / n / period_s);
+        Self {
+            kind: kind_of(rig),
+            drive_max,
+            current_a,
+            trip_current_a: 1.25 * current_a,
+            continuous_current_a: current_a,
+            thermal_time_constant_s: 60.0,
+            speed_rad_s,
+            trip_speed_rad_s: 1.15 * speed_rad_s,
+            full_drive_s: 0.005,
+            supply_v: (f64::NEG_INFINITY, f64::INFINITY),
+            temperature_c: f64::INFINITY,
+            missing_ticks: MISSING_TICKS,
+            frozen_s: 0.5,
+            spike_rad_s: 10.0 * fastest + 4.0 * count,
+            winding: (rig.motor.winding_resistance_ohm.map_or(f64::NAN, |r| r.value), kt),
+            shaft: Shaft::of(rig, current_a, speed_rad_s, None),
+        }
+    }
+}
+
 /// Everything the pure servo needs to know.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
@@ -125,54 +123,9 @@ impl Settings {
         let section = |part: &str| format!("thrusters.{id}.{part}");
         let keys: LimitKeys = config.section(&section("limits"), &thruster.limits)?;
         let checks: CheckKeys = config.section(&section("checks"), &thruster.checks)?;
-        // A limit that is not a number never trips: it would be switched off without a word.
-        keys.check().and_then(|()| checks.check()).map_err(|(key, value)| {
-            config.error(format!(
-                "`thrusters.{id}.{key}` = {value}; allowed is a finite number\nhint: leave the key out for the usual value"
-            ))
-        })?;
-        let positive = |key: &str, value: f64| {
-            if value > 0.0 {
-                return Ok(value);
-            }
-            Err(config.error(format!(
-                "`thrusters.{id}.{key}` = {value} is not above zero\nhint: leave the key out for the usual value"
-            )))
-        };
-        let need = |key: &str, value: Option<f64>, instead: &str| {
-            value.filter(|v| v.is_finite()).ok_or_else(|| {
-                config.error(format!(
-                    "`thrusters.{id}.{key}` is missing\nhint: set it, or state {instead} in the rig"
-                ))
-            })
-        };
-        let period_s = thruster.servo_period_ns() as f64 * 1e-9;
-        let kt = rig.motor.torque_constant_nm_a.value;
-        let current_a = positive(
-            "limits.current_a",
-            need(
-                "limits.current_a",
-                keys.current_a.or(Some(rig.amplifier.current_limit_a)),
-                "amplifier.current_limit_a",
-            )?,
-        )?;
-        let speed_rad_s = positive("limits.speed_rad_s", keys.speed_rad_s.unwrap_or(f64::INFINITY))?;
-        let (kind, drive_max) = match rig.amplifier.kind {
-            AmplifierKind::Current => (DriveKind::Current, current_a),
-            AmplifierKind::Voltage => {
-                (DriveKind::Voltage, need("limits.supply", rig.amplifier.supply_v, "amplifier.supply_v")?)
-            }
-            AmplifierKind::Speed => {
-                (DriveKind::Speed, need("limits.speed_rad_s", Some(speed_rad_s), "no speed")?)
-            }
-        };
-        // Fastest honest change in one tick: full torque reversed on the bare inertia, tenfold,
-        // and some counts of the encoder.
-        let fastest = 2.0 * kt * current_a / rig.motor.inertia_kg_m2.value * period_s;
-        let count = rig.sensors.encoder_counts_per_rev.map_or(0.0, |n| std::f64::consts::TAU / n / period_s);
         let rig_current_a = Some(rig.amplifier.current_limit_a).filter(|a| a.is_finite()).unwrap_or(10_000.0);
         let rig_supply_v = rig.amplifier.supply_v.filter(|v| v.is_finite()).unwrap_or(10_000.0);
-        // Beyond what rig and physics know a limit protects nothing.
+        // Beyond what rig and physics know a limit protects nothing; one that is not a number never trips.
         let bounds: [(&str, Option<f64>, f64, f64, &str); 13] = [
             (
                 "limits.current_a",
@@ -237,41 +190,47 @@ impl Settings {
                 )));
             }
         }
+        let need = |key: &str, value: f64, instead: &str| {
+            Some(value)
+                .filter(|v| v.is_finite())
+                .ok_or_else(|| config.error(format!("`thrusters.{id}.{key}` is missing\nhint: {instead}")))
+        };
+        let current_a = need(
+            "limits.current_a",
+            keys.current_a.unwrap_or(rig.amplifier.current_limit_a),
+            "set it, or state amplifier.current_limit_a in the rig",
+        )?;
+        let speed_rad_s = keys.speed_rad_s.unwrap_or(f64::INFINITY);
+        let drive_max = match kind_of(rig) {
+            DriveKind::Voltage => rig.amplifier.supply_v.ok_or_else(|| {
+                config.error(format!(
+                    "`thrusters.{id}.rig`: amplifier.supply_v is missing, the largest command of a voltage drive\nhint: state it in the rig"
+                ))
+            })?,
+            DriveKind::Speed => need(
+                "limits.speed_rad_s",
+                speed_rad_s,
+                "a drive commanded by speed needs its largest: what propeller and gear bear",
+            )?,
+            DriveKind::Current | DriveKind::Duty => current_a,
+        };
+        let period_s = thruster.servo_period_ns() as f64 * 1e-9;
+        let usual = Limits::usual(rig, drive_max, current_a, speed_rad_s, period_s);
         let limits = Limits {
-            kind,
-            drive_max,
-            current_a,
-            trip_current_a: positive(
-                "limits.trip_current_a",
-                keys.trip_current_a.unwrap_or(1.25 * current_a),
-            )?,
-            continuous_current_a: positive(
-                "limits.continuous_current_a",
-                keys.continuous_current_a.unwrap_or(current_a),
-            )?,
-            thermal_time_constant_s: positive(
-                "limits.thermal_time_constant_s",
-                keys.thermal_time_constant_s.unwrap_or(60.0),
-            )?,
-            speed_rad_s,
-            trip_speed_rad_s: positive(
-                "limits.trip_speed_rad_s",
-                keys.trip_speed_rad_s.unwrap_or(1.15 * speed_rad_s),
-            )?,
-            full_drive_s: positive("limits.full_drive_s", keys.full_drive_s.unwrap_or(0.005))?,
+            trip_current_a: keys.trip_current_a.unwrap_or(usual.trip_current_a),
+            continuous_current_a: keys.continuous_current_a.unwrap_or(usual.continuous_current_a),
+            thermal_time_constant_s: keys.thermal_time_constant_s.unwrap_or(usual.thermal_time_constant_s),
+            trip_speed_rad_s: keys.trip_speed_rad_s.unwrap_or(usual.trip_speed_rad_s),
+            full_drive_s: keys.full_drive_s.unwrap_or(usual.full_drive_s),
             supply_v: (
-                keys.supply_low_v.unwrap_or(f64::NEG_INFINITY),
-                keys.supply_high_v.unwrap_or(f64::INFINITY),
+                keys.supply_low_v.unwrap_or(usual.supply_v.0),
+                keys.supply_high_v.unwrap_or(usual.supply_v.1),
             ),
-            temperature_c: keys.temperature_c.unwrap_or(f64::INFINITY),
-            missing_ticks: MISSING_TICKS,
-            frozen_s: positive("checks.frozen_s", checks.frozen_s.unwrap_or(0.5))?,
-            spike_rad_s: positive(
-                "checks.spike_rad_s",
-                checks.spike_rad_s.unwrap_or(10.0 * fastest + 4.0 * count),
-            )?,
-            winding: (rig.motor.winding_resistance_ohm.map_or(f64::NAN, |r| r.value), kt),
+            temperature_c: keys.temperature_c.unwrap_or(usual.temperature_c),
+            frozen_s: checks.frozen_s.unwrap_or(usual.frozen_s),
+            spike_rad_s: checks.spike_rad_s.unwrap_or(usual.spike_rad_s),
             shaft: Shaft::of(rig, current_a, speed_rad_s, checks.inflow_m_s),
+            ..usual
         };
         if limits.trip_current_a < current_a {
             return Err(config.error(format!(

@@ -5,9 +5,8 @@
 
 use kort_control::{Controller, ControllerConfig, ModelError, Output};
 use kort_controller::tick::Tick;
-use kort_proto::messages::{Command, DriveKind, Header, Request, RequestKind, Setpoint, SetpointKind};
+use kort_proto::messages::{Command, Header, Request, RequestKind, Setpoint, SetpointKind};
 use kort_proto::signals::Signals;
-use kort_servo::direction::Shaft;
 use kort_servo::settings::{Limits, Settings};
 use kort_servo::tick::{Inputs, Servo};
 use kort_soak::{Chain, Driven};
@@ -157,36 +156,17 @@ impl ProductionChain {
 /// that races without load to be the law's problem first.
 fn settings(rig: &Rig, controller: &Controller, period_ns: u64) -> Settings {
     let model = controller.nominal();
-    let period_s = period_ns as f64 * 1e-9;
-    let current_a = model.current_limit_a;
-    let (kind, drive_max) = match rig.amplifier.kind {
-        AmplifierKind::Current => (DriveKind::Current, current_a),
-        AmplifierKind::Voltage => (DriveKind::Voltage, rig.amplifier.supply_v.unwrap_or(f64::INFINITY)),
-        AmplifierKind::Speed => (DriveKind::Speed, model.speed_max_rad_s),
-    };
-    let fastest = 2.0 * model.torque_constant_nm_a * current_a / model.inertia_kg_m2 * period_s;
     let speed_rad_s = 1.75 * model.speed_max_rad_s;
+    let drive_max = match rig.amplifier.kind {
+        AmplifierKind::Current => model.current_limit_a,
+        AmplifierKind::Voltage => rig.amplifier.supply_v.unwrap_or(f64::INFINITY),
+        AmplifierKind::Speed => model.speed_max_rad_s,
+    };
+    let period_s = period_ns as f64 * 1e-9;
     Settings {
         period_ns,
         command_timeout_ns: period_ns * 7 / 2,
-        limits: Limits {
-            kind,
-            drive_max,
-            current_a,
-            trip_current_a: 1.25 * current_a,
-            continuous_current_a: current_a,
-            thermal_time_constant_s: 60.0,
-            speed_rad_s,
-            trip_speed_rad_s: 1.15 * speed_rad_s,
-            full_drive_s: 0.005,
-            supply_v: (f64::NEG_INFINITY, f64::INFINITY),
-            temperature_c: f64::INFINITY,
-            missing_ticks: 3,
-            frozen_s: 0.5,
-            spike_rad_s: 10.0 * fastest + 4.0 * model.speed_quantum_rad_s,
-            winding: (model.winding_resistance_ohm.unwrap_or(f64::NAN), model.torque_constant_nm_a),
-            shaft: Shaft::of(rig, current_a, speed_rad_s, None),
-        },
+        limits: Limits::usual(rig, drive_max, model.current_limit_a, speed_rad_s, period_s),
     }
 }
 
