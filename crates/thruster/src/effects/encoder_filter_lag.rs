@@ -1,9 +1,12 @@
 //! The speed signal is filtered more than stated.
 
-use super::memory::{FirstOrder, History};
+use super::memory::DelayedLag;
 use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, speed_measured};
 use crate::plant::{Sensed, Tick};
 use crate::real::Real;
+
+/// Longest second delay, s.
+const LONGEST_S: f64 = 1.0;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -36,11 +39,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
             stated: decay(stated_s, tick_s),
             slower: decay(values[0] + stated_s, tick_s),
             memory: None,
-            dead_time_s: values[1] * values[2],
-            past: History::new(0.5, tick_s),
-            lag_s: values[1] * (-values[2] + 1.0),
-            tick_s,
-            lag: FirstOrder::new(),
+            delay: DelayedLag::new(values[1], values[2], LONGEST_S, tick_s),
         })
     }),
 };
@@ -48,7 +47,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 fn parameters(_: &Scale) -> Vec<Spec> {
     vec![
         Spec::strength("filter_excess_s", "s", 0.01, 0.0, 1.0).sigma(0.02),
-        Spec::strength("second_lag_s", "s", 0.01, 0.0, 1.0).sigma(0.02),
+        Spec::strength("second_lag_s", "s", 0.01, 0.0, LONGEST_S).sigma(0.02),
         Spec::shape("dead_time_share", "1", 0.0, 0.0, 0.8).prior(0.0, 0.3),
     ]
 }
@@ -64,11 +63,7 @@ struct EncoderFilterLag<T> {
     slower: T,
     /// Last output of the stated filter, and of the one in its place.
     memory: Option<(T, T)>,
-    dead_time_s: T,
-    past: History<T>,
-    lag_s: T,
-    tick_s: f64,
-    lag: FirstOrder<T>,
+    delay: DelayedLag<T>,
 }
 
 impl<T: Real> Effect<T> for EncoderFilterLag<T> {
@@ -83,7 +78,6 @@ impl<T: Real> Effect<T> for EncoderFilterLag<T> {
         let raw = (seen - before * self.stated) / (1.0 - self.stated);
         let slow = self.slower * last + (T::ONE - self.slower) * raw;
         self.memory = Some((seen, slow));
-        self.past.push(slow);
-        sensed.shaft_speed_rad_s = self.lag.step(self.past.ago(self.dead_time_s), self.lag_s, self.tick_s);
+        sensed.shaft_speed_rad_s = self.delay.step(slow);
     }
 }

@@ -1,4 +1,4 @@
-//! What effects remember from tick to tick: a past signal, a first-order lag.
+//! What effects remember from tick to tick: a past signal, a first-order lag, and both in a row.
 
 use crate::real::Real;
 
@@ -72,6 +72,34 @@ impl<T: Real> FirstOrder<T> {
     }
 }
 
+/// A delay of which a share is dead time and the rest a first-order lag.
+pub(super) struct DelayedLag<T> {
+    dead_time_s: T,
+    past: History<T>,
+    lag_s: T,
+    lag: FirstOrder<T>,
+    tick_s: f64,
+}
+
+impl<T: Real> DelayedLag<T> {
+    /// Without a past; there is room for delays up to `longest_s`.
+    pub fn new(delay_s: T, dead_share: T, longest_s: f64, tick_s: f64) -> Self {
+        Self {
+            dead_time_s: delay_s * dead_share,
+            past: History::new(longest_s, tick_s),
+            lag_s: delay_s * (-dead_share + 1.0),
+            lag: FirstOrder::new(),
+            tick_s,
+        }
+    }
+
+    /// The delayed signal at the end of a tick.
+    pub fn step(&mut self, input: T) -> T {
+        self.past.push(input);
+        self.lag.step(self.past.ago(self.dead_time_s), self.lag_s, self.tick_s)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -95,5 +123,18 @@ mod tests {
             y = lag.step(k as f64 * 0.002, 0.05, 0.002);
         }
         assert!((1999.0 * 0.002 - y - 0.05).abs() < 1e-9);
+    }
+
+    /// Whatever its share of dead time, up to the largest delay.
+    #[test]
+    fn a_ramp_leaves_a_delayed_lag_behind_by_its_delay() {
+        for (delay_s, share) in [(0.05, 0.0), (0.05, 0.4), (1.0, 0.8)] {
+            let mut delay = DelayedLag::new(delay_s, share, 1.0, 0.002);
+            let mut y = 0.0;
+            for k in 0..10_000 {
+                y = delay.step(k as f64 * 0.002);
+            }
+            assert!((9999.0 * 0.002 - y - delay_s).abs() < 1e-6, "{delay_s} s, {share}: {y}");
+        }
     }
 }

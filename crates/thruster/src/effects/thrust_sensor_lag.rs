@@ -1,9 +1,12 @@
 //! The force channel is slower than stated.
 
-use super::memory::{FirstOrder, History};
+use super::memory::DelayedLag;
 use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, thrust_measured};
 use crate::plant::{Sensed, Tick};
 use crate::real::Real;
+
+/// Longest delay, s.
+const LONGEST_S: f64 = 1.0;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -23,28 +26,20 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: |_| vec![vec![0.003, 0.0], vec![0.03, 0.0], vec![0.1, 0.0]],
     needs: thrust_measured,
-    build: both!(|values, context| Box::new(ThrustSensorLag {
-        dead_time_s: values[0] * values[1],
-        past: History::new(0.5, context.tick_s),
-        lag_s: values[0] * (-values[1] + 1.0),
-        tick_s: context.tick_s,
-        lag: FirstOrder::new()
-    })),
+    build: both!(|values, context| {
+        Box::new(ThrustSensorLag { delay: DelayedLag::new(values[0], values[1], LONGEST_S, context.tick_s) })
+    }),
 };
 
 fn parameters(_: &Scale) -> Vec<Spec> {
     vec![
-        Spec::strength("thrust_lag_s", "s", 0.01, 0.0, 1.0).sigma(0.03),
+        Spec::strength("thrust_lag_s", "s", 0.01, 0.0, LONGEST_S).sigma(0.03),
         Spec::shape("dead_time_share", "1", 0.0, 0.0, 0.8).prior(0.0, 0.3),
     ]
 }
 
 struct ThrustSensorLag<T> {
-    dead_time_s: T,
-    past: History<T>,
-    lag_s: T,
-    tick_s: f64,
-    lag: FirstOrder<T>,
+    delay: DelayedLag<T>,
 }
 
 impl<T: Real> Effect<T> for ThrustSensorLag<T> {
@@ -53,7 +48,6 @@ impl<T: Real> Effect<T> for ThrustSensorLag<T> {
     }
 
     fn sense(&mut self, _: &Tick, sensed: &mut Sensed<T>) {
-        self.past.push(sensed.thrust_n);
-        sensed.thrust_n = self.lag.step(self.past.ago(self.dead_time_s), self.lag_s, self.tick_s);
+        sensed.thrust_n = self.delay.step(sensed.thrust_n);
     }
 }
