@@ -4,6 +4,7 @@
 use kort_thruster::rig::AmplifierKind;
 
 use super::{Controller, Mode, SENT};
+use crate::known::OperatingPoint;
 use crate::limits::{Limit, LimitSet};
 use crate::mismatch::Seen;
 use crate::signals::{DriveCommand, Estimate, Measurement};
@@ -23,8 +24,12 @@ impl Controller {
         measured.current_a = measured.current_a.map(|_| current_a);
         let flow = last.map_or(0.0, |l| l.flow_m_s.value);
         measured.thrust_n = measured.thrust_n.map(|t| self.model.blade_thrust_n(t, flow));
-        let speed = last.map_or(0.0, |l| l.shaft_speed_rad_s.value);
-        if let Some(reach) = self.known.reach(raw.supply_v, actual_a, speed) {
+        let at = OperatingPoint {
+            supply_v: raw.supply_v,
+            current_a: actual_a,
+            shaft_speed_rad_s: last.map_or(0.0, |l| l.shaft_speed_rad_s.value),
+        };
+        if let Some(reach) = self.known.reach(at) {
             measured.supply_v = Some(reach.supply_v).filter(|v| v.is_finite());
         }
         self.monitor.tick(&Seen {
@@ -119,10 +124,10 @@ impl Controller {
         let model = &self.model;
         // The back-EMF is that of the speed itself, not of what its filter shows later.
         let speed = self.estimate.map_or(0.0, |e| e.shaft_speed_rad_s.value);
-        let drive_a = self.drive_a;
+        let at = OperatingPoint { supply_v, current_a: self.drive_a, shaft_speed_rad_s: speed };
         match model.amplifier {
             AmplifierKind::Current => {
-                let command = self.known.command(current_a, supply_v, drive_a, speed);
+                let command = self.known.command(current_a, at);
                 DriveCommand { current_a: command, ..DriveCommand::default() }
             }
             AmplifierKind::Voltage => {
@@ -135,12 +140,12 @@ impl Controller {
                 let voltage =
                     if current_a == 0.0 && target == 0.0 { 0.0 } else { wanted.clamp(-supply, supply) };
                 let told = supply_v.or(self.stated_supply_v).unwrap_or(f64::INFINITY);
-                let command = self.known.command(voltage, supply_v, drive_a, speed).clamp(-told, told);
+                let command = self.known.command(voltage, at).clamp(-told, told);
                 DriveCommand { current_a, voltage_v: Some(command), speed_rad_s: None }
             }
             AmplifierKind::Speed => {
                 let cap = model.speed_max_rad_s;
-                let command = self.known.command(target.clamp(-cap, cap), supply_v, drive_a, speed);
+                let command = self.known.command(target.clamp(-cap, cap), at);
                 DriveCommand { current_a, voltage_v: None, speed_rad_s: Some(command.clamp(-cap, cap)) }
             }
         }

@@ -33,6 +33,17 @@ pub struct Reach {
     pub current_a: f64,
 }
 
+/// Where the drive works now.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct OperatingPoint {
+    /// Supply, V; the rig's nominal one where none is measured.
+    pub supply_v: Option<f64>,
+    /// Motor current, A.
+    pub current_a: f64,
+    /// Shaft speed, rad/s.
+    pub shaft_speed_rad_s: f64,
+}
+
 /// The effects between command and amplifier.
 pub(super) struct DriveChain {
     effects: Vec<Box<dyn Effect>>,
@@ -72,22 +83,16 @@ impl DriveChain {
     }
 
     /// What becomes of a command.
-    pub(super) fn pass(
-        &mut self,
-        command: f64,
-        supply_v: Option<f64>,
-        current_a: f64,
-        speed_rad_s: f64,
-    ) -> Drive {
+    pub(super) fn pass(&mut self, command: f64, at: OperatingPoint) -> Drive {
         let mut drive = Drive {
             command,
             current_limit_a: self.current_limit_a,
             time_constant_s: 0.0,
-            supply_v: supply_v.or(self.nominal_supply_v).unwrap_or(f64::INFINITY),
+            supply_v: self.supply_v(at),
             resistance_ohm: self.resistance_ohm,
-            back_emf_v: self.torque_constant_nm_a * speed_rad_s,
-            shaft_speed_rad_s: speed_rad_s,
-            current_a,
+            back_emf_v: self.torque_constant_nm_a * at.shaft_speed_rad_s,
+            shaft_speed_rad_s: at.shaft_speed_rad_s,
+            current_a: at.current_a,
             voltage_limited: false,
         };
         for effect in &mut self.effects {
@@ -96,42 +101,34 @@ impl DriveChain {
         drive
     }
 
-    pub(super) fn reach(&mut self, supply_v: Option<f64>, current_a: f64, speed_rad_s: f64) -> Reach {
-        let stated = supply_v.or(self.nominal_supply_v).unwrap_or(f64::INFINITY);
+    fn supply_v(&self, at: OperatingPoint) -> f64 {
+        at.supply_v.or(self.nominal_supply_v).unwrap_or(f64::INFINITY)
+    }
+
+    pub(super) fn reach(&mut self, at: OperatingPoint) -> Reach {
+        let stated = self.supply_v(at);
         // A voltage drive gives what its largest command becomes; a current drive what its bus lets it.
         let full = if self.kind == AmplifierKind::Voltage && stated.is_finite() { stated } else { 0.0 };
-        let drive = self.pass(full, supply_v, current_a, speed_rad_s);
+        let drive = self.pass(full, at);
         let supply_v = if full > 0.0 { drive.command.abs().min(full) } else { drive.supply_v };
         Reach { supply_v, resistance_ohm: drive.resistance_ohm, current_a: drive.current_limit_a }
     }
 
     /// The command for what is wanted; the largest command where that is not enough.
-    pub(super) fn command(
-        &mut self,
-        wanted: f64,
-        supply_v: Option<f64>,
-        current_a: f64,
-        speed_rad_s: f64,
-    ) -> f64 {
+    pub(super) fn command(&mut self, wanted: f64, at: OperatingPoint) -> f64 {
         let most = self.most;
         let zero = ZERO * most;
         if wanted.abs() < zero {
             // Straight through zero, from where either side begins to give something.
-            let side = self.command_beyond(zero.copysign(wanted), supply_v, current_a, speed_rad_s);
+            let side = self.command_beyond(zero.copysign(wanted), at);
             return side * (wanted.abs() / zero);
         }
-        self.command_beyond(wanted, supply_v, current_a, speed_rad_s)
+        self.command_beyond(wanted, at)
     }
 
-    fn command_beyond(
-        &mut self,
-        wanted: f64,
-        supply_v: Option<f64>,
-        current_a: f64,
-        speed_rad_s: f64,
-    ) -> f64 {
+    fn command_beyond(&mut self, wanted: f64, at: OperatingPoint) -> f64 {
         let most = self.most;
-        let mut gives = |command: f64| self.pass(command, supply_v, current_a, speed_rad_s).command;
+        let mut gives = |command: f64| self.pass(command, at).command;
         let mut command = wanted.clamp(-most, most);
         for _ in 0..STEPS {
             let error = wanted - gives(command);
@@ -154,6 +151,8 @@ mod tests {
     use super::*;
     use crate::model::tests::STAND;
 
+    const AT_REST: OperatingPoint = OperatingPoint { supply_v: None, current_a: 0.0, shaft_speed_rad_s: 0.0 };
+
     fn chain(effects: &str) -> DriveChain {
         let rig = Rig::from_toml(&format!("{STAND}{effects}")).unwrap();
         let model = ControlModel::from_rig(&rig, 0.002).unwrap();
@@ -167,17 +166,17 @@ mod tests {
         for effects in [band.to_owned(), curve.to_owned(), format!("{band}{curve}")] {
             let mut chain = chain(&effects);
             for wanted in [-8.0, -2.0, -0.3, -0.05, 0.05, 0.5, 3.0, 7.0] {
-                let command = chain.command(wanted, None, 0.0, 0.0);
-                let gives = chain.pass(command, None, 0.0, 0.0).command;
+                let command = chain.command(wanted, AT_REST);
+                let gives = chain.pass(command, AT_REST).command;
                 assert!((gives - wanted).abs() < 1e-3, "{effects}: {wanted} by {command} gives {gives}");
             }
-            assert_eq!(chain.command(0.0, None, 0.0, 0.0), 0.0);
+            assert_eq!(chain.command(0.0, AT_REST), 0.0);
         }
     }
 
     #[test]
     fn what_is_out_of_reach_gets_all_there_is() {
         let mut chain = chain("[[effects]]\neffect = \"command_dead_band\"\nhalf_width = 2\n");
-        assert!((chain.command(8.9, None, 0.0, 0.0) - 9.0).abs() < 1e-6);
+        assert!((chain.command(8.9, AT_REST) - 9.0).abs() < 1e-6);
     }
 }

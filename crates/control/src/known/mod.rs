@@ -34,7 +34,7 @@ use crate::signals::{Estimate, Measurement};
 pub use curves::{FoilCurve, FrictionCurve};
 pub(crate) use design::design;
 use drive::DriveChain;
-pub use drive::Reach;
+pub use drive::{OperatingPoint, Reach};
 use motion::Motion;
 use sensing::Sensing;
 
@@ -127,16 +127,12 @@ impl Known {
     }
 
     /// What the drive can give now; `None` where no effect is at work on it.
-    pub fn reach(&mut self, supply_v: Option<f64>, current_a: f64, speed_rad_s: f64) -> Option<Reach> {
-        (!self.drive.is_idle()).then(|| self.drive.reach(supply_v, current_a, speed_rad_s))
+    pub fn reach(&mut self, at: OperatingPoint) -> Option<Reach> {
+        (!self.drive.is_idle()).then(|| self.drive.reach(at))
     }
 
     /// The command that the drive turns into what is wanted (A, V or rad/s, as the drive takes it).
-    pub fn command(&mut self, wanted: f64, supply_v: Option<f64>, current_a: f64, speed_rad_s: f64) -> f64 {
-        if self.drive.is_idle() {
-            wanted
-        } else {
-            self.drive.command(wanted, supply_v, current_a, speed_rad_s)
-        }
+    pub fn command(&mut self, wanted: f64, at: OperatingPoint) -> f64 {
+        if self.drive.is_idle() { wanted } else { self.drive.command(wanted, at) }
     }
 }

@@ -5,7 +5,7 @@ use kort_thruster::plant::{Sensed, Tick};
 use kort_thruster::rig::{AmplifierKind, KnownEffect, Quantity, Rig};
 
 use super::built;
-use super::drive::DriveChain;
+use super::drive::{DriveChain, OperatingPoint};
 use super::motion::{Motion, follows_angle};
 use crate::model::{ControlModel, ModelError};
 
@@ -203,13 +203,17 @@ fn driven(rig: &Rig, model: &ControlModel) -> Vec<Use> {
     if chain.is_idle() {
         return Vec::new();
     }
-    let (current, speed) = (0.6 * model.current_limit_a, 0.6 * model.speed_max_rad_s);
+    let loaded = OperatingPoint {
+        supply_v: None,
+        current_a: 0.6 * model.current_limit_a,
+        shaft_speed_rad_s: 0.6 * model.speed_max_rad_s,
+    };
     let most = model.supply_v.unwrap_or(model.current_limit_a);
-    let bends = [-0.7, -0.02, 0.02, 0.4, 0.9].iter().any(|share| {
-        (chain.pass(share * most, None, current, speed).command - share * most).abs() > 1e-9 * most
-    });
-    let idle = chain.pass(0.0, None, 0.0, 0.0).supply_v;
-    let sags = chain.pass(0.0, None, current, speed).supply_v < idle * (1.0 - 1e-9);
+    let bends = [-0.7, -0.02, 0.02, 0.4, 0.9]
+        .iter()
+        .any(|share| (chain.pass(share * most, loaded).command - share * most).abs() > 1e-9 * most);
+    let idle = chain.pass(0.0, OperatingPoint::default()).supply_v;
+    let sags = chain.pass(0.0, loaded).supply_v < idle * (1.0 - 1e-9);
     [(Use::Command, bends), (Use::Limits, sags)]
         .into_iter()
         .filter(|(_, yes)| *yes)

@@ -1,37 +1,10 @@
 //! The model against the restored paper, and its inverses against themselves.
 
+use kort_thruster::blade::Inflow;
+
 use super::*;
 
-pub(crate) const STAND: &str = r#"
-[rig]
-name = "stand"
-[propeller]
-radius_m = 0.13
-duct_length_m = 0.1271
-pitch_rad = 0.39
-lift_max = 0.542
-drag_max = 1.25
-[flow]
-density_kg_m3 = 998
-flux_coefficient = 1.86
-added_mass_coefficient = 2.0
-[motor]
-inertia_kg_m2 = 0.01
-torque_constant_nm_a = 1.25
-[amplifier]
-kind = "current"
-time_constant_s = 0.002
-current_limit_a = 9
-supply_v = 120
-[sensors]
-control_rate_hz = 500
-encoder_counts_per_rev = 4096
-speed_filter_time_constant_s = 0.010
-thrust_filter_hz = 163
-thrust_full_scale_n = 889.6
-thrust_bits = 12
-flow_rate_hz = 20
-"#;
+pub(crate) const STAND: &str = include_str!("../../tests/common/stand.toml");
 
 pub(crate) fn stand() -> ControlModel {
     ControlModel::from_rig(&Rig::from_toml(STAND).unwrap(), 0.002).unwrap()

@@ -7,34 +7,7 @@ use kort_thruster::parameters::{Parameter, Parameters};
 use kort_thruster::plant::{Plant, Tick};
 use kort_thruster::rig::{AmplifierKind, Rig};
 
-pub const STAND: &str = r#"
-[rig]
-name = "stand"
-[propeller]
-radius_m = 0.13
-duct_length_m = 0.1271
-pitch_rad = 0.39
-lift_max = 0.542
-drag_max = 1.25
-[flow]
-density_kg_m3 = 998
-flux_coefficient = 1.86
-added_mass_coefficient = 2.0
-[motor]
-inertia_kg_m2 = 0.01
-torque_constant_nm_a = 1.25
-[amplifier]
-kind = "current"
-time_constant_s = 0.002
-current_limit_a = 9
-supply_v = 120
-[sensors]
-encoder_counts_per_rev = 4096
-speed_filter_time_constant_s = 0.010
-thrust_filter_hz = 163
-thrust_full_scale_n = 889.6
-thrust_bits = 12
-"#;
+pub const STAND: &str = include_str!("stand.toml");
 
 /// A thruster of 76 mm with a fast shaft and a slow drive.
 pub const SMALL: &str = r#"
