@@ -4,7 +4,9 @@ use kort_thruster::blade::Inflow;
 
 use super::*;
 
-pub(crate) const STAND: &str = include_str!("../../tests/common/stand.toml");
+/// The suites' stand, with the rates of its control and of its flow meter.
+pub(crate) const STAND: &str =
+    concat!(include_str!("../../tests/common/stand.toml"), "control_rate_hz = 500\nflow_rate_hz = 20\n");
 
 pub(crate) fn stand() -> ControlModel {
     ControlModel::from_rig(&Rig::from_toml(STAND).unwrap(), 0.002).unwrap()
