@@ -7,11 +7,13 @@ mod excitation;
 mod measuring;
 mod place;
 mod run;
+mod segment;
 
-pub use excitation::{Excitation, NoReplays, Replayed, Replays, Segment};
+pub use excitation::{Excitation, NoReplays, Replayed, Replays};
 pub use measuring::Measuring;
 pub use place::{complaint, from_toml};
-pub use run::{Run, scale};
+pub use run::{Run, Used, scale, used_effect};
+pub use segment::Segment;
 
 use std::collections::BTreeMap;
 
@@ -172,9 +174,7 @@ pub enum ScenarioError {
         message: String,
     },
     /// A value out of range.
-    #[error(
-        "`{key}` = {found} is outside what is allowed: {allowed}\nhint: correct the value in the scenario"
-    )]
+    #[error("`{key}` = {found} is outside what is allowed: {allowed}\nhint: correct the value")]
     Value {
         /// The key.
         key: String,

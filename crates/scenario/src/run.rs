@@ -1,15 +1,20 @@
 //! A scenario at work: rows of a recording, one by one.
 
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, StandardNormal};
+mod drive_map;
+mod effects;
+mod turbulent;
 
-use super::{Command, Excitation, Measuring, Replays, Scenario, ScenarioError, Turbulence};
-use kort_thruster::effects::{self, Descriptor, Scale, Spec};
+use kort_thruster::effects::{Descriptor, Scale};
 use kort_thruster::models::ModelName;
 use kort_thruster::parameters::{Parameter, Parameters};
 use kort_thruster::plant::{Plant, Sensed, Tick};
 use kort_thruster::rig::{AmplifierKind, Rig};
+
+use crate::{Command, Excitation, Measuring, Replays, Scenario, ScenarioError};
+use drive_map::DriveMap;
+use effects::used;
+pub use effects::{Used, used_effect};
+use turbulent::Turbulent;
 
 /// Control and log rates of a rig that states none, Hz.
 const CONTROL_RATE_HZ: f64 = 500.0;
@@ -42,18 +47,6 @@ struct Signals {
     supply: Option<Excitation>,
     depth: Option<Excitation>,
     temperature: Option<Excitation>,
-}
-
-/// From a command's value to the drive's.
-struct DriveMap {
-    command: Command,
-    kind: AmplifierKind,
-    /// Drive command at share 1.
-    full: f64,
-    torque_constant_nm_a: f64,
-    resistance_ohm: f64,
-    thrust_n_s2: f64,
-    torque_nm_s2: f64,
 }
 
 impl Run {
@@ -279,170 +272,6 @@ pub fn scale(rig: &Rig, p: &Parameters, peak: f64, tick_s: f64, duration_s: f64)
         tick_s,
         duration_s,
         angle_recorded: true,
-    }
-}
-
-/// The scenario's effects with a value for every parameter.
-fn used(scenario: &Scenario, scale: &Scale) -> Result<Vec<(&'static Descriptor, Vec<f64>)>, ScenarioError> {
-    let near = |wanted: &str, names: &[&str]| {
-        let best = names
-            .iter()
-            .max_by(|a, b| strsim::jaro_winkler(wanted, a).total_cmp(&strsim::jaro_winkler(wanted, b)));
-        best.map_or("it has none".to_string(), |n| {
-            format!("did you mean `{n}`? known are {}", names.join(", "))
-        })
-    };
-    let mut all = Vec::with_capacity(scenario.effects.len());
-    for (i, wanted) in scenario.effects.iter().enumerate() {
-        let at = format!("effects[{i}]");
-        let Some(descriptor) = effects::find(&wanted.effect) else {
-            let ids: Vec<&str> = effects::ALL.iter().map(|d| d.id).collect();
-            return Err(ScenarioError::Unknown {
-                key: format!("{at}.effect"),
-                found: format!("\"{}\"", wanted.effect),
-                hint: near(&wanted.effect, &ids),
-            });
-        };
-        let specs = (descriptor.parameters)(scale);
-        if let Some(name) = wanted.parameters.keys().find(|name| !specs.iter().any(|s| s.name == *name)) {
-            let names: Vec<&str> = specs.iter().map(|s| s.name).collect();
-            let (key, found) = (format!("{at}.parameters"), format!("\"{name}\""));
-            return Err(ScenarioError::Unknown { key, found, hint: near(name, &names) });
-        }
-        let value = |spec: &Spec| {
-            let key = format!("{at}.parameters.{}", spec.name);
-            let range = format!("{} to {} {}", spec.low, spec.high, spec.unit);
-            match wanted.parameters.get(spec.name) {
-                None => {
-                    Err(ScenarioError::Missing { key, hint: format!("{range}, for example {}", spec.start) })
-                }
-                Some(v) if *v >= spec.low && *v <= spec.high => Ok(*v),
-                Some(v) => Err(ScenarioError::Value { key, found: v.to_string(), allowed: range }),
-            }
-        };
-        all.push((descriptor, specs.iter().map(value).collect::<Result<Vec<_>, _>>()?));
-    }
-    Ok(all)
-}
-
-impl DriveMap {
-    fn new(command: Command, rig: &Rig, p: &Parameters) -> Result<Self, ScenarioError> {
-        let kind = rig.amplifier.kind;
-        let fail = |why: &str, hint: &str| {
-            Err(ScenarioError::Command { command: command.name(), why: why.into(), hint: hint.into() })
-        };
-        let own = match kind {
-            AmplifierKind::Current => Command::CurrentCmdA,
-            AmplifierKind::Voltage => Command::VoltageCmdV,
-            AmplifierKind::Speed => Command::SpeedCmdRadS,
-        };
-        let (ct, cq) = if rig.propeller.is_some() { p.bollard_coefficients() } else { (0.0, 0.0) };
-        let mut map = Self {
-            command,
-            kind,
-            full: f64::NAN,
-            torque_constant_nm_a: p.get(Parameter::TorqueConstantNmA),
-            resistance_ohm: p.get(Parameter::WindingResistanceOhm),
-            thrust_n_s2: ct,
-            torque_nm_s2: cq,
-        };
-        match command {
-            Command::CurrentCmdA | Command::VoltageCmdV | Command::SpeedCmdRadS if command != own => {
-                return fail(
-                    &format!("its drive takes {}", own.name()),
-                    "command = \"share\" fits any drive",
-                );
-            }
-            Command::TorqueCmdNM if kind != AmplifierKind::Current => {
-                return fail(
-                    "a torque needs amplifier.kind = \"current\"",
-                    "command = \"share\" fits any drive",
-                );
-            }
-            Command::DutyCmd if kind != AmplifierKind::Voltage => {
-                return fail(
-                    "a duty needs amplifier.kind = \"voltage\"",
-                    "command = \"share\" fits any drive",
-                );
-            }
-            Command::ThrustCmdN if ct <= 0.0 => {
-                return fail("it has no propeller that gives thrust", "command it by torque or current");
-            }
-            Command::DutyCmd | Command::Share => {
-                let kt = map.torque_constant_nm_a;
-                let limit = match (kind, rig.amplifier.supply_v) {
-                    (AmplifierKind::Current, _) => {
-                        Some(rig.amplifier.current_limit_a).filter(|a| a.is_finite())
-                    }
-                    (AmplifierKind::Voltage, supply) => supply,
-                    // Speed at which the supply just drives the propeller, winding neglected.
-                    (AmplifierKind::Speed, supply) => supply.map(|v| v / kt),
-                };
-                match limit {
-                    Some(limit) => map.full = limit,
-                    None => {
-                        let key = if kind == AmplifierKind::Current { "current_limit_a" } else { "supply_v" };
-                        return fail(
-                            &format!("its largest command is not stated (amplifier.{key})"),
-                            &format!("state amplifier.{key}, or give the values as {}", own.name()),
-                        );
-                    }
-                }
-            }
-            _ => {}
-        }
-        Ok(map)
-    }
-
-    fn to_drive(&self, value: f64) -> f64 {
-        match self.command {
-            Command::CurrentCmdA | Command::VoltageCmdV | Command::SpeedCmdRadS => value,
-            Command::DutyCmd | Command::Share => value * self.full,
-            Command::TorqueCmdNM => value / self.torque_constant_nm_a,
-            Command::ThrustCmdN => {
-                let speed = value.signum() * (value.abs() / self.thrust_n_s2).sqrt();
-                let current = self.torque_nm_s2 * speed * speed.abs() / self.torque_constant_nm_a;
-                match self.kind {
-                    AmplifierKind::Current => current,
-                    AmplifierKind::Voltage => {
-                        self.resistance_ohm * current + self.torque_constant_nm_a * speed
-                    }
-                    AmplifierKind::Speed => speed,
-                }
-            }
-        }
-    }
-}
-
-/// Gauss-Markov noise, exact at any step.
-struct Turbulent {
-    sigma_m_s: f64,
-    time_constant_s: f64,
-    now: f64,
-    random: ChaCha8Rng,
-}
-
-impl Turbulent {
-    fn new(wanted: Turbulence, seed: u64) -> Result<Self, ScenarioError> {
-        for (key, value) in [("sigma_m_s", wanted.sigma_m_s), ("time_constant_s", wanted.time_constant_s)] {
-            if !(value.is_finite() && value > 0.0) {
-                let (key, found) = (format!("turbulence.{key}"), value.to_string());
-                return Err(ScenarioError::Value { key, found, allowed: "a finite number above 0".into() });
-            }
-        }
-        let mut random = ChaCha8Rng::seed_from_u64(seed.wrapping_add(29));
-        let draw: f64 = StandardNormal.sample(&mut random);
-        let Turbulence { sigma_m_s, time_constant_s } = wanted;
-        Ok(Self { sigma_m_s, time_constant_s, now: sigma_m_s * draw, random })
-    }
-
-    /// Values at the start and the end of the next step.
-    fn next(&mut self, dt: f64) -> (f64, f64) {
-        let keep = (-dt / self.time_constant_s).exp();
-        let draw: f64 = StandardNormal.sample(&mut self.random);
-        let from = self.now;
-        self.now = keep * from + self.sigma_m_s * (1.0 - keep * keep).sqrt() * draw;
-        (from, self.now)
     }
 }
 

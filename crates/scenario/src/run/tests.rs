@@ -1,6 +1,7 @@
-use super::super::NoReplays;
+use kort_thruster::effects;
+
 use super::*;
-use crate::{EffectUse, Segment};
+use crate::{EffectUse, NoReplays, Segment};
 
 fn rig() -> Rig {
     Rig::from_toml(include_str!("../../../../config/thrusters/whitcomb-yoerger-1999.toml")).unwrap()

@@ -7,7 +7,7 @@ use kort_proto::faults::Fault;
 use kort_proto::messages::DriveKind;
 use kort_proto::signals::Signals;
 use kort_scenario::Measuring;
-use kort_thruster::effects::{self, Descriptor, Scale};
+use kort_thruster::effects::Descriptor;
 use kort_thruster::models::ModelName;
 use kort_thruster::parameters::{Parameter, Parameters};
 use kort_thruster::plant::{Plant, Tick};
@@ -85,20 +85,31 @@ impl Simulated {
             ));
         }
         if keys.ambient_m_s.is_nan() || keys.ambient_m_s.abs() > 5.0 {
-            return Err(fail("ambient_m_s", format!("{} is outside -5 to 5", keys.ambient_m_s)));
+            return Err(fail(
+                "ambient_m_s",
+                format!(
+                    "{} is outside -5 to 5\nhint: the stream past the stand, 0 in still water",
+                    keys.ambient_m_s
+                ),
+            ));
         }
         if !(0.0..=1e6).contains(&keys.sensor_fault_after_s) {
             return Err(fail(
                 "sensor_fault_after_s",
-                format!("{} is outside 0 to 1e6", keys.sensor_fault_after_s),
+                format!(
+                    "{} is outside 0 to 1e6\nhint: when the sensor begins to lie",
+                    keys.sensor_fault_after_s
+                ),
             ));
         }
         let tick_s = thruster.servo_period_ns() as f64 * 1e-9;
         let parameters = Parameters::stated(rig);
         let scale = kort_scenario::scale(rig, &parameters, full_drive(rig, &parameters), tick_s, 60.0);
         let mut chosen = Vec::new();
-        for effect in &keys.effects {
-            chosen.push(resolve(effect, &scale).map_err(|words| fail("effects", words))?);
+        for (i, effect) in keys.effects.iter().enumerate() {
+            let (named, given) = (format!("{section}.effects[{i}].id"), format!("{section}.effects[{i}]"));
+            let used = kort_scenario::used_effect((&named, &effect.id), (&given, &effect.values), &scale);
+            chosen.push(used.map_err(|e| config.error(e.to_string()))?);
         }
         let chosen: Vec<(&Descriptor, &[f64])> = chosen.iter().map(|(d, v)| (*d, v.as_slice())).collect();
         Ok(Self {
@@ -172,36 +183,6 @@ impl Simulated {
             lying.distort(self.time_s, into);
         }
     }
-}
-
-/// An effect with its parameters in order.
-fn resolve(keys: &EffectKeys, scale: &Scale) -> Result<(&'static Descriptor, Vec<f64>), String> {
-    let descriptor = effects::find(&keys.id).ok_or_else(|| {
-        let known: Vec<_> = effects::ALL.iter().map(|d| d.id).collect();
-        format!("there is no effect `{}`\nhint: known are {}", keys.id, known.join(", "))
-    })?;
-    let specs = (descriptor.parameters)(scale);
-    if let Some(unknown) = keys.values.keys().find(|k| specs.iter().all(|s| s.name != k.as_str())) {
-        let known: Vec<_> = specs.iter().map(|s| s.name).collect();
-        return Err(format!("`{}` has no parameter `{unknown}`\nhint: it has {}", keys.id, known.join(", ")));
-    }
-    let mut values = Vec::new();
-    for spec in &specs {
-        let value = *keys.values.get(spec.name).ok_or_else(|| {
-            format!(
-                "`{}` lacks its parameter `{}` ({})\nhint: for example {}",
-                keys.id, spec.name, spec.unit, spec.start
-            )
-        })?;
-        if !(value >= spec.low && value <= spec.high) {
-            return Err(format!(
-                "`{}.{}` = {value} is outside {} to {} ({})",
-                keys.id, spec.name, spec.low, spec.high, spec.unit
-            ));
-        }
-        values.push(value);
-    }
-    Ok((descriptor, values))
 }
 
 /// Largest drive command: current limit, supply, or the speed at which the supply's voltage is reached.
