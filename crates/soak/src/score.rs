@@ -1,10 +1,18 @@
 //! Scores of one run, gathered tick by tick.
 
+mod histogram;
+mod steps;
+mod worst;
+
 use std::collections::BTreeMap;
 
 use kort_thruster::rig::Rig;
 
 use crate::disc::Disc;
+use histogram::Histogram;
+use steps::Steps;
+use worst::Worst;
+pub use worst::{Point, Window};
 
 /// What one tick shows to the scores.
 #[derive(Clone, Copy, Debug, Default)]
@@ -69,41 +77,6 @@ pub const SCORES: &[(&str, &str)] = &[
     ("limits_broken", "ticks beyond a limit; must be 0"),
 ];
 
-/// Longest time after a step that is looked at, s.
-const STEP_WINDOW_S: f64 = 6.0;
-/// Length of a window whose plot may be shown, s.
-pub const WINDOW_S: f64 = 8.0;
-/// Samples a second kept for plots.
-const PLOT_HZ: f64 = 100.0;
-/// Bins of the error histogram: 64 an octave, from 2^-20 of full scale to 4 times it.
-const BIN_BITS: u32 = 6;
-const BINS: usize = 22 << BIN_BITS;
-/// 2^-20 as the exponent of a number in memory.
-const LEAST_EXPONENT: u64 = 1023 - 20;
-
-/// A step of the reference under way.
-#[derive(Clone, Copy, Debug)]
-struct Step {
-    since_s: f64,
-    from_n: f64,
-    to_n: f64,
-    risen_s: Option<f64>,
-    outside_s: f64,
-    beyond: f64,
-}
-
-/// One point of a plot: time, reference, thrust, speed, flow, estimated flow, current.
-pub type Point = [f32; 7];
-
-/// The worst stretch of a run.
-#[derive(Clone, Debug, Default)]
-pub struct Window {
-    /// Root mean square of the thrust error in it, N.
-    pub rms_n: f64,
-    /// What happened.
-    pub points: Vec<Point>,
-}
-
 /// Gathers the scores of one run.
 pub struct Tally {
     dt_s: f64,
@@ -115,7 +88,7 @@ pub struct Tally {
     ticks: u64,
     squares: f64,
     sum: f64,
-    bins: Vec<u32>,
+    errors: Histogram,
     energy_j: f64,
     copper_j: f64,
     impulse_n_s: f64,
@@ -125,23 +98,13 @@ pub struct Tally {
     last_current_a: f64,
     flow_squares: f64,
     broken: u64,
-    step: Option<Step>,
-    last_reference_n: Option<f64>,
-    rises: Vec<f64>,
-    settles: Vec<f64>,
-    overshoots: Vec<f64>,
-    window: Window,
-    window_squares: f64,
-    window_ticks: u64,
-    worst: Window,
-    plot_every: u64,
-    seen: u64,
+    steps: Steps,
+    worst: Worst,
 }
 
 impl Tally {
     /// For a thruster as its rig states it, with its largest thrust; the start is not scored.
     pub fn new(dt_s: f64, rig: &Rig, scale_n: f64, settle_s: f64) -> Self {
-        let plot_every = (1.0 / (PLOT_HZ * dt_s)).round().max(1.0) as u64;
         Self {
             dt_s,
             scale_n,
@@ -152,7 +115,7 @@ impl Tally {
             ticks: 0,
             squares: 0.0,
             sum: 0.0,
-            bins: vec![0; BINS],
+            errors: Histogram::new(),
             energy_j: 0.0,
             copper_j: 0.0,
             impulse_n_s: 0.0,
@@ -162,17 +125,8 @@ impl Tally {
             last_current_a: 0.0,
             flow_squares: 0.0,
             broken: 0,
-            step: None,
-            last_reference_n: None,
-            rises: Vec::new(),
-            settles: Vec::new(),
-            overshoots: Vec::new(),
-            window: Window::default(),
-            window_squares: 0.0,
-            window_ticks: 0,
-            worst: Window::default(),
-            plot_every,
-            seen: 0,
+            steps: Steps::new(dt_s, scale_n),
+            worst: Worst::new(dt_s),
         }
     }
 
@@ -191,7 +145,7 @@ impl Tally {
         self.broken += u64::from(s.broken);
         if s.time_s < self.settle_s {
             self.last_current_a = s.current_a;
-            self.last_reference_n = Some(s.reference_n);
+            self.steps.begin_at(s.reference_n);
             return;
         }
         let dt = self.dt_s;
@@ -211,99 +165,25 @@ impl Tally {
             self.squares += error * error;
             self.sum += error;
             self.flow_squares += (s.flow_estimate_m_s - s.flow_m_s).powi(2);
-            self.bins[bin(error.abs() / self.scale_n)] += 1;
+            self.errors.count(error.abs() / self.scale_n);
         }
-        self.follow_step(s);
-        self.follow_window(s, error);
-    }
-
-    fn follow_step(&mut self, s: &Sample) {
-        let last = self.last_reference_n.replace(s.reference_n).unwrap_or(s.reference_n);
-        let change = s.reference_n - last;
-        if change != 0.0 || s.excused {
-            self.close_step();
-            if change.abs() > 0.05 * self.scale_n && !s.excused {
-                self.step = Some(Step {
-                    since_s: 0.0,
-                    from_n: s.thrust_n,
-                    to_n: s.reference_n,
-                    risen_s: None,
-                    outside_s: 0.0,
-                    beyond: 0.0,
-                });
-            }
-        }
-        if let Some(step) = &mut self.step {
-            step.since_s += self.dt_s;
-            let span = step.to_n - step.from_n;
-            let done = (s.thrust_n - step.from_n) / span;
-            if done >= 0.9 && step.risen_s.is_none() {
-                step.risen_s = Some(step.since_s);
-            }
-            if (done - 1.0).abs() > 0.05 {
-                step.outside_s = step.since_s;
-            }
-            step.beyond = step.beyond.max(done - 1.0);
-            if step.since_s >= STEP_WINDOW_S {
-                self.close_step();
-            }
-        }
-    }
-
-    /// A step counts if it was held for half a second; what was not reached counts as the whole time.
-    fn close_step(&mut self) {
-        let Some(step) = self.step.take() else { return };
-        if step.since_s < 0.5 || (step.to_n - step.from_n).abs() < 0.05 * self.scale_n {
-            return;
-        }
-        self.rises.push(step.risen_s.unwrap_or(step.since_s));
-        self.settles.push(step.outside_s);
-        self.overshoots.push(100.0 * step.beyond);
-    }
-
-    fn follow_window(&mut self, s: &Sample, error: f64) {
-        if !s.excused {
-            self.window_squares += error * error;
-        }
-        self.window_ticks += 1;
-        if self.seen.is_multiple_of(self.plot_every) {
-            self.window.points.push([
-                s.time_s as f32,
-                s.reference_n as f32,
-                s.thrust_n as f32,
-                s.shaft_speed_rad_s as f32,
-                s.flow_m_s as f32,
-                s.flow_estimate_m_s as f32,
-                s.current_a as f32,
-            ]);
-        }
-        self.seen += 1;
-        if self.window_ticks as f64 * self.dt_s >= WINDOW_S {
-            self.window.rms_n = (self.window_squares / self.window_ticks as f64).sqrt();
-            if self.window.rms_n > self.worst.rms_n {
-                std::mem::swap(&mut self.worst, &mut self.window);
-            }
-            self.window.points.clear();
-            (self.window_squares, self.window_ticks) = (0.0, 0);
-        }
+        self.steps.tick(s);
+        self.worst.tick(s);
     }
 
     /// The scores, and the worst window.
     pub fn finish(mut self, extra: &[(&'static str, f64)]) -> Outcome {
-        self.close_step();
-        if self.worst.points.is_empty() {
-            std::mem::swap(&mut self.worst, &mut self.window);
-        }
+        self.steps.close();
         let n = self.ticks.max(1) as f64;
         let seconds = n * self.dt_s;
         let mut scores = BTreeMap::new();
         scores.insert("thrust_rms_n", (self.squares / n).sqrt());
-        scores.insert("thrust_p95_n", self.percentile(0.95));
+        scores.insert("thrust_p95_n", self.errors.percentile(0.95) * self.scale_n);
         scores.insert("thrust_bias_n", self.sum / n);
         for (name, values) in [
-            ("rise_time_s", &self.rises),
-            ("settle_time_s", &self.settles),
-            ("overshoot_pct", &self.overshoots),
+            ("rise_time_s", &self.steps.rises),
+            ("settle_time_s", &self.steps.settles),
+            ("overshoot_pct", &self.steps.overshoots),
         ] {
             if !values.is_empty() {
                 scores.insert(name, values.iter().sum::<f64>() / values.len() as f64);
@@ -325,31 +205,8 @@ impl Tally {
         scores.insert("flow_rms_m_s", (self.flow_squares / n).sqrt());
         scores.insert("limits_broken", self.broken as f64);
         scores.extend(extra.iter().copied());
-        Outcome { scores, worst: self.worst }
+        Outcome { scores, worst: self.worst.finish() }
     }
-
-    fn percentile(&self, share: f64) -> f64 {
-        let target = (share * self.ticks as f64) as u64;
-        let mut below = 0;
-        for (i, count) in self.bins.iter().enumerate() {
-            below += u64::from(*count);
-            if below > target {
-                return edge(i + 1) * self.scale_n;
-            }
-        }
-        0.0
-    }
-}
-
-/// The exponent and the leading bits of the fraction are a logarithmic scale, straight within an octave.
-fn bin(share: f64) -> usize {
-    let place = share.to_bits() >> (52 - BIN_BITS);
-    (place.saturating_sub(LEAST_EXPONENT << BIN_BITS) as usize).min(BINS - 1)
-}
-
-/// Lower edge of a bin.
-fn edge(bin: usize) -> f64 {
-    f64::from_bits((bin as u64 + (LEAST_EXPONENT << BIN_BITS)) << (52 - BIN_BITS))
 }
 
 /// Scores and worst window of one run.
