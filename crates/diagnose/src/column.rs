@@ -10,6 +10,8 @@ use kort_thruster::plant::{Balance, Drive, Local, Sensed, Tick};
 use kort_thruster::real::Real;
 use kort_thruster::rig::Rig;
 
+use crate::nameless::nameless;
+
 /// What a term acts on.
 #[derive(Clone, Copy)]
 enum Place {
@@ -73,19 +75,11 @@ fn column_there(available: &Available) -> Result<(), &'static str> {
 
 macro_rules! driven {
     ($name:ident, $id:literal, $path:ident, $equation:literal, $needs:expr, $parameters:expr) => {
-        pub(crate) const $name: Descriptor = Descriptor {
+        pub(crate) const $name: Descriptor = nameless! {
             id: $id,
             path: Path::$path,
             what: "a term without a name, driven by a column",
             equation: $equation,
-            signature: "",
-            confused_with: &[],
-            separated_by: "",
-            reference: "",
-            commonness: 0.2,
-            shifts_time: false,
-            nonparametric: true,
-            forms: &[],
             parameters: $parameters,
             starts: one_start,
             needs: $needs,

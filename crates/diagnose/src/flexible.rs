@@ -11,6 +11,8 @@ use kort_thruster::plant::{Balance, Drive, Local, Sensed, Tick};
 use kort_thruster::real::Real;
 use kort_thruster::rig::Rig;
 
+use crate::nameless::nameless;
+
 /// Every term.
 pub const TERMS: &[&Descriptor] = &[
     &SHAFT_OVER_SPEED,
@@ -171,19 +173,11 @@ impl<T: Real> Effect<T> for Step<T> {
 
 macro_rules! term {
     ($const:ident, $id:literal, $path:ident, $equation:literal, $needs:expr, $parameters:expr, $place:ident) => {
-        const $const: Descriptor = Descriptor {
+        const $const: Descriptor = nameless! {
             id: $id,
             path: Path::$path,
             what: "a term without a name",
             equation: $equation,
-            signature: "",
-            confused_with: &[],
-            separated_by: "",
-            reference: "",
-            commonness: 0.2,
-            shifts_time: false,
-            nonparametric: true,
-            forms: &[],
             parameters: $parameters,
             starts: one_start,
             needs: $needs,
@@ -302,19 +296,11 @@ term!(
     SensorOverTime
 );
 
-const SHAFT_STEP: Descriptor = Descriptor {
+const SHAFT_STEP: Descriptor = nameless! {
     id: "unknown_shaft_step",
     path: Path::Shaft,
     what: "a load that comes on at one instant",
     equation: "shaft torque [N m] from an instant on",
-    signature: "",
-    confused_with: &[],
-    separated_by: "",
-    reference: "",
-    commonness: 0.2,
-    shifts_time: false,
-    nonparametric: true,
-    forms: &[],
     parameters: |s| {
         vec![
             Spec::strength("torque_n_m", "N m", 0.02 * s.torque_n_m, -s.torque_n_m, s.torque_n_m)

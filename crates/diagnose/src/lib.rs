@@ -11,6 +11,7 @@ mod experiment;
 pub mod flexible;
 mod left;
 mod locate;
+mod nameless;
 pub mod posterior;
 mod probe;
 pub mod report;

@@ -1,0 +1,18 @@
+//! What descriptors of terms without a name have in common: no words of a catalogue, and prior odds of a fifth.
+
+macro_rules! nameless {
+    ($($field:ident: $value:expr,)*) => {
+        Descriptor {
+            signature: "",
+            confused_with: &[],
+            separated_by: "",
+            reference: "",
+            commonness: 0.2,
+            shifts_time: false,
+            nonparametric: true,
+            forms: &[],
+            $($field: $value,)*
+        }
+    };
+}
+pub(crate) use nameless;
