@@ -1,11 +1,13 @@
 //! The whole service as real processes: it starts and thrusts, and whatever is killed, frozen or
 //! lost ends at zero thrust, is replaced, and never resumes what it was told before.
 
+#[path = "../common/mod.rs"]
 mod common;
+mod refusals;
 
 use std::time::{Duration, Instant};
 
-use common::{PERIOD_NS, Site, Stack, alive, at_zero, children, kill, run, wait};
+use common::{PERIOD_NS, Site, Stack, alive, at_zero, children, kill, wait};
 use kort_proto::faults::Fault;
 use kort_proto::messages::Telemetry;
 
@@ -275,41 +277,6 @@ fn the_end_of_the_terminal_leaves_nothing_in_shared_memory() {
 }
 
 #[test]
-fn too_few_open_files_are_called_that() {
-    let site = Site::new();
-    let out = run(std::process::Command::new("sh").arg("-c").arg(format!(
-        "ulimit -n 32; exec {} up --config {} --root {}",
-        common::KORT,
-        site.config().display(),
-        site.root().display()
-    )));
-    let words = String::from_utf8_lossy(&out.stderr);
-    assert_eq!(out.status.code(), Some(1), "{words}");
-    assert!(words.contains("open files: at most 32") && words.contains("ulimit -n"), "{words}");
-    assert!(!words.contains("/dev/shm"), "{words}");
-}
-
-#[test]
-fn what_others_could_write_is_not_trusted() {
-    use std::os::unix::fs::PermissionsExt;
-    let site = Site::new();
-    std::fs::create_dir(site.root()).unwrap();
-    std::fs::set_permissions(site.root(), std::fs::Permissions::from_mode(0o777)).unwrap();
-    let out = run(&mut site.command("up"));
-    let words = String::from_utf8_lossy(&out.stderr);
-    assert!(out.status.code() == Some(1) && words.contains("may be written by others"), "{words}");
-    std::fs::remove_dir(site.root()).unwrap();
-    let elsewhere = site.folder.path().join("victim");
-    std::fs::write(&elsewhere, "whole").unwrap();
-    std::os::unix::fs::symlink(&elsewhere, site.folder.path().join("shm.lock")).unwrap();
-    let out = run(&mut site.command("up"));
-    let words = String::from_utf8_lossy(&out.stderr);
-    assert!(out.status.code() == Some(1) && words.contains("is a link"), "{words}");
-    assert_eq!(std::fs::read_to_string(&elsewhere).unwrap(), "whole");
-    std::fs::remove_file(site.folder.path().join("shm.lock")).unwrap();
-}
-
-#[test]
 fn a_frozen_gateway_ends_at_zero_and_resumes_nothing_when_it_thaws() {
     common::in_real_time(|| {
         let mut stack = Stack::start();
@@ -380,91 +347,4 @@ fn a_killed_supervisor_takes_its_children_along_and_the_next_one_starts() {
         stack.watch().stays_at_zero(Duration::from_millis(300));
         stack.thrust(60.0, LEASE_MS);
     });
-}
-
-#[test]
-fn a_second_supervisor_is_told_who_runs_here() {
-    common::in_real_time(|| {
-        let stack = Stack::start();
-        let second = run(&mut stack.site.command("up"));
-        assert_eq!(second.status.code(), Some(1));
-        let words = String::from_utf8_lossy(&second.stderr);
-        assert!(words.contains(&stack.supervisor.id().to_string()) && words.contains("hint:"), "{words}");
-        assert!(stack.state().is_some(), "the first one still runs");
-    });
-}
-
-#[test]
-fn what_stands_in_the_way_of_a_start_is_said_once() {
-    let site = Site::new();
-    let taken = std::net::TcpListener::bind(("127.0.0.1", site.port)).unwrap();
-    let up = run(&mut site.command("up"));
-    let words = String::from_utf8_lossy(&up.stderr);
-    assert_eq!(up.status.code(), Some(1), "{words}");
-    assert_eq!(words.matches("error: gateway.bind").count(), 1, "{words}");
-    assert!(words.contains(&site.port.to_string()) && words.contains("hint:"), "{words}");
-    assert!(up.stdout.is_empty(), "no console is promised");
-    drop(taken);
-    let root = site.folder.path().join("x".repeat(150));
-    let up = run(std::process::Command::new(common::KORT)
-        .args(["up", "--config"])
-        .arg(site.config())
-        .arg("--root")
-        .arg(&root));
-    let words = String::from_utf8_lossy(&up.stderr);
-    assert_eq!(up.status.code(), Some(1), "{words}");
-    assert!(words.contains("at most 35 bytes") && !words.contains("panicked"), "{words}");
-}
-
-#[test]
-fn a_wrong_configuration_is_refused_with_the_nearest_key() {
-    let site = Site::new();
-    let text = std::fs::read_to_string(site.config()).unwrap();
-    for (wrong, words) in [
-        (
-            text.replace("amplifier", "amplifyer"),
-            vec!["unknown field `amplifyer`", "did you mean `amplifier`?"],
-        ),
-        (text.replace("rate_hz = 500", "rate_hz = 9000"), vec!["thrusters.t1.servo.rate_hz", "100 to 5000"]),
-        (
-            text.replace("full_drive_s", "full_drive"),
-            vec!["thrusters.t1.limits", "did you mean `full_drive_s`?"],
-        ),
-        (text.replace("velocity_servo", "velocity"), vec!["velocity", "known are static_map"]),
-        (
-            text.replace("full_drive_s = 0.005", "current_a = 1e6"),
-            vec!["thrusters.t1.limits.current_a", "1000000", "outside", "hint:"],
-        ),
-        (
-            text.replace("full_drive_s = 0.005", "temperature_c = -300"),
-            vec!["thrusters.t1.limits.temperature_c", "-300", "hint:"],
-        ),
-        (
-            text.replace("limits = {", "checks = { frozen_s = 1e9 }\nlimits = {"),
-            vec!["thrusters.t1.checks.frozen_s", "hint:"],
-        ),
-        (
-            text.replace("full_drive_s = 0.005", "temperature_c = nan"),
-            vec!["thrusters.t1.limits.temperature_c", "NaN", "hint:"],
-        ),
-    ] {
-        std::fs::write(site.config(), wrong).unwrap();
-        // Each process refuses what it reads; the first three are read by the servo.
-        let role = if words[0] == "velocity" { "controller" } else { "servo" };
-        let out = run(&mut site.command(role));
-        let error = String::from_utf8_lossy(&out.stderr);
-        assert_eq!(out.status.code(), Some(2), "{error}");
-        assert!(words.iter().all(|w| error.contains(w)) && error.contains("kort.toml"), "{error}");
-        // The supervisor does not try again what no second try makes right.
-        let out = run(&mut site.command("up"));
-        let error = String::from_utf8_lossy(&out.stderr);
-        assert_eq!(out.status.code(), Some(2), "{error}");
-        assert!(words.iter().all(|w| error.contains(w)), "{error}");
-        assert_eq!(error.matches("error:").count(), 1, "one message: {error}");
-        assert!(out.stdout.is_empty(), "no console is promised");
-    }
-    std::fs::write(site.config(), text.replace(&format!("127.0.0.1:{}", site.port), "127.0.0.1:0")).unwrap();
-    let out = run(&mut site.command("up"));
-    let error = String::from_utf8_lossy(&out.stderr);
-    assert!(out.status.code() == Some(2) && error.contains("port 0"), "{error}");
 }
