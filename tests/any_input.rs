@@ -185,6 +185,7 @@ proptest! {
             (Body::Lease, r#"{"holder": "bench""#),
             (Body::Controller, r#"{"controller": "velocity_servo""#),
             (Body::Rig, r#"{"revision": 1"#),
+            (Body::Diagnosis, r#"{"last_s": 60"#),
             (Body::Recording, r#"{"name": "x""#),
             (Body::Message, r#"{"setpoint": {"thrust_n": 1}, "lease_id": "x""#),
         ] {

@@ -369,3 +369,29 @@ fn everything_can_be_read_heard_and_reached_by_keyboard() {
         assert!((100.0..112.0).contains(&largest_n), "a step of 100 N shoots over to {largest_n} N");
     });
 }
+
+/// Path lights, a diagnosis that comes to its end in place, and the way back from a revision of the rig.
+#[test]
+fn an_operator_diagnoses_and_goes_back() {
+    common::in_real_time(|| {
+        let stack = Stack::start();
+        let Some(mut page) = Browser::open(&format!("http://127.0.0.1:{}/", stack.site.port)) else { return };
+        page.until("document.readyState === 'complete' && typeof state !== 'undefined' && state !== null");
+        page.until("document.querySelectorAll('#paths .chip').length === 5");
+        page.until(&text_is("rig-text", "revision 1"));
+        // A second of rows is the least that can be diagnosed; what becomes of a thruster at rest is shown all the same.
+        std::thread::sleep(Duration::from_millis(1500));
+        page.click("diagnose");
+        page.until("found !== null && found.state !== 'running'");
+        page.until(
+            "document.getElementById('diagnosis-text').textContent.length > 10 && state.diagnosis === null",
+        );
+        assert_eq!(page.eval("document.getElementById('use').disabled"), json!(true), "nothing was found");
+        let rig = include_str!("../config/thrusters/whitcomb-yoerger-1999.toml");
+        stack.expect("POST", "/rig", Some(json!({"toml": format!("{rig}\n# revised\n")})));
+        page.until(&text_is("rig-text", "revision 2"));
+        page.click("back");
+        page.until(&text_is("rig-text", "revision 1"));
+        page.until(&text_is("log", "revision 1 of the rig is in force"));
+    });
+}

@@ -609,6 +609,9 @@ fn the_openapi_document_names_every_route_and_each_answers() {
             "/v1/thrusters/{id}/rig/rollback",
             "/v1/thrusters/{id}/rig/revisions",
             "/v1/thrusters/{id}/rig/revisions/{number}",
+            "/v1/thrusters/{id}/diagnoses",
+            "/v1/thrusters/{id}/diagnoses/{diagnosis}",
+            "/v1/thrusters/{id}/diagnoses/{diagnosis}/report",
         ] {
             assert!(document["paths"][route].is_object(), "{route} is not documented");
         }
@@ -618,6 +621,7 @@ fn the_openapi_document_names_every_route_and_each_answers() {
                 .replace("{name}", "none")
                 .replace("{code}", "4")
                 .replace("{number}", "1");
+            let real = real.replace("{diagnosis}", "none");
             for method in methods.as_object().unwrap().keys() {
                 let answer = send(port, &method.to_uppercase(), &real, &[], b"");
                 let documented = &document["paths"][path][method]["responses"][answer.status.to_string()];

@@ -2,7 +2,9 @@
 
 use crate::extract::{Json, OptionalJson};
 use crate::problem::Problem;
-use crate::routes::bodies::{ControllerRequest, LeaseRequest, RecordingRequest, RigRequest, incoming};
+use crate::routes::bodies::{
+    ControllerRequest, DiagnosisRequest, LeaseRequest, RecordingRequest, RigRequest, incoming,
+};
 use crate::view::Setpoint;
 
 /// What a client sends.
@@ -16,6 +18,8 @@ pub enum Body {
     Controller,
     /// `POST …/rig`
     Rig,
+    /// `POST …/diagnoses`
+    Diagnosis,
     /// `POST /v1/recordings`
     Recording,
     /// A text message of the stream.
@@ -24,8 +28,15 @@ pub enum Body {
 
 impl Body {
     /// Every kind.
-    pub const ALL: [Body; 6] =
-        [Body::Setpoint, Body::Lease, Body::Controller, Body::Rig, Body::Recording, Body::Message];
+    pub const ALL: [Body; 7] = [
+        Body::Setpoint,
+        Body::Lease,
+        Body::Controller,
+        Body::Rig,
+        Body::Diagnosis,
+        Body::Recording,
+        Body::Message,
+    ];
 
     /// Reads the bytes.
     ///
@@ -37,6 +48,7 @@ impl Body {
             Body::Lease => Json::<LeaseRequest>::from_bytes(bytes).map(drop),
             Body::Controller => Json::<ControllerRequest>::from_bytes(bytes).map(drop),
             Body::Rig => Json::<RigRequest>::from_bytes(bytes).map(drop),
+            Body::Diagnosis => OptionalJson::<DiagnosisRequest>::from_bytes(bytes).map(drop),
             Body::Recording => OptionalJson::<RecordingRequest>::from_bytes(bytes).map(drop),
             // A message that is not UTF-8 is no message of the stream: the connection is closed before.
             Body::Message => std::str::from_utf8(bytes).map_or(Ok(()), |text| incoming(text).map(drop)),

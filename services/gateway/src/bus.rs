@@ -19,6 +19,7 @@ use kort_proto::transport::{Deployment, GatewayPorts, Ticker, TransportError, mo
 
 use crate::events::Events;
 use crate::record::Recorder;
+use crate::ring::Feed;
 use crate::tally::Tally;
 use crate::thruster::{Ask, Thruster};
 use crate::view::{MismatchView, Setpoint};
@@ -42,6 +43,8 @@ pub struct Link {
     pub heartbeat: Duration,
     /// The event log.
     pub events: Arc<Events>,
+    /// The last minutes.
+    pub ring: Feed,
 }
 
 /// The runtime that answers requests beats too: a gateway that only this thread keeps alive must not look alive.
@@ -257,6 +260,7 @@ impl Bridge {
             self.last_servo_sequence = (session, sequence);
             self.link.tally.telemetry(&telemetry, lost);
             recorder.offer(&self.link.thruster.id, &telemetry, lost);
+            self.link.ring.take(&telemetry);
             self.held.take(&telemetry);
             if telemetry.armed != 0 {
                 let shown = self.held.fill(telemetry).signals;

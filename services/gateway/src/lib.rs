@@ -12,8 +12,10 @@ pub mod bodies;
 mod bus;
 mod connections;
 mod desk;
+mod diagnosis;
 mod durations;
 mod energy;
+mod error;
 mod events;
 mod extract;
 mod gate;
@@ -25,39 +27,42 @@ mod problem;
 mod process;
 mod record;
 mod rig;
+mod ring;
 mod routes;
 mod serve;
 mod settings;
 mod tally;
+mod thin;
 mod thruster;
 mod tls;
 pub mod token;
 mod view;
 mod windows;
 
-use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 use axum::body::Bytes;
-use kort_proto::config::{Config, ConfigError};
+use kort_proto::config::Config;
 use kort_proto::transport::{Deployment, Watched};
-use thiserror::Error;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::watch;
 use utoipa::openapi::OpenApi;
 
 use bus::Pulse;
 use connections::Connections;
+use diagnosis::Diagnoses;
 use durations::Durations;
+pub use error::GatewayError;
 use events::Events;
 use gate::Gate;
 use openapi::Document;
 use problem::{Kind, Problem};
 use record::{Recorder, Subject};
 use rig::RigDesk;
+use ring::Ring;
 use settings::Deployed;
 pub use settings::Settings;
 use tally::Tally;
@@ -68,83 +73,13 @@ use token::Tokens;
 /// Largest request body, bytes.
 const BODY_BYTES_MAX: usize = 16 * 1024;
 
-/// Why the gateway cannot run.
-#[derive(Debug, Error)]
-pub enum GatewayError {
-    /// The address cannot be listened on.
-    #[error("gateway.bind = {bind}: {error}\nhint: {}", bind_hint(error))]
-    Bind {
-        /// The address.
-        bind: SocketAddr,
-        /// The system's words.
-        error: std::io::Error,
-    },
-    /// The folder of the recordings cannot be used.
-    #[error("gateway.recordings = {}: {error}\nhint: name a folder this user can write", folder.display())]
-    Recordings {
-        /// The folder.
-        folder: PathBuf,
-        /// The system's words.
-        error: std::io::Error,
-    },
-    /// The folder of the event log cannot be used.
-    #[error("gateway.events = {}: {error}\nhint: name a folder this user can write", folder.display())]
-    Events {
-        /// The folder.
-        folder: PathBuf,
-        /// The system's words.
-        error: std::io::Error,
-    },
-    /// The folder of the rigs' revisions cannot be used.
-    #[error("gateway.rigs = {}: {error}\nhint: name a folder this user can write", folder.display())]
-    Rigs {
-        /// The folder.
-        folder: PathBuf,
-        /// The system's words.
-        error: std::io::Error,
-    },
-    /// Who may command beyond this machine is not said.
-    #[error(
-        "gateway.bind = {bind} is reached from other machines, and {} holds no token\nhint: kort token new NAME --role viewer|pilot|admin makes one",
-        file.display()
-    )]
-    NoTokens {
-        /// The address.
-        bind: SocketAddr,
-        /// The file of the tokens.
-        file: PathBuf,
-    },
-    /// The tokens cannot be read.
-    #[error(transparent)]
-    Tokens(#[from] token::TokenError),
-    /// Certificate or key cannot be used.
-    #[error(transparent)]
-    Tls(#[from] tls::TlsError),
-    /// The configuration cannot be used.
-    #[error(transparent)]
-    Config(#[from] ConfigError),
-    /// The system refuses something else.
-    #[error("gateway: {0}")]
-    System(#[from] std::io::Error),
-}
-
-fn bind_hint(error: &std::io::Error) -> &'static str {
-    match error.kind() {
-        std::io::ErrorKind::AddrInUse => {
-            "another program uses it; choose another port with gateway.bind in kort.toml"
-        }
-        std::io::ErrorKind::PermissionDenied => {
-            "ports below 1024 need a right; choose another with gateway.bind in kort.toml"
-        }
-        _ => "choose an address of this machine with gateway.bind in kort.toml",
-    }
-}
-
 /// Everything the routes share.
 #[derive(Debug)]
 pub(crate) struct App {
     thrusters: Vec<Arc<Thruster>>,
     rigs: Vec<Arc<RigDesk>>,
+    rings: Vec<Ring>,
+    diagnoses: Arc<Diagnoses>,
     tallies: Vec<Arc<Tally>>,
     recorder: Arc<Recorder>,
     events: Arc<Events>,
@@ -181,10 +116,22 @@ impl App {
 
     /// The rig description of this thruster.
     fn rig(&self, id: &str) -> Result<&Arc<RigDesk>, Problem> {
+        Ok(&self.rigs[self.place(id)?])
+    }
+
+    /// The last minutes of this thruster.
+    fn ring(&self, id: &str) -> Result<&Ring, Problem> {
+        Ok(&self.rings[self.place(id)?])
+    }
+
+    /// Its place among all: each has one rig, one ring and one tally.
+    fn place(&self, id: &str) -> Result<usize, Problem> {
         let thruster = self.thruster(id)?;
-        let at = self.thrusters.iter().position(|other| Arc::ptr_eq(other, thruster));
-        at.and_then(|at| self.rigs.get(at))
-            .ok_or_else(|| Problem::new(Kind::Internal, format!("thruster {id:?} has no rig description")))
+        Ok(self.thrusters.iter().position(|other| Arc::ptr_eq(other, thruster)).unwrap_or_default())
+    }
+
+    fn diagnoses(&self) -> &Arc<Diagnoses> {
+        &self.diagnoses
     }
 
     fn tallies(&self) -> &[Arc<Tally>] {
@@ -389,11 +336,16 @@ async fn serve(
     let events = Events::start(&settings.events, Arc::clone(&recorder))
         .map_err(|error| GatewayError::Events { folder: settings.events.clone(), error })?;
     recorder.tell_to(&events);
+    let diagnoses = Diagnoses::open(&settings.diagnoses, settings.diagnosis, Arc::clone(&events))
+        .map_err(|error| GatewayError::Diagnoses { folder: settings.diagnoses.clone(), error })?;
+    let diagnoses = Arc::new(diagnoses);
     let (stop_streams, stopping) = watch::channel(false);
 
     let mut app = App {
         thrusters: Vec::new(),
         rigs: Vec::new(),
+        rings: Vec::new(),
+        diagnoses: Arc::clone(&diagnoses),
         tallies: Vec::new(),
         recorder: Arc::clone(&recorder),
         events: Arc::clone(&events),
@@ -417,10 +369,12 @@ async fn serve(
         let rig = RigDesk::open(&settings.rigs, Arc::clone(&thruster), deployment.clone(), deployed)
             .map_err(|error| GatewayError::Rigs { folder: settings.rigs.clone(), error })?;
         app.rigs.push(Arc::new(rig));
+        let (feed, ring) = ring::start(&settings.diagnosis)?;
+        app.rings.push(ring);
         app.thrusters.push(Arc::clone(&thruster));
         app.tallies.push(Arc::clone(&tally));
         let events = Arc::clone(&events);
-        links.push(bus::Link { thruster, tally, asks, heartbeat, events });
+        links.push(bus::Link { thruster, tally, asks, heartbeat, events, ring: feed });
     }
     let app = Arc::new(app);
     for rig in &app.rigs {
@@ -478,6 +432,7 @@ async fn serve(
         }
         tokio::time::sleep(Duration::from_millis(10)).await;
     }
+    diagnoses.stop();
     recorder.stop_all();
     stop_bus.store(true, Ordering::Relaxed);
     let _ = bus.join();

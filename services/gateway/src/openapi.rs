@@ -28,6 +28,7 @@ pub fn opening() -> OpenApi {
         ("thrusters", "What is known of each thruster"),
         ("command", "Lease, arming, setpoint, control law"),
         ("rig", "The rig description in force, its revisions, and the way back"),
+        ("diagnoses", "What the model left out, found while the thruster runs"),
         ("recordings", "Recordings of the live signals"),
         ("health", "Health and metrics"),
         ("console", "The operator's console"),

@@ -24,6 +24,7 @@ pub enum Kind {
     UnknownThruster,
     UnknownRecording,
     UnknownRevision,
+    UnknownDiagnosis,
     UnknownFault,
     MethodNotAllowed,
     RequestTimeout,
@@ -34,6 +35,7 @@ pub enum Kind {
     Refused,
     NoRecording,
     RecordingActive,
+    DiagnosisActive,
     BodyTooLarge,
     UnsupportedMediaType,
     InvalidField,
@@ -50,7 +52,7 @@ pub enum Kind {
 
 impl Kind {
     /// All kinds, for the documentation and the tests.
-    pub const ALL: [Kind; 36] = [
+    pub const ALL: [Kind; 38] = [
         Kind::MalformedJson,
         Kind::MalformedPath,
         Kind::MalformedQuery,
@@ -65,6 +67,7 @@ impl Kind {
         Kind::UnknownThruster,
         Kind::UnknownRecording,
         Kind::UnknownRevision,
+        Kind::UnknownDiagnosis,
         Kind::UnknownFault,
         Kind::MethodNotAllowed,
         Kind::RequestTimeout,
@@ -75,6 +78,7 @@ impl Kind {
         Kind::Refused,
         Kind::NoRecording,
         Kind::RecordingActive,
+        Kind::DiagnosisActive,
         Kind::BodyTooLarge,
         Kind::UnsupportedMediaType,
         Kind::InvalidField,
@@ -110,6 +114,7 @@ impl Kind {
             Kind::UnknownThruster => (S::NOT_FOUND, "unknown-thruster", "No such thruster"),
             Kind::UnknownRecording => (S::NOT_FOUND, "unknown-recording", "No such recording"),
             Kind::UnknownRevision => (S::NOT_FOUND, "unknown-revision", "No such revision of the rig"),
+            Kind::UnknownDiagnosis => (S::NOT_FOUND, "unknown-diagnosis", "No such diagnosis"),
             Kind::UnknownFault => (S::NOT_FOUND, "unknown-fault", "No such fault code"),
             Kind::MethodNotAllowed => {
                 (S::METHOD_NOT_ALLOWED, "method-not-allowed", "This route has no such method")
@@ -126,6 +131,7 @@ impl Kind {
             Kind::RecordingActive => {
                 (S::CONFLICT, "recording-active", "A recording is running or has this name")
             }
+            Kind::DiagnosisActive => (S::CONFLICT, "diagnosis-active", "A diagnosis is running"),
             Kind::BodyTooLarge => (S::PAYLOAD_TOO_LARGE, "body-too-large", "The body is too large"),
             Kind::UnsupportedMediaType => {
                 (S::UNSUPPORTED_MEDIA_TYPE, "unsupported-media-type", "The body must be application/json")

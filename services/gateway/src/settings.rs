@@ -27,6 +27,8 @@ pub struct Settings {
     pub events: PathBuf,
     /// Folder of the rigs' revisions, likewise.
     pub rigs: PathBuf,
+    /// Folder of the diagnoses, likewise.
+    pub diagnoses: PathBuf,
     /// File of the tokens, likewise; `kort token new` writes it.
     pub tokens: PathBuf,
     /// Ask for a token on loopback too; beyond it one is always asked for.
@@ -39,6 +41,8 @@ pub struct Settings {
     pub tls: Option<Tls>,
     /// When a recording ends by itself.
     pub recording: RecordingLimits,
+    /// What is kept for diagnoses, and of them.
+    pub diagnosis: DiagnosisLimits,
 }
 
 /// Section `[gateway.tls]`.
@@ -79,6 +83,31 @@ impl Default for RecordingLimits {
     }
 }
 
+/// Section `[gateway.diagnosis]`.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct DiagnosisLimits {
+    /// Time that is always kept of each thruster, s.
+    pub ring_time_s: f64,
+    /// Rate at which it is kept, Hz.
+    pub ring_rate_hz: f64,
+    /// Diagnoses that are kept; the oldest goes for the next.
+    pub kept_max: usize,
+}
+
+impl DiagnosisLimits {
+    /// Rows that are kept of each thruster.
+    pub fn ring_rows(&self) -> usize {
+        (self.ring_time_s * self.ring_rate_hz).ceil().max(1.0) as usize
+    }
+}
+
+impl Default for DiagnosisLimits {
+    fn default() -> DiagnosisLimits {
+        DiagnosisLimits { ring_time_s: 600.0, ring_rate_hz: 100.0, kept_max: 50 }
+    }
+}
+
 impl Default for Settings {
     fn default() -> Settings {
         Settings {
@@ -86,12 +115,14 @@ impl Default for Settings {
             recordings: PathBuf::from("kort-state/recordings"),
             events: PathBuf::from("kort-state/events"),
             rigs: PathBuf::from("kort-state/rigs"),
+            diagnoses: PathBuf::from("kort-state/diagnoses"),
             tokens: PathBuf::from("kort-state/tokens.toml"),
             require_tokens: false,
             hosts: Vec::new(),
             behind_tls_proxy: false,
             tls: None,
             recording: RecordingLimits::default(),
+            diagnosis: DiagnosisLimits::default(),
         }
     }
 }
@@ -144,6 +175,18 @@ impl Settings {
             if !(low..=high).contains(&value) {
                 return Err(format!(
                     "`gateway.recording.{key}` = {value} is outside {low} to {high}\nhint: leave the key out for the usual value"
+                ));
+            }
+        }
+        let diagnosis = &self.diagnosis;
+        for (key, value, low, high) in [
+            ("ring_time_s", diagnosis.ring_time_s, 10.0, 3600.0),
+            ("ring_rate_hz", diagnosis.ring_rate_hz, 1.0, 1000.0),
+            ("kept_max", diagnosis.kept_max as f64, 1.0, 10_000.0),
+        ] {
+            if !(low..=high).contains(&value) {
+                return Err(format!(
+                    "`gateway.diagnosis.{key}` = {value} is outside {low} to {high}\nhint: leave the key out for the usual value"
                 ));
             }
         }

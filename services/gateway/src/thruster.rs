@@ -1,5 +1,7 @@
 //! One thruster as the gateway sees it: what it asks (the desk) and what it last heard.
 
+mod law;
+
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, mpsc};
 use std::time::{Duration, Instant};
 
@@ -7,11 +9,8 @@ use axum::body::Bytes;
 use kort_proto::events::EventKind;
 use kort_proto::faults::{Fault, Names};
 use kort_proto::limits::Limit;
-use kort_proto::messages::{
-    ControllerState, Outcome, PARAMETERS, Parameter, Process, Reply, Request, RequestKind,
-};
+use kort_proto::messages::{ControllerState, Outcome, Process, Reply, Request, RequestKind};
 use kort_proto::signals::Kind as SignalKind;
-use kort_proto::text::Text;
 use tokio::sync::oneshot;
 
 use crate::desk::{Desk, check_range};
@@ -19,10 +18,9 @@ use crate::events::Events;
 use crate::heard::Heard;
 use crate::lease::{Lease, Wanted};
 use crate::problem::{Kind, Problem};
-use crate::routes::{ControllerRequest, ControllerView, LawParameter};
 use crate::view::{
-    BeforeView, Estimated, FaultView, LeaseView, LimitView, MismatchView, ParameterEstimate, Setpoint,
-    SetpointRange, ThrusterState, Values,
+    BeforeView, DiagnosisStep, Estimated, FaultView, LeaseView, LimitView, MismatchView, ParameterEstimate,
+    Setpoint, SetpointRange, ThrusterState, Values,
 };
 
 /// Servo and controller answer a request within this time, or are taken to be away.
@@ -52,6 +50,8 @@ pub struct Thruster {
     asks: mpsc::SyncSender<Ask>,
     events: Arc<Events>,
     rendered: Mutex<(Rendered, Bytes)>,
+    /// Name and step of the diagnosis that runs, and when it began.
+    diagnosis: Mutex<Option<(String, String, Instant)>>,
 }
 
 /// What a rendered state was made of: sample, desk, and whether the servo was silent.
@@ -78,6 +78,7 @@ impl Thruster {
             heard: Mutex::new(Heard { servo_silence, ..Heard::default() }),
             asks,
             events,
+            diagnosis: Mutex::default(),
             rendered: Mutex::new(((u64::MAX, u64::MAX, false), Bytes::new())),
         };
         (thruster, inbox)
@@ -91,6 +92,11 @@ impl Thruster {
     /// Another revision of the rig allows other setpoints.
     pub fn set_range(&self, range: SetpointRange) {
         *lock(&self.range) = range;
+    }
+
+    /// A diagnosis of it has come so far, or is over.
+    pub fn set_diagnosis(&self, at: Option<(String, String, Instant)>) {
+        *lock(&self.diagnosis) = at;
     }
 
     /// The desk, for the bus and the metrics.
@@ -216,101 +222,6 @@ impl Thruster {
         desk.note(kind, &who, format!("{who} {what}"));
     }
 
-    /// The control law that runs.
-    pub fn controller(&self) -> Result<ControllerView, Problem> {
-        let heard = self.heard();
-        let Some(state) = heard.controller(Instant::now()) else {
-            return Err(Problem::new(Kind::NotReady, format!("the controller of {} is not heard", self.id)));
-        };
-        Ok(ControllerView {
-            controller: state.law.as_str().to_owned(),
-            observer: state.observer.as_str().to_owned(),
-            estimator: state.estimator.as_str().to_owned(),
-            parameters: (0..state.law_parameter_count as usize)
-                .filter_map(|index| state.law_parameters.get(index))
-                .map(|p| LawParameter {
-                    name: p.name.as_str().to_owned(),
-                    value: finite(p.value),
-                    unit: p.unit.as_str().to_owned(),
-                    low: finite(p.low),
-                    high: finite(p.high),
-                })
-                .collect(),
-            available: state
-                .laws
-                .iter()
-                .take(state.law_count as usize)
-                .map(|law| law.as_str().to_owned())
-                .collect(),
-        })
-    }
-
-    /// Switches the control law, or changes its parameters.
-    pub async fn set_controller(
-        &self,
-        who: &str,
-        lease: Option<&str>,
-        wanted: &ControllerRequest,
-    ) -> Result<(), Problem> {
-        self.desk().may(lease, Instant::now())?;
-        let now = self.controller()?;
-        if let Some(name) = &wanted.controller
-            && !now.available.contains(name)
-        {
-            return Err(Problem::new(Kind::UnknownController, format!("there is no control law {name:?}"))
-                .hint(format!("choose one of {}", now.available.join(", ")))
-                .allowed(now.available));
-        }
-        if wanted.parameters.len() > PARAMETERS {
-            return Err(Problem::new(
-                Kind::OutOfRange,
-                format!(
-                    "parameters has {} entries; at most {PARAMETERS} are allowed",
-                    wanted.parameters.len()
-                ),
-            ));
-        }
-        let mut message = request(RequestKind::SetController);
-        for (field, slot, name) in [
-            ("controller", &mut message.law, &wanted.controller),
-            ("observer", &mut message.observer, &wanted.observer),
-            ("estimator", &mut message.estimator, &wanted.estimator),
-        ] {
-            let Some(name) = name else { continue };
-            *slot = Text::new(name);
-            if name.is_empty() || slot.as_str() != name {
-                return Err(Problem::new(
-                    Kind::OutOfRange,
-                    format!("{field} = {name:?} must have 1 to 32 bytes"),
-                )
-                .hint("leave it out to keep the present one"));
-            }
-        }
-        message.parameter_count = wanted.parameters.len() as u32;
-        for (slot, (name, value)) in message.parameters.iter_mut().zip(&wanted.parameters) {
-            if Text::<32>::new(name).as_str() != name {
-                return Err(Problem::new(
-                    Kind::InvalidField,
-                    format!("parameters names {name:?}, which no law has"),
-                ));
-            }
-            *slot = Parameter { name: Text::new(name), value: *value, ..Parameter::default() };
-        }
-        self.ask(message, &[Process::Controller], Kind::Refused).await?;
-        let law = wanted.controller.clone().unwrap_or(now.controller);
-        self.settle(|heard, now| heard.controller(now).is_some_and(|state| state.law.as_str() == law)).await;
-        let parts = [
-            ("controller", wanted.controller.as_deref()),
-            ("observer", wanted.observer.as_deref()),
-            ("estimator", wanted.estimator.as_deref()),
-        ];
-        let mut changed: Vec<String> =
-            parts.into_iter().filter_map(|(part, name)| Some(format!("{part} = {}", name?))).collect();
-        changed.extend(wanted.parameters.iter().map(|(name, value)| format!("{name} = {value}")));
-        self.did(who, lease, EventKind::ControllerChanged, &format!("set {}", changed.join(", ")));
-        Ok(())
-    }
-
     /// The thruster's state, rendered at most once for each sample heard.
     pub fn state_json(&self) -> Bytes {
         let now = Instant::now();
@@ -353,6 +264,11 @@ impl Thruster {
                 parameters: controller.map(estimates).unwrap_or_default(),
             },
             mismatch: controller.map(MismatchView::of),
+            diagnosis: lock(&self.diagnosis).as_ref().map(|(id, step, began)| DiagnosisStep {
+                id: id.clone(),
+                step: step.clone(),
+                elapsed_s: now.saturating_duration_since(*began).as_secs_f64(),
+            }),
             faults: Fault::in_set(heard.shown_faults(now)).map(|fault| self.fault_view(fault)).collect(),
             limits: Limit::in_set(heard.limits(now))
                 .map(|limit| LimitView {

@@ -45,6 +45,8 @@ pub struct ThrusterState {
     pub estimated: Estimated,
     /// Which path is off against the rig as stated; null while the controller is away.
     pub mismatch: Option<MismatchView>,
+    /// The diagnosis of it that runs; null if none does.
+    pub diagnosis: Option<DiagnosisStep>,
     /// Latched faults.
     pub faults: Vec<FaultView>,
     /// Limits in force: no faults, they say what holds the thruster back now.
@@ -154,6 +156,19 @@ impl MismatchView {
             None => "the thruster agrees with the rig as stated again".into(),
         }
     }
+}
+
+/// How far a diagnosis is.
+#[derive(Clone, Debug, Serialize, ToSchema)]
+pub struct DiagnosisStep {
+    /// Its name.
+    #[schema(example = "t1-20260101T120000Z")]
+    pub id: String,
+    /// What it is at.
+    #[schema(example = "trying every effect")]
+    pub step: String,
+    /// Time it took so far, s.
+    pub elapsed_s: f64,
 }
 
 /// An estimated parameter.

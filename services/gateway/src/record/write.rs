@@ -15,6 +15,7 @@ use kort_recording::LiveMcap;
 
 use super::{ENDING, Recorder, RecordingInfo, RecordingState, Subject, write_info};
 use crate::settings::RecordingLimits;
+use crate::thin::Thin;
 use crate::thruster::lock;
 
 /// What a kill may cost.
@@ -58,10 +59,9 @@ pub struct Job {
     part: u32,
     base: String,
     first_ns: Option<u64>,
-    due_ns: u64,
+    thin: Thin,
     state_s: f64,
     law_s: f64,
-    row: Signals,
 }
 
 /// Why a recording ends by itself.
@@ -97,16 +97,15 @@ impl Job {
             folder: folder.to_owned(),
             subject,
             limits,
-            base: now.name,
+            base: now.name.clone(),
             info,
             began,
             file,
             part: 1,
             first_ns: None,
-            due_ns: 0,
+            thin: Thin::new(now.rate_hz),
             state_s: f64::NEG_INFINITY,
             law_s: f64::NEG_INFINITY,
-            row: Signals::UNKNOWN,
         })
     }
 
@@ -133,10 +132,9 @@ impl Job {
 
     fn write(&mut self, recorder: &Recorder, inbox: &Receiver<Item>) -> Result<(), End> {
         let mut flushed = Instant::now();
-        let period_ns = (1e9 / lock(&self.info).rate_hz) as u64;
         loop {
             match inbox.recv_timeout(FLUSH_EVERY) {
-                Ok(Item::Sample(sample)) => self.sample(sample.0, &sample.1, period_ns)?,
+                Ok(Item::Sample(sample)) => self.sample(sample.0, &sample.1)?,
                 Ok(Item::Event { at_ns, json }) => self.event(at_ns, &json)?,
                 Err(RecvTimeoutError::Timeout) => (),
                 Err(RecvTimeoutError::Disconnected) => return Ok(()),
@@ -153,25 +151,12 @@ impl Job {
         }
     }
 
-    fn sample(&mut self, time_ns: u64, signals: &Signals, period_ns: u64) -> Result<(), End> {
-        // A sensor slower than the servo shows a value now and then: none is lost between two rows.
-        for signal in SIGNALS {
-            let value = (signal.get)(signals);
-            if !value.is_nan() {
-                (signal.set)(&mut self.row, value);
-            }
-        }
+    fn sample(&mut self, time_ns: u64, signals: &Signals) -> Result<(), End> {
         let first_ns = *self.first_ns.get_or_insert(time_ns);
-        // The servo's period need not divide ours: a row may come a little early, and none is made up for ticks
-        // that were skipped.
-        if time_ns + period_ns / 20 < self.due_ns {
-            return Ok(());
-        }
-        self.due_ns = (self.due_ns + period_ns).max(time_ns + period_ns / 2);
+        let Some(row) = self.thin.take(time_ns, signals) else { return Ok(()) };
         let time_s = time_ns.saturating_sub(first_ns) as f64 * 1e-9;
-        let values: Vec<f64> = SIGNALS.iter().map(|signal| (signal.get)(&self.row)).collect();
+        let values: Vec<f64> = SIGNALS.iter().map(|signal| (signal.get)(&row)).collect();
         self.file.row(time_s, &values)?;
-        self.row = Signals::UNKNOWN;
         self.beside(time_s)?;
         let mut info = lock(&self.info);
         info.rows += 1;

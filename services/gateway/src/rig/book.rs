@@ -202,7 +202,7 @@ fn read_pages(folder: &Path) -> io::Result<Pages> {
 }
 
 /// Writes a file whole or not at all.
-fn write_whole(folder: &Path, name: &str, bytes: &[u8]) -> io::Result<()> {
+pub fn write_whole(folder: &Path, name: &str, bytes: &[u8]) -> io::Result<()> {
     let draft = folder.join(format!(".{name}.draft"));
     fs::write(&draft, bytes)
         .and_then(|()| fs::rename(&draft, folder.join(name)))

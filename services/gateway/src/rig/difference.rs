@@ -43,6 +43,11 @@ pub fn between(before: &str, after: &str) -> Vec<Change> {
     changes
 }
 
+/// Does any value differ?
+pub fn differ(before: &str, after: &str) -> bool {
+    !between(before, after).is_empty()
+}
+
 /// The keys that differ, in words for the event log.
 pub fn words(changes: &[Change]) -> String {
     const NAMED: usize = 4;

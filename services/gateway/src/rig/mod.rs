@@ -24,8 +24,8 @@ use crate::settings::Deployed;
 use crate::thruster::Thruster;
 use crate::view::SetpointRange;
 
-pub use book::{Book, Entry, Making, Revision};
-pub use difference::Change;
+pub use book::{Book, Entry, Making, Revision, write_whole};
+pub use difference::{Change, differ};
 
 /// A controller has read, designed and taken over a revision within this time, or is taken to be away.
 const TAKEN_WITHIN: Duration = Duration::from_secs(6);

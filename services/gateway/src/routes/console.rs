@@ -18,7 +18,7 @@ static PAGE: LazyLock<String> = LazyLock::new(|| {
         let file = Parts::get(name).unwrap_or_else(|| panic!("console/{name} is embedded at build time"));
         String::from_utf8_lossy(&file.data).into_owned()
     };
-    ["style.css", "plot.js", "console.js"]
+    ["style.css", "plot.js", "console.js", "diagnosis.js"]
         .iter()
         .fold(part("index.html"), |page, name| page.replace(&format!("/*{name}*/"), &part(name)))
 });
@@ -48,6 +48,7 @@ mod tests {
             !PAGE.contains("/*style.css*/")
                 && !PAGE.contains("/*plot.js*/")
                 && !PAGE.contains("/*console.js*/")
+                && !PAGE.contains("/*diagnosis.js*/")
         );
         for outside in ["src=\"http", "href=\"http", "@import", "url(http", "fetch(\"http"] {
             assert!(!PAGE.contains(outside), "the console asks another host: {outside}");

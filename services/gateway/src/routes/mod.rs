@@ -3,6 +3,7 @@
 mod arming;
 mod console;
 mod controller;
+mod diagnoses;
 mod docs;
 mod events;
 mod faults;
@@ -21,6 +22,7 @@ pub use controller::{ControllerRequest, ControllerView, LawParameter};
 /// What clients send, for [`crate::bodies`].
 pub mod bodies {
     pub use super::controller::ControllerRequest;
+    pub use super::diagnoses::DiagnosisRequest;
     pub use super::lease::LeaseRequest;
     pub use super::recordings::RecordingRequest;
     pub use super::rig::RigRequest;
@@ -52,6 +54,7 @@ pub fn router(app: Arc<App>) -> Router {
         .merge(events::routes())
         .merge(controller::routes())
         .merge(rig::routes())
+        .merge(diagnoses::routes())
         .merge(stream::routes())
         .merge(recordings::routes())
         .merge(faults::routes())

@@ -50,7 +50,7 @@ struct RevisionView {
     in_force: bool,
 }
 
-/// A revision to put in force: exactly one of `toml` and `revision`.
+/// A revision to put in force: exactly one of `toml`, `diagnosis` and `revision`.
 #[derive(Default, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 #[schema(example = json!({"revision": 1, "note": "the friction was the cable's"}))]
@@ -58,6 +58,9 @@ pub struct RigRequest {
     /// A whole rig description, TOML.
     #[serde(default)]
     toml: Option<String>,
+    /// Name of a diagnosis: the rig that it was compared with, and what it found.
+    #[serde(default)]
+    diagnosis: Option<String>,
     /// Number of a revision that is kept.
     #[serde(default)]
     #[schema(minimum = 1)]
@@ -189,8 +192,8 @@ async fn one(
     responses(
         (status = 200, description = "What is in force now, and what differs", body = Revised),
         (status = 400, description = "`malformed-json`, `malformed-body`, `malformed-header`, `malformed-query`", body = Problem, content_type = "application/problem+json"),
-        (status = 404, description = "`unknown-thruster`, `unknown-revision`", body = Problem, content_type = "application/problem+json"),
-        (status = 409, description = "`refused`: the drive is of another kind; `lease-held`, `lease-lost`", body = Problem, content_type = "application/problem+json"),
+        (status = 404, description = "`unknown-thruster`, `unknown-diagnosis`, `unknown-revision`", body = Problem, content_type = "application/problem+json"),
+        (status = 409, description = "`refused`: the drive is of another kind, or the diagnosis has nothing for the revision in force; `lease-held`, `lease-lost`", body = Problem, content_type = "application/problem+json"),
         (status = 413, description = "`body-too-large`", body = Problem, content_type = "application/problem+json"),
         (status = 415, description = "`unsupported-media-type`", body = Problem, content_type = "application/problem+json"),
         (status = 422, description = "`invalid-rig`, `invalid-field`, `out-of-range`", body = Problem, content_type = "application/problem+json"),
@@ -211,7 +214,7 @@ async fn revise(
             format!("note has {long} bytes; at most {NOTE_BYTES_MAX} are allowed"),
         ));
     }
-    let (text, source) = wanted(desk, &body)?;
+    let (text, source) = wanted(&app, &id, &body)?;
     let making = Making { source, who: who.name.clone(), note: body.note };
     let (desk, asker) = (Arc::clone(desk), Asker { who: who.name, lease });
     whole(async move { desk.revise(&asker, &text, making, dry_run).await }).await
@@ -249,15 +252,21 @@ async fn whole(
 }
 
 /// The text that a request names, and where it comes from.
-fn wanted(desk: &RigDesk, body: &RigRequest) -> Result<(String, String), Problem> {
-    match (&body.toml, body.revision) {
-        (Some(toml), None) => Ok((toml.clone(), "file".into())),
-        (None, Some(number)) => {
+fn wanted(app: &App, id: &str, body: &RigRequest) -> Result<(String, String), Problem> {
+    let desk = app.rig(id)?;
+    match (&body.toml, &body.diagnosis, body.revision) {
+        (Some(toml), None, None) => Ok((toml.clone(), "file".into())),
+        (None, Some(name), None) => {
+            let info = app.diagnoses().find(id, name)?;
+            let text = app.diagnoses().found(&info, &desk.book().current().0.revision)?;
+            Ok((text, format!("diagnosis {name}")))
+        }
+        (None, None, Some(number)) => {
             let (entry, text) = kept(desk, number)?;
             Ok((text.to_string(), format!("revision {}", entry.number)))
         }
-        _ => Err(Problem::new(Kind::InvalidField, "exactly one of toml and revision must be there")
-            .hint("send the file itself as text/plain, or {\"toml\": \"…\"}, or {\"revision\": 1}")),
+        _ => Err(Problem::new(Kind::InvalidField, "exactly one of toml, diagnosis and revision must be there")
+            .hint("send the file itself as text/plain, or {\"toml\": \"…\"}, {\"diagnosis\": \"…\"}, {\"revision\": 1}")),
     }
 }
 

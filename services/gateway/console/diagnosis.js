@@ -1,0 +1,127 @@
+"use strict";
+// Diagnosis: path lights, what the model left out, use it, go back, and what that did to the thrust.
+const LOOK_EVERY_MS = 2000, SETTLE_S = 5, ERROR_SPAN_S = 60;
+let found = null, revised = null; // the newest diagnosis of this thruster; when which revision came, by this page
+
+const diagnosesOf = () => `${base()}/diagnoses`;
+const says = (id, words) => { if ($(id).textContent !== words) $(id).textContent = words; }; // read aloud when it changes
+const percent = (share) => (share === null || share === undefined ? "–" : `${Math.round(100 * share)} %`);
+
+// A light for each path; ten times a second with the state would be read aloud ten times.
+function showPaths(mismatch) {
+  const words = !mismatch ? "The controller is away."
+    : mismatch.alarm ? `The ${mismatch.alarm} path is off since ${new Date(Date.now() - 1000 * mismatch.since_s).toLocaleTimeString()}.`
+    : mismatch.paths.some((path) => path.level === null) ? "What is usual is being learnt; it takes some minutes of driving."
+    : "The thruster agrees with its rig description.";
+  says("mismatch-text", words);
+  const kinds = (mismatch ? mismatch.paths : []).map((path) =>
+    [path.path, path.level === null ? "" : mismatch.alarm === path.path || path.level >= 1 ? "bad" : path.level >= 0.5 ? "warn" : "good"]);
+  const shown = JSON.stringify(kinds);
+  if ($("paths").dataset.shown === shown) return;
+  $("paths").dataset.shown = shown;
+  $("paths").replaceChildren(...kinds.map(([name, kind]) => Object.assign(document.createElement("span"), { className: `chip ${kind}`, textContent: name })));
+}
+
+function showDiagnosis() {
+  if (!state) return;
+  showPaths(state.mismatch);
+  const running = state.diagnosis;
+  if (running) says("diagnosis-text", `${running.step}, ${running.elapsed_s.toFixed(0)} s so far`);
+  $("diagnose").disabled = Boolean(running) || isStale();
+  $("diagnosis-cancel").disabled = !running;
+  $("use").disabled = !found || !found.usable || found.rig_revision !== state.rig_revision || isStale();
+  showError();
+}
+setInterval(showDiagnosis, 200);
+
+async function loadDiagnosis() {
+  if (!thruster || !state) return;
+  const [list, rig] = [await call("GET", diagnosesOf()), await call("GET", `${base()}/rig`)];
+  found = list.length ? list[list.length - 1] : null;
+  $("back").disabled = rig.before === null || isStale();
+  says("rig-text", `In force: revision ${rig.number} of the rig, from ${rig.source}${rig.note ? ` (${rig.note})` : ""}.`);
+  if (!found || found.state === "running") return;
+  const shown = `${found.id} ${found.state}`;
+  if ($("findings").dataset.shown === shown) return;
+  $("findings").dataset.shown = shown;
+  says("diagnosis-text", found.state === "done" ? found.summary : `${found.id}: ${found.state}${found.cause ? `, ${found.cause}` : ""}`);
+  $("findings").replaceChildren(...found.findings.map((f) =>
+    cells([f.effect.replaceAll("_", " "), f.path, f.probability.toFixed(2), percent(f.excess_error_removed), f.statement])));
+  const link = Object.assign(document.createElement("a"), { href: `${diagnosesOf()}/${found.id}/report`, target: "_blank", textContent: `report of ${found.id}` });
+  link.addEventListener("click", (event) => openPage(event, link));
+  $("report").replaceChildren(...(found.state === "done" ? [link] : []));
+}
+setInterval(() => { if (!document.hidden) loadDiagnosis().catch(() => {}); }, LOOK_EVERY_MS);
+
+// A link cannot carry the token: with one, the page is fetched and opened.
+async function openPage(event, link) {
+  if (!token) return;
+  event.preventDefault();
+  const answer = await fetch(link.href, { headers: { Authorization: `Bearer ${token}` } });
+  if (!answer.ok) { log(`${link.textContent}: ${answer.status}`, true); return; }
+  window.open(URL.createObjectURL(await answer.blob()), "_blank");
+}
+
+click("diagnose", async () => {
+  const recording = $("diagnosis-of").value.startsWith("recording ") ? $("diagnosis-of").value.slice(10) : null;
+  const begun = await call("POST", diagnosesOf(), recording ? { recording } : { last_s: Number($("diagnosis-of").value) });
+  log(`diagnosis ${begun.id} began, of ${begun.of}`);
+});
+click("diagnosis-cancel", async () => {
+  if (state.diagnosis) { await call("DELETE", `${diagnosesOf()}/${state.diagnosis.id}`); log("diagnosis cancelled"); }
+});
+
+const value = (v) => (v === null ? "nothing" : typeof v === "object" && "value" in v ? `${v.value} (± ${percent(v.tol)})` : v === true ? "there" : String(v));
+const lines = (difference) => difference.map((change) => `${change.key}: ${value(change.before)} → ${value(change.after)}`);
+click("use", async () => {
+  const wanted = { diagnosis: found.id };
+  const would = await call("POST", `${base()}/rig?dry_run=true`, wanted);
+  if (!confirm(`Put this in force on ${thruster}, also while it drives?\n\n${lines(would.difference).join("\n")}`)) return;
+  came(await call("POST", `${base()}/rig`, wanted));
+});
+click("back", async () => came(await call("POST", `${base()}/rig/rollback`)));
+function came(answer) {
+  revised = { time_s: state.time_s, number: answer.in_force.number };
+  log(`revision ${answer.in_force.number} of the rig is in force: ${lines(answer.difference).join(", ")}`);
+  loadDiagnosis().catch(() => {});
+}
+
+// Thrust error, root mean square, over the minute before a revision came and since; what settles is left out.
+function rms(from_s, to_s) {
+  const [asked, measured] = charts[0].points;
+  let sum = 0, n = 0;
+  for (let i = 0; i < asked.length; i += 1) {
+    const [t, want] = asked[i], got = measured[i][1];
+    if (t < from_s || t > to_s || want === null || got === null || want === undefined) continue;
+    sum += (want - got) ** 2; n += 1;
+  }
+  return n > STREAM_HZ ? Math.sqrt(sum / n) : null;
+}
+function showError() {
+  if (!revised || revised.time_s > state.time_s) { says("error-text", ""); return; }
+  const before = rms(revised.time_s - ERROR_SPAN_S, revised.time_s);
+  const since = rms(Math.max(revised.time_s + SETTLE_S, state.time_s - ERROR_SPAN_S), state.time_s);
+  const told = (n) => (n === null ? "not known yet" : `${n.toFixed(2)} N rms`);
+  const worse = before !== null && since !== null && since > 1.2 * before + 0.05;
+  says("error-text", `Thrust error: ${told(before)} in the minute before revision ${revised.number}, ${told(since)} since${worse ? ": larger than before. Back undoes it." : "."}`);
+  $("error-text").className = worse ? "warn-text" : "quiet";
+}
+
+// What can be diagnosed: the last minutes, or a recording that is done.
+async function offer() {
+  const list = (await call("GET", "/v1/recordings")).filter((item) => item.thruster === thruster && item.state !== "recording");
+  const options = [["60", "last minute"], ["300", "last 5 minutes"], ["600", "last 10 minutes"], ...list.map((item) => [`recording ${item.name}`, item.name])];
+  const shown = JSON.stringify(options), select = $("diagnosis-of");
+  if (select.dataset.shown === shown || document.activeElement === select) return;
+  const chosen = select.dataset.shown ? select.value : "300";
+  select.dataset.shown = shown;
+  select.replaceChildren(...options.map(([name, words]) => new Option(words, name, false, name === chosen)));
+}
+setInterval(() => { if (!document.hidden && thruster) offer().catch(() => {}); }, 5000);
+setTimeout(() => { if (thruster) { offer().catch(() => {}); loadDiagnosis().catch(() => {}); } }, 500);
+$("thruster").addEventListener("change", () => {
+  found = null; revised = null;
+  for (const id of ["findings", "diagnosis-of"]) delete $(id).dataset.shown;
+  $("findings").replaceChildren(); $("report").replaceChildren(); says("diagnosis-text", "");
+  offer().catch(() => {});
+});

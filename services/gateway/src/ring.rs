@@ -1,0 +1,121 @@
+//! The last minutes of a thruster, always at hand and bounded: what a diagnosis is made of when nobody recorded.
+//!
+//! A thread of its own keeps them: the bus hands rows over and never waits, and whoever takes a copy keeps nobody.
+
+use std::collections::VecDeque;
+use std::io;
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+
+use kort_proto::messages::Telemetry;
+use kort_proto::signals::Signals;
+use tokio::sync::oneshot;
+
+use crate::settings::DiagnosisLimits;
+use crate::thin::Thin;
+
+/// Rows that may wait: some seconds.
+const QUEUE: usize = 2048;
+
+/// A row: the servo's time on CLOCK_MONOTONIC, ns, and every signal.
+pub type Row = (u64, Signals);
+
+/// What the ring's thread is given.
+enum Item {
+    Row(Row),
+    /// The rows of the last so many ns, please.
+    Take(u64, oneshot::Sender<Vec<Row>>),
+}
+
+/// The bus's end.
+#[derive(Debug)]
+pub struct Feed {
+    thin: Thin,
+    items: SyncSender<Item>,
+}
+
+/// The end of whoever wants a copy.
+#[derive(Clone, Debug)]
+pub struct Ring {
+    items: SyncSender<Item>,
+}
+
+/// Begins to keep a thruster's last minutes.
+///
+/// # Errors
+/// The thread cannot be started.
+pub fn start(limits: &DiagnosisLimits) -> io::Result<(Feed, Ring)> {
+    let (items, inbox) = sync_channel(QUEUE);
+    let (rows, span_ns) = (limits.ring_rows(), (limits.ring_time_s * 1e9) as u64);
+    std::thread::Builder::new().name("ring".into()).spawn(move || keep(&inbox, rows, span_ns))?;
+    Ok((Feed { thin: Thin::new(limits.ring_rate_hz), items: items.clone() }, Ring { items }))
+}
+
+impl Feed {
+    /// A sample of the servo; never waits.
+    pub fn take(&mut self, telemetry: &Telemetry) {
+        if let Some(row) = self.thin.take(telemetry.time_ns, &telemetry.signals) {
+            let _ = self.items.try_send(Item::Row((telemetry.time_ns, row)));
+        }
+    }
+}
+
+impl Ring {
+    /// A copy of the last so many seconds, oldest first; what there is, if that is less.
+    pub async fn last(&self, time_s: f64) -> Vec<Row> {
+        let (answer, rows) = oneshot::channel();
+        match self.items.try_send(Item::Take((time_s * 1e9) as u64, answer)) {
+            Ok(()) => rows.await.unwrap_or_default(),
+            Err(_) => Vec::new(),
+        }
+    }
+}
+
+fn keep(inbox: &Receiver<Item>, most: usize, span_ns: u64) {
+    let mut rows: VecDeque<Row> = VecDeque::with_capacity(most);
+    while let Ok(item) = inbox.recv() {
+        match item {
+            Item::Row(row) => {
+                // A servo on another clock than the one before: what was kept has no place beside it.
+                if rows.back().is_some_and(|(last_ns, _)| row.0 <= *last_ns) {
+                    rows.clear();
+                }
+                while rows.len() >= most || rows.front().is_some_and(|(at, _)| row.0 - at > span_ns) {
+                    rows.pop_front();
+                }
+                rows.push_back(row);
+            }
+            Item::Take(time_ns, answer) => {
+                let from_ns = rows.back().map_or(0, |(last_ns, _)| last_ns.saturating_sub(time_ns));
+                let first = rows.partition_point(|(at, _)| *at < from_ns);
+                let _ = answer.send(rows.range(first..).copied().collect());
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[tokio::test]
+    async fn the_last_minutes_are_kept_and_no_more() {
+        let limits = DiagnosisLimits { ring_time_s: 10.0, ring_rate_hz: 10.0, ..DiagnosisLimits::default() };
+        let (mut feed, ring) = start(&limits).unwrap();
+        assert!(ring.last(5.0).await.is_empty());
+        let mut feed_from = |seconds: std::ops::Range<u64>| {
+            for ms in (seconds.start * 1000..seconds.end * 1000).step_by(50) {
+                feed.take(&Telemetry { time_ns: ms * 1_000_000, ..Telemetry::default() });
+            }
+        };
+        feed_from(100..130);
+        let rows = ring.last(5.0).await;
+        assert_eq!((rows.len(), rows[0].0 / 1_000_000), (51, 124_900));
+        assert_eq!(ring.last(1e6).await.len(), 100, "bounded");
+        // A gap stays one: rows older than the span are gone.
+        feed_from(200..202);
+        assert_eq!(ring.last(1e6).await.len(), 20);
+        // The machine was started anew.
+        feed_from(1..2);
+        assert_eq!(ring.last(1e6).await.len(), 10);
+    }
+}

@@ -1,0 +1,199 @@
+//! Diagnoses of a running thruster, from outside: begun, followed, read, used, gone back from, cancelled.
+
+mod common;
+
+use std::time::Duration;
+
+use common::{Site, Stack, children, kill, wait};
+use serde_json::{Value, json};
+
+/// How long a diagnosis may take that runs behind everything else on a machine full of tests.
+const LONG: Duration = Duration::from_secs(300);
+
+/// A stand with dry friction that its rig description does not know of.
+fn rubbing() -> Stack {
+    let site = Site::new();
+    let effect = "id = \"coulomb_friction\", coulomb_torque_n_m = 1.2, stribeck_rise = 0.3, stribeck_speed_rad_s = 2.0";
+    site.add("limits = { full_drive_s = 0.005 }", &format!("simulation = {{ effects = [{{ {effect} }}] }}"));
+    Stack::start_at(site)
+}
+
+/// Setpoints that tell the paths apart: up, down and through zero.
+fn drive(stack: &mut Stack, levels: &[f64]) {
+    for newton in levels {
+        stack.thrust(*newton, 60_000);
+        std::thread::sleep(Duration::from_millis(1200));
+    }
+}
+
+/// Waits until a diagnosis is over; what became of it.
+fn over(stack: &Stack, id: &str) -> Value {
+    let end = std::time::Instant::now() + LONG;
+    loop {
+        let found = stack.expect("GET", &format!("/diagnoses/{id}"), None);
+        if found["state"] != "running" {
+            return found;
+        }
+        assert!(std::time::Instant::now() < end, "it takes too long: {found}");
+        std::thread::sleep(Duration::from_millis(200));
+    }
+}
+
+fn name_of(info: &Value) -> String {
+    info["id"].as_str().unwrap_or_else(|| panic!("no name: {info}")).to_owned()
+}
+
+/// The process of the diagnosis that runs.
+fn job(stack: &Stack) -> Option<u32> {
+    children(stack.process("gateway")?).into_iter().find(|(_, role)| role == "diagnose").map(|(pid, _)| pid)
+}
+
+#[test]
+fn what_the_rig_does_not_know_is_found_used_and_gone_back_from() {
+    common::in_real_time(|| {
+        let mut stack = rubbing();
+        drive(&mut stack, &[60.0, -60.0, 120.0, 20.0, -100.0, 80.0, -20.0, 100.0]);
+        let stated = stack.expect("GET", "/rig", None)["revision"].clone();
+        let (status, begun) = stack.http("POST", "/diagnoses", Some(json!({"last_s": 60}))).unwrap();
+        assert_eq!(status, 202, "{begun}");
+        let id = name_of(&begun);
+        assert_eq!((&begun["state"], &begun["rig_revision"]), (&json!("running"), &stated));
+        let (status, busy) = stack.http("POST", "/diagnoses", None).unwrap();
+        assert_eq!((status, &busy["type"]), (409, &json!("urn:kort:problem:diagnosis-active")), "{busy}");
+        wait("the state to tell a step", || {
+            let diagnosis = stack.state()?["diagnosis"].clone();
+            (diagnosis["id"] == id.as_str() && diagnosis["step"].as_str()?.len() > 3).then_some(())
+        });
+
+        let done = over(&stack, &id);
+        assert_eq!((&done["state"], &done["cause"]), (&json!("done"), &Value::Null), "{done}");
+        assert_eq!(done["report"]["schema"], "kort.diagnosis/2");
+        assert_eq!(done["report"]["verdict"], done["verdict"]);
+        let named: Vec<&str> =
+            done["findings"].as_array().unwrap().iter().filter_map(|f| f["effect"].as_str()).collect();
+        assert!(named.contains(&"coulomb_friction") && done["usable"] == true, "{done}");
+        assert!(stack.state().unwrap()["diagnosis"].is_null());
+        let page = stack.text(&format!("/v1/thrusters/t1/diagnoses/{id}/report")).unwrap();
+        assert!(page.starts_with("<!DOCTYPE html>") && page.contains("coulomb"), "{page:.300}");
+
+        // Used under way, and named.
+        drive(&mut stack, &[50.0]);
+        let used = stack.expect("POST", "/rig", Some(json!({"diagnosis": id})));
+        assert_eq!(
+            (&used["applied"], &used["in_force"]["source"]),
+            (&json!(true), &json!(format!("diagnosis {id}")))
+        );
+        let keys: Vec<&str> =
+            used["difference"].as_array().unwrap().iter().map(|c| c["key"].as_str().unwrap()).collect();
+        assert!(keys.contains(&"effects.coulomb_friction.coulomb_torque_n_m"), "{keys:?}");
+        let state = stack.state().unwrap();
+        assert_eq!((&state["rig_revision"], &state["armed"]), (&used["in_force"]["revision"], &json!(true)));
+        // It was compared with a revision that is not in force any more.
+        let (status, again) = stack.http("POST", "/rig", Some(json!({"diagnosis": id}))).unwrap();
+        assert_eq!((status, &again["type"]), (409, &json!("urn:kort:problem:refused")), "{again}");
+        let back = stack.expect("POST", "/rig/rollback", None);
+        assert_eq!(back["in_force"]["revision"], stated);
+        wait("the events", || {
+            let events = stack.get("/v1/events")?;
+            let kinds: Vec<&str> = events.as_array()?.iter().filter_map(|e| e["kind"].as_str()).collect();
+            ["diagnosis_started", "diagnosis_done", "rig_changed", "rig_rolled_back"]
+                .iter()
+                .all(|kind| kinds.contains(kind))
+                .then_some(())
+        });
+    });
+}
+
+#[test]
+fn a_diagnosis_gives_way_is_cancelled_and_ends_with_its_gateway() {
+    common::in_real_time(|| {
+        let mut stack = Stack::start();
+        drive(&mut stack, &[60.0, -60.0]);
+        let begin = |stack: &Stack| {
+            wait("a diagnosis to begin", || {
+                let (status, info) = stack.http("POST", "/diagnoses", Some(json!({"last_s": 60})))?;
+                (status == 202).then(|| name_of(&info))
+            })
+        };
+        let id = begin(&stack);
+        let pid = wait("its process", || job(&stack));
+        // proc(5): nice and policy are fields 19 and 41; SCHED_IDLE is 5.
+        wait("it to give way", || {
+            let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
+            let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
+            (fields[16] == "19" && fields[38] == "5").then_some(())
+        });
+        let cancelled = stack.expect("DELETE", &format!("/diagnoses/{id}"), None);
+        assert_eq!(cancelled["state"], "cancelled");
+        assert_eq!(over(&stack, &id)["state"], "cancelled");
+        assert!(!common::alive(pid));
+        let (status, page) = stack.http("GET", &format!("/diagnoses/{id}/report"), None).unwrap();
+        assert_eq!((status, &page["type"]), (409, &json!("urn:kort:problem:refused")), "{page}");
+        assert_eq!(stack.http("POST", "/rig", Some(json!({"diagnosis": id}))).unwrap().0, 409);
+
+        // Its gateway dies: so does it, and its successor says what became of it.
+        let second = begin(&stack);
+        let pid = wait("its process", || job(&stack));
+        let old = stack.process_of("gateway");
+        kill(old, "KILL");
+        wait("its end", || (!common::alive(pid)).then_some(()));
+        wait("a successor", || stack.process("gateway").filter(|new| *new != old));
+        stack.wait_until_up();
+        let list = stack.expect("GET", "/diagnoses", None);
+        let states: Vec<(&Value, &Value)> =
+            list.as_array().unwrap().iter().map(|d| (&d["id"], &d["state"])).collect();
+        assert_eq!(states, [(&json!(id), &json!("cancelled")), (&json!(second), &json!("failed"))]);
+        assert_eq!(stack.http("DELETE", &format!("/diagnoses/{id}"), None).unwrap().0, 204);
+        assert_eq!(stack.http("GET", &format!("/diagnoses/{id}"), None).unwrap().0, 404);
+    });
+}
+
+#[test]
+fn what_cannot_be_diagnosed_is_refused_with_the_reason() {
+    common::in_real_time(|| {
+        let stack = Stack::start_at(Site::new().with_t2());
+        let record = |method: &str, body: Option<Value>| {
+            let agent: ureq::Agent = ureq::Agent::config_builder().http_status_as_error(false).build().into();
+            let request = ureq::http::Request::builder()
+                .method(method)
+                .uri(format!("http://127.0.0.1:{}/v1/recordings", stack.site.port))
+                .header("Content-Type", "application/json");
+            let body = body.map(|b| b.to_string()).unwrap_or_default();
+            agent.run(request.body(body).unwrap()).unwrap().status().as_u16()
+        };
+        assert_eq!(record("POST", Some(json!({"name": "other", "thruster": "t2"}))), 201);
+        let refused = |body: Value, status: u16, slug: &str| {
+            let (answered, problem) = stack.http("POST", "/diagnoses", Some(body.clone())).unwrap();
+            let slug = format!("urn:kort:problem:{slug}");
+            assert_eq!((answered, &problem["type"]), (status, &json!(slug)), "{body}: {problem}");
+            assert!(problem["hint"].is_string(), "{problem}");
+        };
+        refused(json!({"recording": "nowhere"}), 404, "unknown-recording");
+        refused(json!({"recording": "../kort.toml"}), 404, "unknown-recording");
+        refused(json!({"recording": "other"}), 409, "refused");
+        refused(json!({"recording": "other", "last_s": 5}), 422, "invalid-field");
+        refused(json!({"last_s": 0}), 422, "out-of-range");
+        refused(json!({"last_s": "long"}), 422, "invalid-field");
+        refused(json!({"last_s": 60, "model": "model9"}), 422, "out-of-range");
+        refused(json!({"last_s": 60, "with": ["magic"]}), 422, "out-of-range");
+        refused(json!({"minutes": 5}), 422, "invalid-field");
+        assert_eq!(record("DELETE", None), 200);
+        assert_eq!(record("POST", Some(json!({"name": "mine"}))), 201);
+        refused(json!({"recording": "mine"}), 409, "recording-active");
+        assert_eq!(stack.http("GET", "/diagnoses/t1-none", None).unwrap().0, 404);
+        assert_eq!(stack.http("DELETE", "/diagnoses/t1-none", None).unwrap().0, 404);
+        assert_eq!(stack.expect("GET", "/diagnoses", None), json!([]));
+    });
+    // Nothing was ever heard of the thruster: there is nothing to diagnose.
+    let site = Site::new();
+    let mut gateway = site.spawn("gateway");
+    let answer = wait("an answer", || {
+        let agent: ureq::Agent = ureq::Agent::config_builder().http_status_as_error(false).build().into();
+        let url = format!("http://127.0.0.1:{}/v1/thrusters/t1/diagnoses", site.port);
+        let mut answer = agent.post(url).send_empty().ok()?;
+        serde_json::from_str::<Value>(&answer.body_mut().read_to_string().ok()?).ok()
+    });
+    kill(gateway.id(), "TERM");
+    let _ = gateway.wait();
+    assert_eq!(answer["type"], "urn:kort:problem:no-recording", "{answer}");
+}
