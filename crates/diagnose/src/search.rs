@@ -23,6 +23,8 @@ const MOST_EFFECTS: usize = 8;
 const SCREEN_DOUBT: f64 = 0.15;
 /// Iterations of an exact fit.
 const ITERATIONS: usize = 12;
+/// Steps of a fit by which its forms are compared.
+const FIRST_STEPS: usize = 4;
 /// Forms are changed as long as that lowers a cost by this.
 const ENOUGH: f64 = 0.3;
 
@@ -208,17 +210,18 @@ impl<'a, 'p> Search<'a, 'p> {
             if !self.reshaped.insert((set.clone(), before.to_bits())) {
                 return;
             }
-            let fitted: Vec<Fit> = self
+            // A few steps tell which form is worth a fit to the end.
+            let best = self
                 .other_forms(from)
                 .par_iter()
                 .map(|members| {
                     let (hypothesis, columns) = self.problem.recompose(from, members);
-                    self.problem.settle(&hypothesis, &columns, &from.actions, ITERATIONS)
+                    self.problem.finish(self.problem.fit(&hypothesis, &columns, &from.actions, FIRST_STEPS))
                 })
-                .collect();
-            for fit in fitted {
-                self.keep(set.clone(), fit);
-            }
+                .min_by(|a, b| a.cost().total_cmp(&b.cost()));
+            let Some(best) = best.filter(|fit| fit.cost() < before + self.constants.rivals) else { return };
+            let fit = self.problem.settle(&best.resume(), &best.columns, &best.actions, ITERATIONS);
+            self.keep(set.clone(), fit);
             if self.fits[set].cost() > before - ENOUGH {
                 return;
             }
