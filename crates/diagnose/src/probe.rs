@@ -32,8 +32,7 @@ impl Probe {
 }
 
 /// In how many ways an effect may act here: its forms, for each whole number that a fit holds (an order of the shaft's
-/// angle). A set with one of them has that share of the effect's prior, or the many would be had for nothing. Forms
-/// of what does nothing here are none.
+/// angle). Forms of what does nothing here are none.
 pub fn ways(effect: &Descriptor, scale: &Scale, probes: &[Probe]) -> usize {
     let specs = (effect.parameters)(scale);
     let acts = |j: &usize| {

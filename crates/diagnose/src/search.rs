@@ -65,7 +65,11 @@ impl<'a, 'p> Search<'a, 'p> {
 
     /// Cost of a set: of its fit, and of the prior odds of each effect.
     pub fn cost(&self, set: &Set) -> f64 {
-        self.fits.get(set).map_or(f64::INFINITY, |fit| fit.cost() + 2.0 * self.temper * self.rarity(set))
+        self.fits.get(set).map_or(f64::INFINITY, |fit| fit.cost() + self.prior(set))
+    }
+
+    fn prior(&self, set: &Set) -> f64 {
+        set.iter().map(|id| self.price_of(id)).sum()
     }
 
     /// What speaks against a set before any data, as a natural logarithm.
@@ -73,22 +77,27 @@ impl<'a, 'p> Search<'a, 'p> {
         set.iter().map(|id| self.rarity_of(id)).sum()
     }
 
-    /// An effect is one of the catalogue, more or less common, in one of the ways in which it may act. What has no name is as likely as one of them,
+    /// An effect is one of the catalogue, more or less common. What has no name is as likely as one of them,
     /// at one of the places where it may be.
     fn rarity_of(&self, id: &str) -> f64 {
         if is_term(id) {
             return (TERMS.len() as f64).ln();
         }
+        let commonness = self.descriptor(id).map_or(1.0, |d| d.commonness);
+        (self.effects.len().max(1) as f64 / commonness).ln()
+    }
+
+    /// What a choice among the ways in which an effect may act costs, on the scale on which a fit prices its numbers:
+    /// an order of the shaft's angle is a number that happens to be whole.
+    fn choice_of(&self, id: &str) -> f64 {
         let place = self.effects.iter().position(|e| e.id == id);
-        let commonness = place.map_or(1.0, |k| self.effects[k].commonness);
-        let ways = place.and_then(|k| self.ways.get(k)).copied().unwrap_or(1);
-        ((self.effects.len().max(1) * ways) as f64 / commonness).ln()
+        2.0 * place.and_then(|k| self.ways.get(k)).map_or(0.0, |ways| (*ways as f64).ln())
     }
 
     /// What one more member adds to a cost before any data. Costs are tempered as a whole where they become
-    /// odds, so a logarithm of the prior counts that much more among them.
+    /// odds, so the logarithm of its prior odds counts that much more among them.
     pub fn price_of(&self, id: &str) -> f64 {
-        2.0 * self.temper * self.rarity_of(id)
+        2.0 * self.temper * self.rarity_of(id) + self.choice_of(id)
     }
 
     /// An effect or term of any set.
@@ -326,7 +335,7 @@ impl<'a, 'p> Search<'a, 'p> {
         let screened = &self.screens[set];
         let best = screened.first().map_or(f64::INFINITY, |s| s.cost);
         let doubt = self.doubt(parent.cost() - best);
-        let prior = 2.0 * self.temper * self.rarity(set);
+        let prior = self.prior(set);
         let chosen: Vec<&Screened> = screened
             .iter()
             .take(self.constants.exact)
