@@ -7,13 +7,14 @@ use kort_proto::signals::{SIGNALS, Signals};
 pub struct Thin {
     period_ns: u64,
     due_ns: u64,
+    last_ns: u64,
     row: Signals,
 }
 
 impl Thin {
     /// At most so many rows a second.
     pub fn new(rate_hz: f64) -> Thin {
-        Thin { period_ns: (1e9 / rate_hz) as u64, due_ns: 0, row: Signals::UNKNOWN }
+        Thin { period_ns: (1e9 / rate_hz) as u64, due_ns: 0, last_ns: 0, row: Signals::UNKNOWN }
     }
 
     /// Takes a sample; gives a row where one is due.
@@ -23,6 +24,12 @@ impl Thin {
             if !value.is_nan() {
                 (signal.set)(&mut self.row, value);
             }
+        }
+        // On another clock than before, or after a gap, the rows begin anew with this sample.
+        let begins = time_ns < self.last_ns || time_ns >= self.due_ns + self.period_ns;
+        self.last_ns = time_ns;
+        if begins {
+            self.due_ns = time_ns;
         }
         // The servo's period need not divide ours: a row may come a little early, and none is made up for ticks
         // that were skipped.
