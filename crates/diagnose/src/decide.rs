@@ -165,6 +165,20 @@ mod tests {
     }
 
     #[test]
+    fn beside_more_than_noise_a_name_is_stated_lower_and_still_believed() {
+        let costs: &[(&[&'static str], f64)] = &[(&["windage_drag"], 0.0), (&[], 80.0)];
+        let usual = Circumstances { beside_unknown: 0.75, ..Circumstances::default() };
+        let much = Circumstances { more_than_noise: true, ..usual };
+        let (alone, beside) = (decided(costs, usual), decided(costs, much));
+        assert!((beside.named[0].probability - 0.75 * alone.named[0].probability).abs() < 1e-12);
+        // The factor is not counted again where a nameless term stands in the set already.
+        let with_term: &[(&[&'static str], f64)] = &[(&["unknown_shaft_step", "windage_drag"], 0.0)];
+        let (once, twice) = (decided(with_term, usual), decided(with_term, much));
+        assert!((once.named[0].probability - twice.named[0].probability).abs() < 1e-12);
+        assert_eq!(beside.verdict, Verdict::PartlyExplained);
+    }
+
+    #[test]
     fn a_rival_stands_behind_its_place_and_each_names_the_other() {
         let decision = decided(
             &[

@@ -30,7 +30,8 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 };
 
 /// Play of a degree or two at a gear's output is tens of degrees at a motor that turns many times as often; which of
-/// the two sides a rig's numbers belong to is the owner's choice.
+/// the two sides a rig's numbers belong to is the owner's choice. A load much lighter than a fifth of the whole, free for
+/// more than a radian, would be stopped by the water within a tick, which steps of a tick do not follow.
 fn parameters(_: &Scale) -> Vec<Spec> {
     vec![
         Spec::strength("backlash_rad", "rad", 0.1, 0.0, 1.0).sigma(0.15),
