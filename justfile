@@ -24,13 +24,13 @@ soak *SCENARIOS:
 prove *ARGS:
     cargo run --release -- prove --markdown docs/proof.md {{ARGS}}
 
-# the fault campaign: each process killed 1000 times, and the rest of docs/operations.md's table
-faults KILLS="1000":
-    KORT_FAULT_KILLS={{KILLS}} cargo test --test faults -- --nocapture
+# the fault campaign: each process killed 1000 times (for so long at most), and the rest of docs/operations.md's table
+faults KILLS="1000" MINUTES="60" LANES="1":
+    KORT_FAULT_KILLS={{KILLS}} KORT_FAULT_MINUTES={{MINUTES}} KORT_FAULT_LANES={{LANES}} cargo test --test faults -- --nocapture
 
-# 2,000 slow sockets from one peer: how late the servo wakes and how long stop takes, without and with them
-slow-sockets:
-    cargo test --test access slow_sockets -- --nocapture
+# 2,000 slow sockets from one peer: how late the servo wakes and how long stop takes, without and with them in turn
+slow-sockets ROUNDS="5":
+    KORT_SLOW_ROUNDS={{ROUNDS}} cargo test --test access slow_sockets -- --nocapture
 
 # fuzz an entry point: csv, mcap, toml, deployment, bodies, messages or wires (nightly, cargo-fuzz)
 fuzz TARGET SECONDS="60":

@@ -255,32 +255,34 @@ fn slow_sockets_do_not_lock_out_the_stop() {
         let mut stack = Stack::start();
         stack.thrust(40.0, 60_000);
         let port = stack.site.port;
-        let mut watch = stack.watch();
-        let idle = Lateness::of(&mut watch);
-        let slow: Vec<TcpStream> = (0..2000).filter_map(|_| half_a_head(port)).collect();
-        assert!(slow.len() > 1500, "{} sockets", slow.len());
-        let held = Held::begin(port, slow);
-        let beset = Lateness::of(&mut watch);
-        println!("wake-ups of the servo's loop: {idle} alone, {beset} beset");
-        assert!(beset.ticks > 0, "the servo ticks on");
-        let mut took: Vec<Duration> = (0..10)
-            .map(|_| {
+        let rounds = std::env::var("KORT_SLOW_ROUNDS").ok().and_then(|n| n.parse().ok()).unwrap_or(1);
+        let (mut idle, mut beset, mut took) = (Lateness::default(), Lateness::default(), Vec::new());
+        // In turn, so that what others do to the machine falls on both alike.
+        for _ in 0..rounds {
+            let mut watch = stack.watch();
+            idle.look(&mut watch);
+            let slow: Vec<TcpStream> = (0..2000).filter_map(|_| half_a_head(port)).collect();
+            assert!(slow.len() > 1500, "{} sockets", slow.len());
+            let held = Held::begin(port, slow);
+            beset.look(&mut watch);
+            took.extend((0..10).map(|_| {
                 let began = Instant::now();
                 assert_eq!(ask(port, "POST", "/v1/stop", &[], "").0, 200);
                 began.elapsed()
-            })
-            .collect();
+            }));
+            drop(held.end());
+        }
+        println!("wake-ups of the servo's loop: {idle} alone, {beset} beset");
         took.sort();
-        let slow = held.end();
-        println!("stop among {} slow sockets: median {:?}, worst {:?}", slow.len(), took[5], took[9]);
-        // A bound in time only so wide that a loaded machine keeps it; the aim is 100 ms.
-        assert!(took[5] < Duration::from_millis(1000), "{took:?}");
+        let (median, worst) = (took[took.len() / 2], took[took.len() - 1]);
+        println!("stop among 2000 slow sockets, {} times: median {median:?}, worst {worst:?}", took.len());
+        // It waits for no tick of the controller. The worst is printed: what the machine does to it is not asserted.
+        assert!(median < Duration::from_nanos(common::PERIOD_NS), "{took:?}");
         wait("those that wait to be ended", || {
             let metrics = stack.text("/metrics")?;
             let line = metrics.lines().find(|line| line.starts_with("kort_connections_open "))?;
             (line.rsplit(' ').next()?.parse::<f64>().ok()? < 20.0).then_some(())
         });
-        drop(slow);
     });
 }
 
@@ -350,36 +352,38 @@ impl Held {
     }
 }
 
-/// How late the servo's loop wakes, over some seconds. A figure to print: what the machine does to it is not asserted.
+/// How late the servo's loop wakes. A figure to print: what the machine does to it is not asserted.
+#[derive(Default)]
 struct Lateness {
-    ticks: usize,
-    p50_us: f64,
-    p99_us: f64,
+    late_ns: Vec<u64>,
 }
 
 impl Lateness {
-    fn of(watch: &mut common::Watch) -> Self {
+    /// Looks on for some seconds.
+    fn look(&mut self, watch: &mut common::Watch) {
         let from_ns = watch.next().time_ns;
-        let mut late_ns = Vec::new();
+        let before = self.late_ns.len();
         loop {
             let t = watch.next();
             // What was on its way before is not of this time.
             if t.time_ns < from_ns + 100_000_000 {
                 continue;
             }
-            late_ns.push(t.timing.lateness_ns);
+            self.late_ns.push(t.timing.lateness_ns);
             if t.time_ns > from_ns + 4_000_000_000 {
                 break;
             }
         }
-        late_ns.sort_unstable();
-        let share_us = |share: f64| late_ns[(share * (late_ns.len() - 1) as f64) as usize] as f64 * 1e-3;
-        Self { ticks: late_ns.len(), p50_us: share_us(0.5), p99_us: share_us(0.99) }
+        assert!(self.late_ns.len() > before, "the servo ticks on");
     }
 }
 
 impl std::fmt::Display for Lateness {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "median {:.0} us, p99 {:.0} us late", self.p50_us, self.p99_us)
+        let mut late_ns = self.late_ns.clone();
+        late_ns.sort_unstable();
+        let share_us = |share: f64| late_ns[(share * (late_ns.len() - 1) as f64) as usize] as f64 * 1e-3;
+        let (p50, p99, p999) = (share_us(0.5), share_us(0.99), share_us(0.999));
+        write!(f, "median {p50:.1} us, p99 {p99:.1} us, p99.9 {p999:.1} us late")
     }
 }

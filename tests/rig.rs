@@ -125,6 +125,17 @@ fn a_revision_is_taken_under_way_and_gone_back_from() {
             let kinds: Vec<&str> = events.as_array()?.iter().filter_map(|e| e["kind"].as_str()).collect();
             (kinds.contains(&"rig_changed") && kinds.contains(&"rig_rolled_back")).then_some(())
         });
+
+        // The metrics count with the motor of the rig in force: 3 A through 10 ohm of winding show.
+        let power_w = || {
+            let metrics = stack.text("/metrics")?;
+            let line = metrics.lines().find(|line| line.starts_with("kort_motor_power_watts{"))?;
+            line.rsplit(' ').next()?.parse::<f64>().ok()
+        };
+        let before_w = wait("the power", power_w);
+        let wound = RIG.replacen("[amplifier]", "winding_resistance_ohm = 10.0\n\n[amplifier]", 1);
+        stack.expect("POST", "/rig", Some(json!({"toml": wound})));
+        wait("the winding's loss in the power", || power_w().filter(|power_w| *power_w > 1.3 * before_w));
     });
 }
 

@@ -7,7 +7,7 @@ use kort_proto::transport::monotonic_ns;
 
 use rustix::process::{Pid, Signal, kill_process};
 
-use crate::common::{PERIOD_NS, Site, Stack, at_zero, run, wait};
+use crate::common::{PERIOD_NS, Site, Stack, at_zero, in_real_time, run, wait};
 use crate::table::Table;
 
 const LEASE_MS: u64 = 60_000;
@@ -27,48 +27,82 @@ fn kill(process: u32, signal: Signal) {
     kill_process(pid, signal).expect("it is there");
 }
 
-fn kills() -> usize {
-    std::env::var("KORT_FAULT_KILLS").ok().and_then(|n| n.parse().ok()).unwrap_or(12)
+/// What the campaign was asked for by the environment.
+fn asked(name: &str) -> Option<usize> {
+    std::env::var(name).ok().and_then(|n| n.parse().ok())
 }
+
+/// Kills between two fresh deployments: some at once after another, and some that the supervisor answers later and later.
+const BATCH: usize = 10;
 
 /// A number that looks random and is the same in every run.
 fn scatter(n: usize, below: u64) -> u64 {
     (n as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(31) % below
 }
 
-/// Kill -9 under way, at instants spread over a controller period and more.
+/// Kill -9 under way, at instants spread over a controller period and more. Each process has lanes of its own, side by
+/// side; a batch in which the machine stood still is gone through again.
 pub fn killed(table: &mut Table) {
-    let mut stack = Stack::start();
-    for (role, bound) in [("servo", SUCCESSOR), ("controller", CONTROLLER), ("gateway", GATEWAY)] {
-        let mut measured = Vec::new();
-        for n in 0..kills() {
-            stack.thrust(30.0, LEASE_MS);
-            std::thread::sleep(Duration::from_micros(scatter(n, 60_000)));
-            let mut watch = stack.watch();
-            let session = watch.next().header.session;
-            let victim = stack.process_of(role);
-            let killed_ns = monotonic_ns();
-            kill(victim, Signal::KILL);
-            let zero = match role {
-                "servo" => watch.until("a successor", |t| t.header.session != session),
-                _ => watch.until("zero", at_zero),
-            };
-            assert!(at_zero(&zero), "{role}: {zero:?}");
-            measured.push(Duration::from_nanos(zero.time_ns.saturating_sub(killed_ns)));
-            wait("the fault to be shown", || {
-                let faults = stack.state()?["faults"].as_array()?.len();
-                (faults > 0).then_some(())
-            });
-            wait("a successor", || stack.process(role).filter(|pid| *pid != victim));
-            stack.wait_until_up();
-        }
-        let what = match role {
-            "servo" => "successor at zero, fault latched",
-            "controller" => "zero torque, fault latched",
-            _ => "ramped to zero, fault latched",
+    let (kills, lanes) = (asked("KORT_FAULT_KILLS").unwrap_or(12), asked("KORT_FAULT_LANES").unwrap_or(1));
+    let end = asked("KORT_FAULT_MINUTES").map(|m| Instant::now() + Duration::from_secs(60 * m as u64));
+    let roles = [
+        ("servo", "successor at zero, fault latched", SUCCESSOR),
+        ("controller", "zero torque, fault latched", CONTROLLER),
+        ("gateway", "ramped to zero, fault latched", GATEWAY),
+    ];
+    let measured = std::thread::scope(|scope| {
+        let lane = |role, at: usize| {
+            let numbers: Vec<usize> = (0..kills).skip(at).step_by(lanes.max(1)).collect();
+            scope.spawn(move || {
+                let in_time = |_: &&[usize]| end.is_none_or(|end| Instant::now() < end);
+                let batches = numbers.chunks(BATCH).take_while(in_time);
+                batches.flat_map(|batch| killed_at(role, batch)).collect::<Vec<_>>()
+            })
         };
+        let lanes = roles.map(|(role, ..)| (0..lanes.max(1)).map(|at| lane(role, at)).collect::<Vec<_>>());
+        lanes.map(|lanes| {
+            let ended = lanes.into_iter().map(|lane| lane.join());
+            ended
+                .flat_map(|lane| lane.unwrap_or_else(|why| std::panic::resume_unwind(why)))
+                .collect::<Vec<_>>()
+        })
+    });
+    for ((role, what, bound), measured) in roles.into_iter().zip(measured) {
         table.row(format!("{role} killed (-9)"), what, bound, &measured);
     }
+}
+
+/// What each of these kills of a process took, on a deployment of its own.
+fn killed_at(role: &str, numbers: &[usize]) -> Vec<Duration> {
+    let measured = std::cell::RefCell::new(Vec::new());
+    in_real_time(|| {
+        let mut stack = Stack::start();
+        *measured.borrow_mut() = numbers.iter().map(|n| kill_once(&mut stack, role, *n)).collect();
+    });
+    measured.into_inner()
+}
+
+/// Kills a process under way; how long it took until the thruster was at zero.
+fn kill_once(stack: &mut Stack, role: &str, n: usize) -> Duration {
+    stack.thrust(30.0, LEASE_MS);
+    std::thread::sleep(Duration::from_micros(scatter(n, 60_000)));
+    let mut watch = stack.watch();
+    let session = watch.next().header.session;
+    let victim = stack.process_of(role);
+    let killed_ns = monotonic_ns();
+    kill(victim, Signal::KILL);
+    let zero = match role {
+        "servo" => watch.until("a successor", |t| t.header.session != session),
+        _ => watch.until("zero", at_zero),
+    };
+    assert!(at_zero(&zero), "{role}: {zero:?}");
+    wait("the fault to be shown", || {
+        let faults = stack.state()?["faults"].as_array()?.len();
+        (faults > 0).then_some(())
+    });
+    wait("a successor", || stack.process(role).filter(|pid| *pid != victim));
+    stack.wait_until_up();
+    Duration::from_nanos(zero.time_ns.saturating_sub(killed_ns))
 }
 
 /// A stopped process is ended and replaced; the thrust ends long before.

@@ -40,6 +40,11 @@ impl Ticker {
         (deadline, missed)
     }
 
+    /// The next deadline on CLOCK_MONOTONIC, ns.
+    pub fn next_ns(&self) -> u64 {
+        self.next_ns
+    }
+
     /// Notes the work of this tick: time since its wake-up.
     pub fn worked(&mut self, woke_ns: u64) {
         self.timing.busy_ns = monotonic_ns().saturating_sub(woke_ns);

@@ -5,8 +5,9 @@
 //! then goes to zero by itself.
 
 mod held;
+mod pulse;
 
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, mpsc};
 use std::time::{Duration, Instant};
 
@@ -24,9 +25,15 @@ use crate::tally::Tally;
 use crate::thruster::{Ask, Thruster};
 use crate::view::{MismatchView, Setpoint};
 use held::Held;
+pub use pulse::{Bell, Pulse};
 
 /// Ports that cannot be opened, or that belong to a past generation, are tried again this often.
 const REOPEN_EVERY: Duration = Duration::from_millis(100);
+
+/// While a request is under way its answer is looked for this often, whatever the heartbeat: a stop waits for no tick.
+const ERRAND_EVERY: Duration = Duration::from_millis(2);
+/// And for so long after the last one, until what was done shows in the telemetry too.
+const ERRANDS_FOR: Duration = Duration::from_millis(100);
 
 /// Below servo and controller, above everything that may wait.
 const PRIORITY: i32 = 60;
@@ -47,37 +54,16 @@ pub struct Link {
     pub ring: Feed,
 }
 
-/// The runtime that answers requests beats too: a gateway that only this thread keeps alive must not look alive.
-#[derive(Debug)]
-pub struct Pulse {
-    began: Instant,
-    beat_ms: AtomicU64,
-}
-
-impl Pulse {
-    /// How often the runtime beats.
-    pub const EVERY: Duration = Duration::from_millis(100);
-    /// A runtime silent for this long hangs.
-    const LIFE: Duration = Duration::from_secs(2);
-
-    /// Beats now.
-    pub fn new() -> Pulse {
-        Pulse { began: Instant::now(), beat_ms: AtomicU64::new(0) }
-    }
-
-    /// The runtime beats.
-    pub fn beat(&self) {
-        self.beat_ms.store(self.began.elapsed().as_millis() as u64, Ordering::Relaxed);
-    }
-
-    fn alive(&self) -> bool {
-        let last = Duration::from_millis(self.beat_ms.load(Ordering::Relaxed));
-        self.began.elapsed().saturating_sub(last) < Pulse::LIFE
-    }
-}
-
-/// Runs until `stop` is set.
-pub fn run(deployment: &Deployment, links: Vec<Link>, recorder: &Recorder, pulse: &Pulse, stop: &AtomicBool) {
+/// Runs until `stop` is set; the bell wakes it.
+pub fn run(
+    deployment: &Deployment,
+    links: Vec<Link>,
+    recorder: &Recorder,
+    pulse: &Pulse,
+    bell: &Bell,
+    stop: &AtomicBool,
+) {
+    bell.hang();
     for warning in realtime(PRIORITY, false) {
         tracing::warn!("{warning}");
     }
@@ -91,7 +77,24 @@ pub fn run(deployment: &Deployment, links: Vec<Link>, recorder: &Recorder, pulse
             bridge.link.tally.gateway_timing(&ticker.timing);
         }
         ticker.worked(woke_ns);
+        run_errands(&mut bridges, recorder, ticker.next_ns());
         ticker.wait();
+    }
+}
+
+/// Until the next tick: hands on requests that come, and looks for what came of them.
+fn run_errands(bridges: &mut [Bridge], recorder: &Recorder, until_ns: u64) {
+    loop {
+        let left = Duration::from_nanos(until_ns.saturating_sub(monotonic_ns()));
+        if left.is_zero() {
+            return;
+        }
+        let now = Instant::now();
+        let busy = bridges.iter().any(|bridge| bridge.errands_until.is_some_and(|until| until > now));
+        std::thread::park_timeout(if busy { ERRAND_EVERY.min(left) } else { left });
+        for bridge in bridges.iter_mut() {
+            bridge.errand(recorder);
+        }
     }
 }
 
@@ -109,6 +112,8 @@ struct Bridge {
     mismatch_path: u32,
     /// What the thruster did when it was last heard armed.
     before: Option<Before>,
+    /// Until when answers are looked for between two ticks.
+    errands_until: Option<Instant>,
 }
 
 /// A request that waits for its answers.
@@ -133,6 +138,7 @@ impl Bridge {
             latched: [None; 2],
             mismatch_path: 0,
             before: None,
+            errands_until: None,
         }
     }
 
@@ -154,6 +160,20 @@ impl Bridge {
             false => Ok(()),
         });
         self.answer_overdue(now);
+        match sent {
+            Ok(()) => self.ports = Some(ports),
+            Err(error) => self.complain(error),
+        }
+    }
+
+    /// Between two ticks: requests go out and answers come in; nothing is asked of the thruster.
+    fn errand(&mut self, recorder: &Recorder) {
+        let now = Instant::now();
+        let Some(mut ports) = self.ports.take() else { return };
+        let sent = self.send_asks(&mut ports, now);
+        if self.errands_until.is_some_and(|until| until > now) {
+            self.receive(&ports, recorder, now);
+        }
         match sent {
             Ok(()) => self.ports = Some(ports),
             Err(error) => self.complain(error),
@@ -302,6 +322,7 @@ impl Bridge {
         while let Ok(mut ask) = self.link.asks.try_recv() {
             ask.request.id = self.next_ask;
             self.next_ask += 1;
+            self.errands_until = Some(now + ask.within.min(ERRANDS_FOR));
             let request = ask.request;
             self.pending.push(Pending { id: request.id, since: now, ask, replies: Vec::new() });
             ports.request.send(request)?;

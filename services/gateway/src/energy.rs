@@ -18,6 +18,9 @@ pub struct Motor {
 }
 
 impl Motor {
+    /// One of which nothing is known: its power is not either, unless a transducer measures torque.
+    pub const UNKNOWN: Motor = Motor { torque_constant_nm_a: f64::NAN, winding_resistance_ohm: f64::NAN };
+
     /// The motor of a rig, as stated.
     pub fn of(rig: &Rig) -> Motor {
         Motor {
@@ -53,6 +56,11 @@ impl Energy {
     /// Nothing yet.
     pub fn new(motor: Motor) -> Energy {
         Energy { motor, last: None, power: Window::new(WINDOW_NS), taken_j: 0.0, returned_j: 0.0 }
+    }
+
+    /// The motor's figures are others from now on; what was summed up stays.
+    pub fn set_motor(&mut self, motor: Motor) {
+        self.motor = motor;
     }
 
     /// One more sample, taken at `now_ns`. The mean of two neighbours acts between them.

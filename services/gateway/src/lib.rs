@@ -51,7 +51,7 @@ use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::watch;
 use utoipa::openapi::OpenApi;
 
-use bus::Pulse;
+use bus::{Bell, Pulse};
 use connections::Connections;
 use diagnosis::Diagnoses;
 use durations::Durations;
@@ -361,13 +361,21 @@ async fn serve(
         document: OnceLock::new(),
         patterns: OnceLock::new(),
     };
+    let bell = Arc::new(Bell::default());
     let mut links = Vec::new();
     for deployed in thrusters {
-        let Deployed { id, range, heartbeat, servo_silence, motor, .. } = &deployed;
-        let (thruster, asks) = Thruster::new(id, *range, *servo_silence, Arc::clone(&events));
-        let (thruster, tally, heartbeat) = (Arc::new(thruster), Arc::new(Tally::new(*motor)), *heartbeat);
-        let rig = RigDesk::open(&settings.rigs, Arc::clone(&thruster), deployment.clone(), deployed)
-            .map_err(|error| GatewayError::Rigs { folder: settings.rigs.clone(), error })?;
+        let Deployed { id, range, heartbeat, servo_silence, .. } = &deployed;
+        let (thruster, asks) =
+            Thruster::new(id, *range, *servo_silence, Arc::clone(&bell), Arc::clone(&events));
+        let (thruster, tally, heartbeat) = (Arc::new(thruster), Arc::new(Tally::new()), *heartbeat);
+        let rig = RigDesk::open(
+            &settings.rigs,
+            Arc::clone(&thruster),
+            Arc::clone(&tally),
+            deployment.clone(),
+            deployed,
+        )
+        .map_err(|error| GatewayError::Rigs { folder: settings.rigs.clone(), error })?;
         app.rigs.push(Arc::new(rig));
         let (feed, ring) = ring::start(&settings.diagnosis)?;
         app.rings.push(ring);
@@ -387,7 +395,7 @@ async fn serve(
         let (recorder, pulse, stop) = (Arc::clone(&recorder), Arc::clone(&pulse), Arc::clone(&stop_bus));
         std::thread::Builder::new()
             .name("bus".into())
-            .spawn(move || bus::run(&deployment, links, &recorder, &pulse, &stop))?
+            .spawn(move || bus::run(&deployment, links, &recorder, &pulse, &bell, &stop))?
     };
 
     tokio::spawn(async move {

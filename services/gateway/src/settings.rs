@@ -10,7 +10,6 @@ use kort_thruster::rig::{AmplifierKind, Rig};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer};
 
-use crate::energy::Motor;
 use crate::hosts;
 use crate::view::SetpointRange;
 
@@ -226,8 +225,6 @@ pub struct Deployed {
     pub range: SetpointRange,
     /// Period at which its setpoint is sent anew: the controller's.
     pub heartbeat: Duration,
-    /// What turns its measured signals into power.
-    pub motor: Motor,
     /// Kind of its drive.
     pub drive: AmplifierKind,
     /// Largest shaft speed that the configuration allows, rad/s.
@@ -271,7 +268,6 @@ pub fn thrusters(config: &Config) -> Result<Vec<Deployed>, ConfigError> {
             let servo_silence = Duration::from_nanos(
                 (5 * thruster.servo_period_ns()).max(2 * thruster.controller_period_ns()),
             );
-            let motor = Motor::of(&rig);
             let drive = rig.amplifier.kind;
             Ok(Deployed {
                 id: id.clone(),
@@ -279,7 +275,6 @@ pub fn thrusters(config: &Config) -> Result<Vec<Deployed>, ConfigError> {
                 servo_silence,
                 range,
                 heartbeat,
-                motor,
                 drive,
                 speed_limit_rad_s,
             })

@@ -35,8 +35,8 @@ pub struct Counts {
 }
 
 impl Tally {
-    /// Nothing counted yet.
-    pub fn new(motor: Motor) -> Tally {
+    /// Nothing counted yet; of the motor nothing is known.
+    pub fn new() -> Tally {
         Tally(Mutex::new(Counts {
             signals: vec![Window::new(WINDOW_NS); SIGNALS.len()],
             estimates: vec![Window::new(WINDOW_NS); ESTIMATES.len()],
@@ -45,8 +45,13 @@ impl Tally {
             faults_raised: vec![0; Fault::ALL.len()],
             telemetry: (0, 0),
             gateway: Timing::default(),
-            energy: Energy::new(motor),
+            energy: Energy::new(Motor::UNKNOWN),
         }))
+    }
+
+    /// What samples show is turned into power with this motor from now on: that of the rig in force.
+    pub fn set_motor(&self, motor: Motor) {
+        lock(&self.0).energy.set_motor(motor);
     }
 
     /// One more sample of the servo, `lost` samples after the one before.

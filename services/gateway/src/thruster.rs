@@ -13,6 +13,7 @@ use kort_proto::messages::{ControllerState, Outcome, Process, Reply, Request, Re
 use kort_proto::signals::Kind as SignalKind;
 use tokio::sync::oneshot;
 
+use crate::bus::Bell;
 use crate::desk::{Desk, check_range};
 use crate::events::Events;
 use crate::heard::Heard;
@@ -48,6 +49,8 @@ pub struct Thruster {
     desk: Mutex<Desk>,
     heard: Mutex<Heard>,
     asks: mpsc::SyncSender<Ask>,
+    /// Wakes the bus for a request.
+    bell: Arc<Bell>,
     events: Arc<Events>,
     rendered: Mutex<(Rendered, Bytes)>,
     /// Name and step of the diagnosis that runs, and when it began.
@@ -68,6 +71,7 @@ impl Thruster {
         id: &str,
         range: SetpointRange,
         servo_silence: Duration,
+        bell: Arc<Bell>,
         events: Arc<Events>,
     ) -> (Thruster, mpsc::Receiver<Ask>) {
         let (asks, inbox) = mpsc::sync_channel(64);
@@ -77,6 +81,7 @@ impl Thruster {
             desk: Mutex::new(Desk::new(id)),
             heard: Mutex::new(Heard { servo_silence, ..Heard::default() }),
             asks,
+            bell,
             events,
             diagnosis: Mutex::default(),
             rendered: Mutex::new(((u64::MAX, u64::MAX, false), Bytes::new())),
@@ -319,7 +324,10 @@ impl Thruster {
         let (answer, answers) = oneshot::channel();
         let ask = Ask { request, expects: expects.to_vec(), within, answer };
         let replies = match self.asks.try_send(ask) {
-            Ok(()) => answers.await.unwrap_or_default(),
+            Ok(()) => {
+                self.bell.ring();
+                answers.await.unwrap_or_default()
+            }
             Err(_) => Vec::new(),
         };
         if let Some(reply) = replies.iter().find(|reply| reply.outcome != Outcome::Done as u32) {

@@ -155,13 +155,13 @@ impl Book {
     ///
     /// # Errors
     /// The disk refuses; the book is as before then.
-    pub fn turn_to(&self, number: u32) -> io::Result<()> {
+    pub fn turn_to(&self, number: u32) -> io::Result<Entry> {
         let mut shelf = lock(&self.shelf);
         let mut next = shelf.clone();
         next.current = shelf.revisions.iter().position(|(e, _)| e.number == number).unwrap_or(shelf.current);
         self.write(&next)?;
         *shelf = next;
-        Ok(())
+        Ok(shelf.revisions[shelf.current].0.clone())
     }
 
     fn write(&self, shelf: &Shelf) -> io::Result<()> {

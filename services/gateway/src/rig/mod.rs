@@ -19,8 +19,10 @@ use serde::Serialize;
 use tokio::sync::Mutex;
 use utoipa::ToSchema;
 
+use crate::energy::Motor;
 use crate::problem::{Kind, Problem};
 use crate::settings::Deployed;
+use crate::tally::Tally;
 use crate::thruster::Thruster;
 use crate::view::SetpointRange;
 
@@ -36,6 +38,7 @@ const LOOK_EVERY: Duration = Duration::from_millis(500);
 #[derive(Debug)]
 pub struct RigDesk {
     thruster: Arc<Thruster>,
+    tally: Arc<Tally>,
     deployment: Deployment,
     deployed: Deployed,
     book: Book,
@@ -63,23 +66,39 @@ pub struct Asker {
     pub lease: Option<String>,
 }
 
+/// A text that can be used.
+struct Checked {
+    rig: Rig,
+    /// How far setpoints may go with it.
+    range: SetpointRange,
+}
+
+/// How a revision comes into force.
+enum How {
+    /// As a new entry.
+    Made(Making),
+    /// By going back to the entry of this number.
+    Back(u32),
+}
+
 impl RigDesk {
-    /// Opens the book of a thruster under `folder`, and lets setpoints go as far as the revision in force allows.
+    /// Opens the book of a thruster under `folder`, and follows the revision in force.
     ///
     /// # Errors
     /// The folder cannot be read or written.
     pub fn open(
         folder: &Path,
         thruster: Arc<Thruster>,
+        tally: Arc<Tally>,
         deployment: Deployment,
         deployed: Deployed,
     ) -> io::Result<RigDesk> {
         let name = |text: &str| Rig::from_toml(text).map(|rig| rig.name).unwrap_or_default();
         let (_, text) = &deployed.rig;
         let book = Book::open(&folder.join(&deployed.id), text, &name(text))?;
-        let desk = RigDesk { thruster, deployment, deployed, book, turn: Mutex::new(()) };
-        if let Ok(range) = desk.check(&desk.book.current().1).map(|(_, range)| range) {
-            desk.thruster.set_range(range);
+        let desk = RigDesk { thruster, tally, deployment, deployed, book, turn: Mutex::new(()) };
+        if let Ok(checked) = desk.check(&desk.book.current().1) {
+            desk.follow(&checked);
         }
         Ok(desk)
     }
@@ -110,33 +129,18 @@ impl RigDesk {
     ) -> Result<Revised, Problem> {
         let _turn = self.turn.lock().await;
         let (before, text_before) = self.book.current();
-        let (rig, range) = self.check(text)?;
-        let difference = difference::between(&text_before, text);
+        let checked = self.check(text)?;
         if dry_run || *text_before == *text {
+            let difference = difference::between(&text_before, text);
             return Ok(Revised { applied: false, in_force: before, difference });
         }
-        self.thruster.desk().may(asker.lease.as_deref(), Instant::now())?;
-        self.thruster.ready()?;
-        self.book.keep(text).map_err(|error| self.not_kept(&error))?;
-        self.take_over(text).await?;
-        let entered = self.book.enter(text, &rig.name, making);
-        let in_force = self.or_back(entered, &text_before).await?;
-        self.thruster.set_range(range);
-        let words = format!(
-            "put revision {} of the rig in force ({}, from {}): {}",
-            in_force.number,
-            in_force.revision,
-            in_force.source,
-            difference::words(&difference)
-        );
-        self.thruster.did(&asker.who, asker.lease.as_deref(), EventKind::RigChanged, &words);
-        Ok(Revised { applied: true, in_force, difference })
+        self.put_in_force(asker, text, checked, How::Made(making)).await
     }
 
     /// Goes back to the revision that was in force before this one.
     pub async fn roll_back(&self, asker: &Asker) -> Result<Revised, Problem> {
         let _turn = self.turn.lock().await;
-        let (now, text_now) = self.book.current();
+        let (now, _) = self.book.current();
         let back = now.before.and_then(|number| self.book.revision(number)).ok_or_else(|| {
             Problem::new(
                 Kind::Refused,
@@ -144,23 +148,56 @@ impl RigDesk {
             )
             .hint("GET …/rig/revisions lists every revision; POST …/rig puts any of them in force")
         })?;
-        let (in_force, text) = back;
-        let (_, range) = self.check(&text)?;
+        let (entry, text) = back;
+        let checked = self.check(&text)?;
+        self.put_in_force(asker, &text, checked, How::Back(entry.number)).await
+    }
+
+    /// Takes a checked text over, notes it down, follows it, and tells. What cannot be noted down is taken back.
+    async fn put_in_force(
+        &self,
+        asker: &Asker,
+        text: &str,
+        checked: Checked,
+        how: How,
+    ) -> Result<Revised, Problem> {
         self.thruster.desk().may(asker.lease.as_deref(), Instant::now())?;
         self.thruster.ready()?;
-        self.take_over(&text).await?;
-        self.or_back(self.book.turn_to(in_force.number), &text_now).await?;
-        self.thruster.set_range(range);
-        let difference = difference::between(&text_now, &text);
-        let words = format!(
-            "went back from revision {} of the rig to {} ({}): {}",
-            now.number,
-            in_force.number,
-            in_force.revision,
-            difference::words(&difference)
-        );
-        self.thruster.did(&asker.who, asker.lease.as_deref(), EventKind::RigRolledBack, &words);
+        let (before, text_before) = self.book.current();
+        self.book.keep(text).map_err(|error| self.not_kept(&error))?;
+        self.take_over(text).await?;
+        let back = matches!(how, How::Back(_));
+        let noted = match how {
+            How::Made(making) => self.book.enter(text, &checked.rig.name, making),
+            How::Back(number) => self.book.turn_to(number),
+        };
+        let in_force = match noted {
+            Ok(entry) => entry,
+            Err(error) => {
+                self.take_over(&text_before).await?;
+                return Err(self.not_kept(&error));
+            }
+        };
+        self.follow(&checked);
+        let Entry { number, revision, source, .. } = &in_force;
+        let difference = difference::between(&text_before, text);
+        let differs = difference::words(&difference);
+        let (kind, words) = if back {
+            let words =
+                format!("went back from revision {} of the rig to {number} ({revision})", before.number);
+            (EventKind::RigRolledBack, words)
+        } else {
+            let words = format!("put revision {number} of the rig in force ({revision}, from {source})");
+            (EventKind::RigChanged, words)
+        };
+        self.thruster.did(&asker.who, asker.lease.as_deref(), kind, &format!("{words}: {differs}"));
         Ok(Revised { applied: true, in_force, difference })
+    }
+
+    /// What this gateway itself knows of the rig: how far setpoints go, and what its motor takes.
+    fn follow(&self, checked: &Checked) {
+        self.thruster.set_range(checked.range);
+        self.tally.set_motor(Motor::of(&checked.rig));
     }
 
     /// Sees to it that the controller runs on the revision in force: one that was restarted begins with the
@@ -195,8 +232,8 @@ impl RigDesk {
         }
     }
 
-    /// Checks a text as `kort check` and the controller do; the rig, and how far setpoints may go with it.
-    fn check(&self, text: &str) -> Result<(Rig, SetpointRange), Problem> {
+    /// Checks a text as `kort check` and the controller do.
+    fn check(&self, text: &str) -> Result<Checked, Problem> {
         let rig = Rig::from_toml(text).map_err(|error| invalid(&error.to_string()))?;
         let model = ControlModel::from_rig(&rig, self.deployed.heartbeat.as_secs_f64())
             .map_err(|error| invalid(&error.to_string()))?;
@@ -213,7 +250,7 @@ impl RigDesk {
             )
             .hint("a drive of another kind is deployed with the configuration, and needs a restart"));
         }
-        Ok((rig, self.deployed.range_of(&model)))
+        Ok(Checked { range: self.deployed.range_of(&model), rig })
     }
 
     /// Hands a text to the controller and waits until it runs on it.
@@ -230,17 +267,6 @@ impl RigDesk {
             })
             .await;
         Ok(())
-    }
-
-    /// What was put in force but cannot be noted down is taken back.
-    async fn or_back<T>(&self, noted: io::Result<T>, text_before: &str) -> Result<T, Problem> {
-        match noted {
-            Ok(done) => Ok(done),
-            Err(error) => {
-                self.take_over(text_before).await?;
-                Err(self.not_kept(&error))
-            }
-        }
     }
 
     fn not_kept(&self, error: &io::Error) -> Problem {
