@@ -4,12 +4,13 @@
 //!
 //! - a voltage drive by its back-EMF, whatever the load: `Om = (V - R i) / ke`;
 //! - any drive that tells its current by the power with which the motor seems to brake: only the water can sustain it,
-//!   and a stream gives no more than Betz's share of what flows through the disc;
+//!   and a stream gives no more than Betz's share of what flows through the disc; a dry shaft gives back no more than
+//!   what turns with it, and what hangs on it, have stored;
 //! - a drive with a speed loop by the speed it was told.
 
 use kort_proto::messages::DriveKind;
 use kort_thruster::parameters::{Parameter, Parameters};
-use kort_thruster::rig::Rig;
+use kort_thruster::rig::{Load, Rig};
 
 use crate::settings::Limits;
 
@@ -32,23 +33,34 @@ const INFLOW_SHARE: f64 = 0.7;
 const BETZ: f64 = 16.0 / 27.0;
 const DUCTED: f64 = 2.0;
 
+/// Slower than this a sensor may only be noisy, or not quite at zero, on a shaft that does not turn.
+const CREEP_RAD_S: f64 = 1.0;
+/// Standard gravity, m/s^2.
+const GRAVITY_M_S2: f64 = 9.806_65;
+
 /// What the shaft sensor is held against.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shaft {
-    /// Inertia, kg m^2.
+    /// Inertia of all that turns with it, kg m^2.
     pub inertia_kg_m2: f64,
     /// The most power with which water can turn the shaft, W; infinite where that is not known.
     pub water_w: f64,
+    /// The most energy that weight or spring on a dry shaft can give back, J.
+    pub stored_j: f64,
+    /// For so long the sensor may still show how the shaft turned before, s.
+    pub lag_s: f64,
 }
 
 impl Shaft {
     /// Of a rig whose largest current and shaft speed are these. Water gives what a stream of `inflow_m_s` carries, or
-    /// one of the thruster's own slipstream; a dry shaft's load is not known.
+    /// one of the thruster's own slipstream; a dry shaft's load only what was put into it.
     pub fn of(rig: &Rig, current_a: f64, speed_rad_s: f64, inflow_m_s: Option<f64>) -> Self {
         let p = Parameters::stated(rig);
         let inertia_kg_m2 = p.get(Parameter::InertiaKgM2);
+        let lag_s = STOPS * rig.sensors.speed_filter_time_constant_s.unwrap_or(0.0);
         if rig.propeller.is_none() {
-            return Self { inertia_kg_m2, water_w: f64::INFINITY };
+            let torque_n_m = p.get(Parameter::TorqueConstantNmA) * current_a;
+            return Self { lag_s, ..Self::dry(&rig.load, inertia_kg_m2, torque_n_m) };
         }
         let flux = p.get(Parameter::DensityKgM3) * p.area_m2();
         let (thrust, torque) = p.bollard_coefficients();
@@ -57,7 +69,30 @@ impl Shaft {
         let slipstream = fastest * (2.0 * thrust / flux).sqrt();
         let inflow = inflow_m_s.unwrap_or(INFLOW_SHARE * slipstream);
         let water_w = DUCTED * BETZ * 0.5 * flux * inflow.powi(3);
-        Self { inertia_kg_m2, water_w: if water_w.is_finite() { water_w } else { f64::INFINITY } }
+        let water_w = if water_w.is_finite() { water_w } else { f64::INFINITY };
+        Self { inertia_kg_m2, water_w, stored_j: 0.0, lag_s }
+    }
+
+    /// Of a motor of this inertia that turns only this load, with this torque at most.
+    fn dry(load: &Load, motor_kg_m2: f64, torque_n_m: f64) -> Self {
+        let (turns_kg_m2, stored_j) = match load {
+            Load::None | Load::Fan { .. } => (0.0, 0.0),
+            Load::Pendulum { mass_kg, length_m } => {
+                let (mass, length) = (mass_kg.value, length_m.value);
+                (mass * length * length, 2.0 * mass * GRAVITY_M_S2 * length)
+            }
+            // Twisted as far as the motor can hold it.
+            Load::TwoMass { inertia_kg_m2, stiffness_nm_rad, .. } => {
+                (inertia_kg_m2.value, 0.5 * torque_n_m * torque_n_m / stiffness_nm_rad.value)
+            }
+            // A weight may run down for as long as the slide is.
+            Load::Slide { mass_kg, lead_m_rev, incline_rad } => {
+                let lead_m = lead_m_rev.value / std::f64::consts::TAU;
+                let stored_j = if incline_rad.value == 0.0 { 0.0 } else { f64::INFINITY };
+                (mass_kg.value * lead_m * lead_m, stored_j)
+            }
+        };
+        Self { inertia_kg_m2: motor_kg_m2 + turns_kg_m2, water_w: 0.0, stored_j, lag_s: 0.0 }
     }
 }
 
@@ -66,6 +101,9 @@ impl Shaft {
 pub struct Direction {
     opposed_s: f64,
     impulse_nm_s: f64,
+    /// Energy that braking seems to have taken off the shaft, beyond what water could give meanwhile, J.
+    braked_j: f64,
+    braking_s: f64,
     fastest_rad_s: f64,
     /// Time since the last reading of the speed.
     gap_s: f64,
@@ -104,22 +142,28 @@ impl Direction {
         speed.abs() > FALLING * self.fastest_rad_s
     }
 
-    /// The motor seems to brake harder than water can drive, for longer than it takes to stop the shaft.
+    /// The motor seems to brake harder than water can drive, for longer than it takes to stop the shaft, and has taken
+    /// off more than what hangs on it can give.
     fn brakes_without_end(&mut self, l: &Limits, speed: f64, current: f64, dt_s: f64) -> bool {
         let (_, torque_constant) = l.winding;
         let torque = torque_constant * current;
         let braking_w = -torque * speed;
-        if braking_w.is_nan() || braking_w <= l.shaft.water_w {
-            self.impulse_nm_s = 0.0;
+        if braking_w.is_nan() || braking_w <= l.shaft.water_w || speed.abs() < CREEP_RAD_S {
+            (self.impulse_nm_s, self.braked_j, self.braking_s) = (0.0, 0.0, 0.0);
             if l.kind != DriveKind::Speed {
                 self.fastest_rad_s = 0.0;
             }
             return false;
         }
         self.fastest_rad_s = self.fastest_rad_s.max(speed.abs());
-        // What the water could give for ever does not count.
-        self.impulse_nm_s += torque.abs() * dt_s * (1.0 - l.shaft.water_w / braking_w);
+        self.braking_s += dt_s;
+        if self.braking_s > l.shaft.lag_s {
+            // What the water could give for ever does not count.
+            self.impulse_nm_s += torque.abs() * dt_s * (1.0 - l.shaft.water_w / braking_w);
+            self.braked_j += (braking_w - l.shaft.water_w) * dt_s;
+        }
         self.impulse_nm_s > STOPS * l.shaft.inertia_kg_m2 * self.fastest_rad_s
+            && self.braked_j > STOPS * l.shaft.stored_j
     }
 }
 
@@ -156,7 +200,7 @@ mod tests {
 
     #[test]
     fn braking_beyond_what_water_gives_trips_once_the_shaft_should_have_stopped() {
-        let shaft = Shaft { inertia_kg_m2: 0.01, water_w: 100.0 };
+        let shaft = Shaft { inertia_kg_m2: 0.01, water_w: 100.0, stored_j: 0.0, lag_s: 0.0 };
         let l = Limits { shaft, winding: (f64::NAN, 1.0), ..limits() };
         // 9 N m against 50 rad/s are 450 W: 350 of them nobody gives. 3 x 0.01 x 50 / 9 x 450 / 350 = 0.214 s.
         assert!(trips_after(l, -50.0, 9.0, 9.0).is_some_and(|ticks| (210..220).contains(&ticks)));

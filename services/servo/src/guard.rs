@@ -239,7 +239,7 @@ pub(crate) mod tests {
             frozen_s: 0.2,
             spike_rad_s: 20.0,
             winding: (f64::NAN, 1.2),
-            shaft: Shaft { inertia_kg_m2: 0.1, water_w: f64::INFINITY },
+            shaft: Shaft { inertia_kg_m2: 0.1, water_w: f64::INFINITY, stored_j: 0.0, lag_s: 0.0 },
         }
     }
 

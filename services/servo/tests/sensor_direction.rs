@@ -1,5 +1,5 @@
-//! A shaft sensor that counts the wrong way round trips on every shipped rig, and an honest one does not: not on hard
-//! reversals, not on a propeller that a stream turns, not with an inertia far from the stated one.
+//! A shaft sensor that counts the wrong way round trips on every shipped rig and on dry ones, and an honest one does not:
+//! not on hard reversals, not on a propeller that a stream turns, not with an inertia far from the stated one.
 
 use std::path::PathBuf;
 
@@ -24,6 +24,26 @@ struct Stand {
     /// The thruster's own slipstream at full drive, m/s.
     slipstream_m_s: f64,
 }
+
+/// A motor of 0.01 kg m^2 without a propeller on a current drive, with what hangs on it.
+fn dry(load: &str) -> Stand {
+    let text = format!(
+        "[rig]\nname = \"dry\"\nclass = \"bench\"\n[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = 0.01\n\
+         torque_constant_nm_a = 0.5\nviscous_friction_nm_s = 0.02\n[amplifier]\nkind = \"current\"\ncurrent_limit_a = 8.0\n\
+         time_constant_s = 0.002\n[sensors]\nspeed_filter_time_constant_s = 0.01\n[load]\n{load}\n"
+    );
+    let file = tempfile::NamedTempFile::new().expect("a file");
+    std::fs::write(file.path(), text).expect("written");
+    stand(&file.path().to_owned())
+}
+
+/// What hangs on dry shafts.
+const LOADS: [&str; 4] = [
+    "kind = \"none\"",
+    "kind = \"fan\"\nfan_coefficient_nm_s2 = 0.0002",
+    "kind = \"pendulum\"\nmass_kg = 1.0\nlength_m = 0.2",
+    "kind = \"two_mass\"\ninertia_kg_m2 = 0.02\nstiffness_nm_rad = 20.0\ndamping_nm_s = 0.02",
+];
 
 /// Every shipped rig.
 fn stands() -> Vec<Stand> {
@@ -107,7 +127,7 @@ impl Stand {
 
 #[test]
 fn an_honest_sensor_trips_nothing() {
-    for stand in stands() {
+    for stand in stands().into_iter().chain(LOADS.map(dry)) {
         for inertia in [0.5, 1.0, 2.5] {
             for inflow in [-0.7, -0.4, 0.0, 0.4, 0.7] {
                 for half_period_s in [0.1, 0.4, 1.5] {
@@ -137,6 +157,25 @@ fn an_honest_sensor_trips_nothing() {
                 let tripped = stand.trips_at(&trial);
                 assert_eq!(tripped, None, "{}: staircase, inflow {inflow}, inertia {inertia}", stand.name);
             }
+        }
+    }
+}
+
+/// Nothing drives a dry shaft but the motor: a reversed sensor shows at any drive that turns it round.
+#[test]
+fn a_reversed_sensor_on_a_dry_shaft_trips_at_a_thirtieth_of_full_drive_too() {
+    for load in LOADS {
+        let stand = dry(load);
+        let swings = load.contains("pendulum");
+        for level in [1.0, -1.0, 1.0 / 30.0] {
+            let trial = Trial { wish: &|_| level, inflow: 0.0, inertia: 1.0, reversed_s: 3.0, until_s: 12.0 };
+            let tripped = stand.trips_at(&trial);
+            println!("{load}, level {level}: {tripped:?}");
+            // A weight that the motor only lifts a little does not turn round: it hangs still, and shows nothing.
+            assert!(
+                tripped.is_some_and(|at| at >= 3.0) || (swings && level.abs() < 0.5),
+                "{load}, level {level}"
+            );
         }
     }
 }

@@ -27,7 +27,7 @@ fn settings() -> Settings {
             frozen_s: 10.0,
             spike_rad_s: 1e9,
             winding: (f64::NAN, 1.2),
-            shaft: crate::direction::Shaft { inertia_kg_m2: 0.1, water_w: f64::INFINITY },
+            shaft: crate::guard::tests::limits().shaft,
         },
     }
 }
