@@ -51,6 +51,31 @@ fn a_recording_of_the_service_is_diagnosed_without_a_rig() {
     });
 }
 
+/// A disk that takes its time to begin a recording, here a pipe that nobody reads, holds up who asked for it, and no more.
+#[test]
+fn a_recording_that_the_disk_holds_up_does_not_touch_the_thrust() {
+    common::in_real_time(|| {
+        let mut stack = Stack::start();
+        stack.thrust(50.0, 60_000);
+        let folder = stack.site.folder.path().join("recordings");
+        let pipe = folder.join(".slow.draft");
+        assert!(run(Command::new("mkfifo").arg(&pipe)).status.success());
+        let url = format!("http://127.0.0.1:{}/v1/recordings", stack.site.port);
+        let asked = std::thread::spawn(move || ureq::post(url).send_json(json!({"name": "slow"})).is_ok());
+        wait("the file", || folder.join("slow.mcap").is_file().then_some(()));
+        let mut watch = stack.watch();
+        let from_ns = watch.next().time_ns;
+        // Longer than a gateway may be silent, and than the setpoint then takes to zero.
+        watch.until("a second", |t| {
+            assert!(t.armed == 1 && t.faults == 0, "{t:?}");
+            t.time_ns > from_ns + 1_200_000_000
+        });
+        assert!(!asked.is_finished(), "the disk still holds it up");
+        std::fs::read(&pipe).expect("what it writes");
+        assert!(asked.join().unwrap(), "it runs after all");
+    });
+}
+
 /// kill -9 of the gateway: another's reader finds all but the last second, with setpoint, law, limits, faults, events,
 /// rig, and the estimates with their standard errors.
 #[test]

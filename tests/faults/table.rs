@@ -15,6 +15,8 @@ struct Row {
     worst: f64,
     slack: f64,
     times: usize,
+    /// How many of them were beyond the bound.
+    beyond: usize,
 }
 
 impl Table {
@@ -42,7 +44,8 @@ impl Table {
         // other tests.
         let slack = 2e-6 * crate::common::PERIOD_NS as f64;
         let (fault, bound) = (fault.into(), ms(bound));
-        self.0.push(Row { fault, what, unit: "ms", bound, worst, slack, times: measured.len() });
+        let beyond = measured.iter().filter(|time| ms(**time) > bound).count();
+        self.0.push(Row { fault, what, unit: "ms", bound, worst, slack, times: measured.len(), beyond });
     }
 
     /// Notes another quantity that a fault must not let grow beyond its bound.
@@ -54,7 +57,8 @@ impl Table {
         bound: f64,
         worst: f64,
     ) {
-        self.0.push(Row { fault: fault.into(), what, unit, bound, worst, slack: 0.0, times: 1 });
+        let beyond = usize::from(worst > bound);
+        self.0.push(Row { fault: fault.into(), what, unit, bound, worst, slack: 0.0, times: 1, beyond });
     }
 
     /// Does every bound hold?
@@ -65,11 +69,11 @@ impl Table {
 
 impl fmt::Display for Table {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "| fault | what follows | promised | worst | times |")?;
-        writeln!(f, "| --- | --- | --- | --- | --- |")?;
-        for Row { fault, what, unit, bound, worst, times, .. } in &self.0 {
+        writeln!(f, "| fault | what follows | promised | worst | times | beyond |")?;
+        writeln!(f, "| --- | --- | --- | --- | --- | --- |")?;
+        for Row { fault, what, unit, bound, worst, times, beyond, .. } in &self.0 {
             let worst = (worst * 100.0).round() / 100.0;
-            writeln!(f, "| {fault} | {what} | {bound} {unit} | {worst} {unit} | {times} |")?;
+            writeln!(f, "| {fault} | {what} | {bound} {unit} | {worst} {unit} | {times} | {beyond} |")?;
         }
         Ok(())
     }

@@ -98,6 +98,8 @@ pub struct Recorder {
     folder: PathBuf,
     limits: RecordingLimits,
     running: Mutex<Vec<Running>>,
+    /// Held by whoever starts one.
+    starting: Mutex<()>,
     /// What became of recordings, where the disk would not take it.
     unwritten: Mutex<BTreeMap<String, RecordingInfo>>,
     before: Mutex<BTreeMap<String, Totals>>,
@@ -135,6 +137,7 @@ impl Recorder {
             folder: folder.to_owned(),
             limits,
             running: Mutex::default(),
+            starting: Mutex::default(),
             unwritten: Mutex::default(),
             before: Mutex::default(),
             events: OnceLock::new(),
@@ -165,8 +168,9 @@ impl Recorder {
     ) -> Result<RecordingInfo, Problem> {
         let now = SystemTime::now();
         self.reap();
-        let mut running = lock(&self.running);
-        if running.len() >= AT_ONCE {
+        // The list itself is not held while the disk works: the bus hands out samples by it.
+        let _one_at_a_time = lock(&self.starting);
+        if lock(&self.running).len() >= AT_ONCE {
             return Err(Problem::new(Kind::RecordingActive, format!("{AT_ONCE} recordings are running"))
                 .hint("DELETE /v1/recordings/{name} stops one"));
         }
@@ -176,8 +180,9 @@ impl Recorder {
             let stamp = humantime::format_rfc3339_seconds(now).to_string().replace(['-', ':'], "");
             format!("{thruster}-{stamp}")
         });
-        let taken = self.file(&name, "json").exists() || running.iter().any(|other| other.name == name);
-        if taken || (!chosen && running.iter().any(|other| other.thruster == thruster)) {
+        let runs = |is: &dyn Fn(&Running) -> bool| lock(&self.running).iter().any(is);
+        let taken = self.file(&name, "json").exists() || runs(&|other| other.name == name);
+        if taken || (!chosen && runs(&|other| other.thruster == thruster)) {
             let hint = "choose another name; a second recording of a thruster needs a name of its own";
             return Err(Problem::new(
                 Kind::RecordingActive,
@@ -208,8 +213,8 @@ impl Recorder {
             .name("record".into())
             .spawn(move || job.run(&theirs, &inbox))
             .map_err(|error| failed(&error))?;
-        running.push(Running { name: name.clone(), thruster, items, info: shared, thread });
-        drop(running);
+        let running = Running { name: name.clone(), thruster, items, info: shared, thread };
+        lock(&self.running).push(running);
         self.tell(
             EventKind::RecordingStarted,
             &info,
@@ -222,14 +227,16 @@ impl Recorder {
     /// Stops a running recording: its owner's, or anybody's for an admin.
     pub fn stop(&self, name: &str, who: &Identity) -> Result<RecordingInfo, Problem> {
         self.reap();
-        let at = lock(&self.running).iter().position(|running| running.name == name);
-        let Some(at) = at else {
-            return Err(Problem::new(Kind::NoRecording, format!("no recording {name:?} is running"))
-                .hint("POST /v1/recordings starts one"));
+        let running = {
+            let mut all = lock(&self.running);
+            let at = all.iter().position(|running| running.name == name).ok_or_else(|| {
+                Problem::new(Kind::NoRecording, format!("no recording {name:?} is running"))
+                    .hint("POST /v1/recordings starts one")
+            })?;
+            let owner = lock(&all[at].info).owner.clone();
+            may(who, &owner, name)?;
+            all.swap_remove(at)
         };
-        let owner = lock(&lock(&self.running)[at].info).owner.clone();
-        may(who, &owner, name)?;
-        let running = lock(&self.running).swap_remove(at);
         let info = self.settle(running);
         self.tell(
             EventKind::RecordingStopped,
