@@ -16,10 +16,14 @@ const NAME: &str = "any.input";
 const MAP: &str = "[time]\nsource = \"t_ms\"\nunit = \"ms\"\nstale_rows = \"drop\"\n\
     [columns.shaft_speed_rad_s]\nsource = \"n\"\nunit = \"rev/s\"\nsign_of = \"pwm\"\nsign_zero = 1500\n";
 
+/// A map that takes what logs of messages have.
+const MESSAGES: &str =
+    "[time]\nclock = \"log\"\n[columns.shaft_speed_rad_s]\nsource = \"ESC[0].RPM\"\nunit = \"rpm\"\n";
+
 /// A rig for the deployments that are read.
 const RIG: &str = include_str!("../config/thrusters/whitcomb-yoerger-1999.toml");
 
-/// A recording, CSV or MCAP by its first bytes, plain or gzip, alone and through a column map.
+/// A recording or a log of others, by its first bytes, plain or gzip, alone and through column maps, and what is in it.
 pub fn recording(bytes: &[u8]) -> Result<Recording, String> {
     let read = |map: Option<&ColumnMap>| {
         let read = Recording::decode(NAME, bytes, map);
@@ -30,8 +34,13 @@ pub fn recording(bytes: &[u8]) -> Result<Recording, String> {
         }
         read.map_err(|e| located(NAME, e.to_string()))
     };
-    let map = ColumnMap::from_toml("map", MAP).expect("a sound map");
-    let _ = read(Some(&map));
+    for map in [MAP, MESSAGES] {
+        let map = ColumnMap::from_toml("map", map).expect("a sound map");
+        let _ = read(Some(&map));
+    }
+    if let Err(error) = kort_recording::survey(NAME, bytes) {
+        let _ = located(NAME, error.to_string());
+    }
     read(None)
 }
 

@@ -16,6 +16,9 @@ pub(crate) enum Cell<'a> {
     Number(f64),
 }
 
+/// Name of the first column where rows come from a log of messages with a clock of its own.
+pub(crate) const CLOCK: &str = "the log's clock";
+
 /// A point of a settled table shows its measured values this far into its hold.
 const SETTLED_AT: f64 = 0.95;
 
@@ -271,13 +274,23 @@ fn mapped<'m>(source: &[String], map: &'m ColumnMap, recording: &mut Recording) 
             TimeColumn::Stamps { index: find(source)?, to_s: *to_s, drop_stale: *drop_stale }
         }
         Time::Settled { settle_s } => TimeColumn::Settled { settle_s: *settle_s },
+        Time::Clock { .. } if source.first().is_some_and(|first| first == CLOCK) => {
+            find(CLOCK)?;
+            TimeColumn::Stamps { index: 0, to_s: 1.0, drop_stale: false }
+        }
+        Time::Clock { .. } => return Err(Problem::TableWanted { map: map.name.clone() }),
     };
     let select = match &map.select {
         Some(select) => Some((find(&select.source)?, select.value.as_str(), Vec::new())),
         None => None,
     };
     let mut takes = Vec::with_capacity(map.columns.len());
+    let mut lacking = Vec::new();
     for column in &map.columns {
+        if column.optional && !source.contains(&column.source) {
+            lacking.push(column.source.as_str());
+            continue;
+        }
         let sign_of = match &column.sign_of {
             Some((source, zero)) => Some((find(source)?, *zero)),
             None => None,
@@ -285,6 +298,15 @@ fn mapped<'m>(source: &[String], map: &'m ColumnMap, recording: &mut Recording) 
         let command = column.name.contains("_cmd");
         takes.push(Take { index: find(&column.source)?, how: Some(column), sign_of, command });
         recording.columns.push(Column::new(column.name.as_str(), Vec::new()));
+    }
+    if !map.given.is_empty() {
+        let given: Vec<String> = map.given.iter().map(|(key, value)| format!("{key} = {value}")).collect();
+        recording.notes.push(format!("column map {}: {}", map.name, given.join(", ")));
+    }
+    if !lacking.is_empty() {
+        recording
+            .notes
+            .push(format!("not in this log, though the column map has it: {}", lacking.join(", ")));
     }
     recording.unused = source.iter().zip(&used).filter(|(_, used)| !**used).map(|(n, _)| n.clone()).collect();
     Ok((time, select, takes))

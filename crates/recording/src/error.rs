@@ -168,6 +168,36 @@ pub enum Problem {
         /// What to do.
         hint: String,
     },
+    /// A log of messages, read without a map.
+    #[error("is a {format} log, which comes in through a column map")]
+    MapWanted {
+        /// The format.
+        format: &'static str,
+    },
+    /// A log of messages, read with a map for tables.
+    #[error(
+        "column map `{map}` is for tables with a column of stamps; the file is a {format} log, whose messages have stamps of their own"
+    )]
+    ClockWanted {
+        /// The map.
+        map: String,
+        /// The format.
+        format: &'static str,
+    },
+    /// A table, read with a map for logs of messages.
+    #[error("column map `{map}` is for logs of messages; the file is a table")]
+    TableWanted {
+        /// The map.
+        map: String,
+    },
+    /// A log that cannot be read.
+    #[error("not a readable {format} log: {message}")]
+    Broken {
+        /// The format.
+        format: &'static str,
+        /// What is wrong, and where.
+        message: String,
+    },
     /// No row has the selected value.
     #[error("no row has `{column}` = \"{wanted}\"; found: {found}")]
     NothingSelected {
@@ -179,7 +209,9 @@ pub enum Problem {
         found: String,
     },
     /// An MCAP file without a usable channel.
-    #[error("no channel holds numbers kort can read: {found}; allowed: message encoding \"json\"")]
+    #[error(
+        "no channel holds numbers kort can read: {found}; allowed: JSON messages, and through a column map ROS 2 messages (cdr with ros2msg)"
+    )]
     NoChannel {
         /// The channels there are.
         found: String,
@@ -224,7 +256,15 @@ impl Problem {
             Problem::NotFinite { .. } => "leave the cell empty if there was no sample".into(),
             Problem::TooFewRows { .. } => "was the logger stopped too early?".into(),
             Problem::NothingSelected { .. } => "give the value after the map's name: --columns NAME:VALUE".into(),
-            Problem::NoChannel { .. } => "export the signals with JSON messages, or as CSV".into(),
+            Problem::MapWanted { .. } => {
+                "`kort columns LOG` lists what is in it and which map fits; then --columns NAME".into()
+            }
+            Problem::ClockWanted { .. } => "such a map has [time] clock = \"log\"; `kort columns LOG` proposes one".into(),
+            Problem::TableWanted { .. } => {
+                "a map for tables names the column of stamps: [time] source and unit; `kort columns LOG` proposes one".into()
+            }
+            Problem::Broken { .. } => "was the file copied whole? A log that was cut off is read up to where it ends".into(),
+            Problem::NoChannel { .. } => "`kort columns LOG` lists what can be read; else export the signals with JSON messages, or as CSV".into(),
             Problem::Mcap { .. } => "a file cut off by a killed process is read up to its last complete chunk; this one has none".into(),
         }
     }

@@ -11,11 +11,13 @@ mod assemble;
 pub mod columns;
 mod error;
 pub mod formats;
+pub mod log;
 pub mod map;
 mod recording;
 pub mod units;
 
 pub use error::{Place, Problem, RecordingError};
 pub use formats::{Format, LiveMcap, Writer};
+pub use log::{Survey, survey};
 pub use map::{ColumnMap, MapError};
 pub use recording::{Column, Gap, Recording};

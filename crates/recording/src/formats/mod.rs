@@ -1,7 +1,11 @@
 //! File formats, recognised by content when read and by the file's name when written.
 
+mod cdr;
 mod csv;
+mod dataflash;
 mod mcap;
+mod stream;
+mod ulog;
 
 pub use mcap::Rows as LiveMcap;
 
@@ -13,7 +17,8 @@ use flate2::read::MultiGzDecoder;
 use flate2::write::GzEncoder;
 
 use crate::error::{Problem, RecordingError};
-use crate::map::ColumnMap;
+use crate::log::{Log, join};
+use crate::map::{ColumnMap, Time};
 use crate::recording::Recording;
 
 const GZIP: &[u8] = &[0x1f, 0x8b];
@@ -35,13 +40,70 @@ pub(crate) fn decode(
 }
 
 fn decode_plain(name: &str, mut input: impl BufRead, map: Option<&ColumnMap>) -> Result<Recording, Problem> {
+    let messages = map.is_some_and(|map| matches!(map.time, Time::Clock { .. }));
+    match Content::of(input.fill_buf().map_err(unreadable)?) {
+        Content::Empty => Err(Problem::Empty),
+        Content::Mcap if !messages => mcap::decode(name, input, map),
+        Content::Csv => csv::decode(name, input, map),
+        kind => {
+            let Some(map) = map else { return Err(Problem::MapWanted { format: kind.name() }) };
+            let sources: Vec<String> = map.sources().map(|(source, _)| source.to_string()).collect();
+            join::recording(name, &kind.log(input, Some(&sources))?, map)
+        }
+    }
+}
+
+/// Reads a log as its messages: the values of the wanted sources, or the statistics of all.
+pub(crate) fn log(mut input: impl BufRead, wanted: Option<&[String]>) -> Result<Log, Problem> {
     let start = input.fill_buf().map_err(unreadable)?;
-    if start.is_empty() {
-        Err(Problem::Empty)
-    } else if start.starts_with(::mcap::MAGIC) {
-        mcap::decode(name, input, map)
-    } else {
-        csv::decode(name, input, map)
+    if start.starts_with(GZIP) {
+        let mut input = io::BufReader::with_capacity(1 << 16, MultiGzDecoder::new(input));
+        let kind = Content::of(input.fill_buf().map_err(unreadable)?);
+        return kind.log(input, wanted);
+    }
+    Content::of(start).log(input, wanted)
+}
+
+/// Formats of logs, told by how they begin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Content {
+    Empty,
+    Csv,
+    Mcap,
+    Ulog,
+    DataFlash,
+}
+
+impl Content {
+    fn of(start: &[u8]) -> Self {
+        match () {
+            () if start.is_empty() => Content::Empty,
+            () if start.starts_with(::mcap::MAGIC) => Content::Mcap,
+            () if start.starts_with(ulog::MAGIC) => Content::Ulog,
+            () if start.starts_with(dataflash::MAGIC) => Content::DataFlash,
+            () => Content::Csv,
+        }
+    }
+
+    /// For people.
+    fn name(self) -> &'static str {
+        match self {
+            Content::Empty => "empty",
+            Content::Csv => "CSV",
+            Content::Mcap => "MCAP",
+            Content::Ulog => "PX4 ULog",
+            Content::DataFlash => "ArduPilot DataFlash",
+        }
+    }
+
+    fn log(self, input: impl BufRead, wanted: Option<&[String]>) -> Result<Log, Problem> {
+        match self {
+            Content::Empty => Err(Problem::Empty),
+            Content::Csv => csv::log(input, wanted),
+            Content::Mcap => mcap::log(input, wanted),
+            Content::Ulog => ulog::log(input, wanted),
+            Content::DataFlash => dataflash::log(input, wanted),
+        }
     }
 }
 
@@ -175,5 +237,7 @@ impl Recording {
     }
 }
 
+#[cfg(test)]
+mod damaged;
 #[cfg(test)]
 mod tests;

@@ -9,10 +9,20 @@ macro_rules! shipped {
 }
 
 shipped![
+    "ardupilot",
+    "ardupilot-old",
+    "ardupilot-vehicle",
+    "moteus",
     "motor-step-acoustic-air",
+    "px4",
+    "px4-outputs",
+    "px4-uavcan",
+    "px4-vehicle",
     "quarter_drone",
     "rcbench-air-static",
+    "ros2",
     "rosa-rotor-air",
     "t200-static",
+    "vesc",
     "vortex-auv-pool",
 ];

@@ -57,12 +57,45 @@ fn values_go_through_table_scale_offset_sign_and_unit() {
 #[test]
 fn every_shipped_map_reads() {
     for name in ColumnMap::shipped() {
-        let map = ColumnMap::find(name).unwrap();
+        let map = ColumnMap::example(name).expect("it reads, with its own examples");
+        assert_eq!(ColumnMap::find(&map.call()).unwrap(), map, "{name}: called with all that it asks for");
         assert!(!map.description.is_empty(), "{name}: says where the log comes from");
     }
     let error = ColumnMap::find("quarter-drone").unwrap_err().to_string();
     assert!(error.contains("quarter_drone"), "{error}");
     assert!(ColumnMap::find("quarter_drone:x").is_err(), "has no runs to choose from");
+}
+
+#[test]
+fn what_a_map_asks_for_stands_in_its_sources() {
+    let text = "[ask]\nmotor = { meaning = \"which\", default = \"0\" }\npoles = { meaning = \"pairs\", example = \"7\" }\n\
+        [time]\nclock = \"log\"\nrows_of = \"ESC[{motor}]\"\n\
+        [columns.shaft_speed_rad_s]\nsource = \"ESC[{motor+1}].RPM\"\nunit = \"rpm\"\ndivide_by = \"{poles}\"\n";
+    let folder = std::env::temp_dir().join(format!("kort-map-{}.toml", std::process::id()));
+    std::fs::write(&folder, text).unwrap();
+    let find = |more: &str| ColumnMap::find(&format!("{}{more}", folder.display()));
+    let map = find(":poles=14,motor=2").unwrap();
+    assert_eq!(map.columns[0].source, "ESC[3].RPM");
+    assert_eq!(map.time, Time::Clock { rows_of: Some("ESC[2]".into()) });
+    assert!((map.columns[0].scale - 1.0 / 14.0).abs() < 1e-12);
+    for (more, word) in [
+        ("", "`poles` is not given"),
+        (":poles=0", "divide_by"),
+        (":poles=x", "divide_by"),
+        (":poles=7,motor=left", "whole number"),
+        (":poles=7,side=1", "`side`"),
+    ] {
+        let error = find(more).unwrap_err().to_string();
+        assert!(error.contains(word) && error.contains("hint:"), "{more}: {error}");
+    }
+    std::fs::remove_file(&folder).unwrap();
+    let plain = ColumnMap::from_toml("m", text).unwrap();
+    assert_eq!(plain.call(), "m:motor=0,poles=7");
+    for bad in ["{motro}", "{motor", "{motor+x}"] {
+        let error =
+            ColumnMap::from_toml("m", &text.replace("ESC[{motor+1}].RPM", bad)).unwrap_err().to_string();
+        assert!(error.contains("hint:"), "{bad}: {error}");
+    }
 }
 
 proptest! {

@@ -1,5 +1,6 @@
 //! One file a subcommand.
 
+mod columns;
 mod diagnose;
 mod explain;
 mod fit;
@@ -16,6 +17,8 @@ use crate::failure::{Failure, Outcome};
 /// The laboratory's subcommands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
+    /// Say what is in a log of others, and propose a column map for it
+    Columns(columns::Args),
     /// Find what the model left out: where, what, how much better with it
     Diagnose(diagnose::Diagnose),
     /// Look up the physics a model may leave out: what it is, how it shows, what it is confused with
@@ -46,6 +49,7 @@ impl Command {
     /// Does it.
     pub fn run(self) -> Result<Outcome, Failure> {
         match self {
+            Command::Columns(args) => columns::run(&args),
             Command::Diagnose(diagnose) => diagnose.run(),
             Command::Explain(args) => explain::run(&args),
             Command::Fit(fit) => fit.run(),

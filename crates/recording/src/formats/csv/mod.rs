@@ -1,5 +1,7 @@
 //! CSV as RFC 4180 has it, header row first.
 
+mod table;
+
 use std::io::{self, Read, Write};
 
 use csv::{ByteRecord, ErrorKind, ReaderBuilder};
@@ -9,10 +11,14 @@ use crate::error::{Place, Problem};
 use crate::map::ColumnMap;
 use crate::recording::Recording;
 
+pub(super) use table::log;
+
 /// Decodes row by row: memory holds the columns and one row.
 pub(super) fn decode(name: &str, input: impl Read, map: Option<&ColumnMap>) -> Result<Recording, Problem> {
     let mut tail = Tail { input, last: b'\n' };
-    let mut reader = ReaderBuilder::new().has_headers(false).flexible(true).from_reader(&mut tail);
+    let delimiter = map.map_or(b',', |map| map.delimiter);
+    let mut reader =
+        ReaderBuilder::new().has_headers(false).flexible(true).delimiter(delimiter).from_reader(&mut tail);
     let mut record = ByteRecord::new();
     if !read(&mut reader, &mut record)? {
         return Err(Problem::Empty);
@@ -20,6 +26,12 @@ pub(super) fn decode(name: &str, input: impl Read, map: Option<&ColumnMap>) -> R
     let mut header = Vec::with_capacity(record.len());
     for cell in &record {
         header.push(text(cell, 1)?.trim().to_string());
+    }
+    if map.is_some() {
+        // Others end a row with the sign between cells: a column that a map cannot mean.
+        for (place, name) in header.iter_mut().enumerate().filter(|(_, name)| name.is_empty()) {
+            *name = format!("(column {})", place + 1);
+        }
     }
     let width = header.len() as u64;
     let mut rows = Assembler::new(name, header, map)?;

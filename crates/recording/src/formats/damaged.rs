@@ -1,0 +1,83 @@
+//! Damaged logs of every format: read as far as they go, or refused in words; never a panic.
+
+use std::io::Read;
+
+use proptest::prelude::*;
+use proptest::sample::Index;
+
+use crate::map::ColumnMap;
+use crate::{Recording, survey};
+
+#[path = "../../../../tests/logs/writers.rs"]
+mod writers;
+
+const PX4: &[u8] = include_bytes!("../../../../tests/recordings/logs/px4-uavcan-escs.ulg.gz");
+
+const ROS2: &[u8] = include_bytes!("../../../../tests/recordings/logs/ros2-two-thrusters.mcap");
+
+/// Logs with the map that brings each in.
+fn seeds() -> Vec<(Vec<u8>, &'static str)> {
+    let mut px4 = Vec::new();
+    flate2::read::GzDecoder::new(PX4).take(40_000).read_to_end(&mut px4).unwrap();
+    vec![(px4, "px4-uavcan:bank=1"), (writers::dataflash(60), "ardupilot"), (ROS2.to_vec(), "ros2")]
+}
+
+/// A byte changed, some taken out, some put in, or the rest cut off.
+type Damage = (Index, u8, usize, bool);
+
+fn damaged(seed: &[u8], damages: &[Damage]) -> Vec<u8> {
+    let mut bytes = seed.to_vec();
+    for (place, byte, kind, cut) in damages {
+        let at = place.index(bytes.len().max(1)).min(bytes.len());
+        match kind {
+            0 if *cut => bytes.truncate(at),
+            0 | 1 => bytes.iter_mut().skip(at).take(1).for_each(|b| *b = *byte),
+            2 => drop(bytes.drain(at..(at + usize::from(*byte)).min(bytes.len()))),
+            _ => bytes.splice(at..at, std::iter::repeat_n(*byte, kind * 3)).for_each(drop),
+        }
+    }
+    bytes
+}
+
+fn check(bytes: &[u8], map: &str) -> Result<(), TestCaseError> {
+    if let Err(error) = survey("log", bytes) {
+        prop_assert!(error.to_string().contains("hint:"));
+    }
+    let map = ColumnMap::find(map).unwrap();
+    match Recording::decode("log", bytes, Some(&map)) {
+        Ok(recording) => {
+            prop_assert!(recording.rows() >= 2 && recording.time_s.windows(2).all(|w| w[0] < w[1]));
+            prop_assert!(recording.columns.iter().all(|c| c.values.len() == recording.rows()));
+        }
+        Err(error) => prop_assert!(error.to_string().contains("hint:")),
+    }
+    Ok(())
+}
+
+#[test]
+fn undamaged_they_read() {
+    for (bytes, map) in seeds() {
+        let map = ColumnMap::find(map).unwrap();
+        let recording = Recording::decode("log", bytes.as_slice(), Some(&map)).unwrap();
+        assert!(recording.rows() > 40 && recording.column("shaft_speed_rad_s").is_some());
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(80))]
+
+    #[test]
+    fn damage_is_survived(which in any::<Index>(), damages in prop::collection::vec((any::<Index>(), any::<u8>(), 0_usize..6, any::<bool>()), 1..6)) {
+        let seeds = seeds();
+        let (bytes, map) = &seeds[which.index(seeds.len())];
+        check(&damaged(bytes, &damages), map)?;
+    }
+
+    #[test]
+    fn nonsense_behind_a_good_beginning_is_survived(bytes in prop::collection::vec(any::<u8>(), 0..600), keep in 0_usize..400) {
+        for (seed, map) in seeds() {
+            let nonsense: Vec<u8> = seed[..keep].iter().chain(&bytes).copied().collect();
+            check(&nonsense, map)?;
+        }
+    }
+}

@@ -1,0 +1,84 @@
+//! MCAP with JSON messages: one channel, one message a row, a field a column. A file of others may
+//! have several channels; their fields become columns over the common log time.
+
+mod messages;
+mod table;
+mod write;
+
+use std::io::{self, Read};
+
+use mcap::records::Record;
+use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
+
+use crate::error::Problem;
+use crate::map::ColumnMap;
+use crate::recording::Recording;
+
+pub(super) use messages::log;
+use table::Table;
+pub use write::Rows;
+
+/// No record and no chunk of a sensible file is longer; a broken length must not eat the memory.
+const RECORD_LIMIT: usize = 1 << 30;
+
+/// Every record from start to end; what tore the file, if it has no end.
+fn records(
+    mut input: impl Read,
+    mut take: impl FnMut(Record<'_>) -> Result<(), Problem>,
+) -> Result<Option<String>, Problem> {
+    let options = LinearReaderOptions::default()
+        .with_prevalidate_chunk_crcs(true)
+        .with_record_length_limit(RECORD_LIMIT);
+    let mut reader = LinearReader::new_with_options(options);
+    let mut complete = false;
+    while let Some(event) = reader.next_event() {
+        let torn = match event {
+            Ok(LinearReadEvent::ReadRequest(need)) => match input.read(reader.insert(need)) {
+                Ok(n) => {
+                    reader.notify_read(n);
+                    continue;
+                }
+                Err(e) if e.kind() == io::ErrorKind::Interrupted => continue,
+                Err(e) => e.to_string(),
+            },
+            Ok(LinearReadEvent::Record { opcode, data }) => {
+                complete |= opcode == mcap::records::op::DATA_END;
+                match mcap::parse_record(opcode, data) {
+                    Ok(record) => take(record)?,
+                    Err(e) => return Err(Problem::Mcap { message: e.to_string() }),
+                }
+                continue;
+            }
+            Err(e) => e.to_string(),
+        };
+        return Ok((!complete).then_some(torn));
+    }
+    Ok(None)
+}
+
+/// Decodes from start to end; a file without its end is read up to the last complete chunk.
+pub(super) fn decode(name: &str, input: impl Read, map: Option<&ColumnMap>) -> Result<Recording, Problem> {
+    let mut table = Table::default();
+    let torn = records(input, |record| table.take(record))?;
+    let mut losses = Vec::new();
+    if let Some(why) = torn {
+        if table.rows.is_empty() {
+            return Err(Problem::Mcap { message: why });
+        }
+        losses.push(format!(
+            "the file is cut off ({why}); read up to its last complete chunk: {} messages; what followed is lost",
+            table.messages
+        ));
+    }
+    if table.bad_messages > 0 {
+        losses.push(format!("{} message(s) are no JSON objects and were skipped", table.bad_messages));
+    }
+    table.assemble(name, map, losses)
+}
+
+/// Name of the metadata with what is known of a recording.
+const ABOUT: &str = "kort";
+/// Schemas of channels that stand beside the signals.
+const STATE: &str = "kort.state/1";
+const EVENT: &str = "kort.event/1";
+const BESIDE: [&str; 2] = [STATE, EVENT];

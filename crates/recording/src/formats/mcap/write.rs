@@ -1,0 +1,168 @@
+//! Writing MCAP: rows as JSON messages of one channel; beside it, on request, states and events.
+
+use std::collections::BTreeMap;
+use std::io::{self, Seek, Write};
+
+use mcap::records::MessageHeader;
+use serde_json::Value;
+
+use super::{ABOUT, EVENT, STATE};
+use crate::columns;
+use crate::units;
+
+/// Size of a chunk before compression, bytes.
+const CHUNK_BYTES: u64 = 128 * 1024;
+
+/// Writes rows as JSON messages of one channel; beside it, on request, states and events.
+///
+/// A chunk is put together in memory and written whole: a file that is cut off at any instant ends with a whole
+/// chunk or in the middle of one, which every MCAP reader takes for a torn file and not for a broken one.
+pub struct Rows<W: Write + Seek> {
+    writer: mcap::Writer<W>,
+    channel_id: u16,
+    beside: Option<[u16; 2]>,
+    origin_ns: u64,
+    columns: Vec<String>,
+    sequence: u32,
+    message: Vec<u8>,
+}
+
+impl<W: Write + Seek> Rows<W> {
+    pub(in crate::formats) fn create(topic: &str, columns: &[&str], output: W) -> io::Result<Self> {
+        let mut writer = mcap::WriteOptions::new()
+            .library(concat!("kort ", env!("CARGO_PKG_VERSION")))
+            .compression(Some(mcap::Compression::Zstd))
+            .compression_threads(0)
+            .chunk_size(Some(CHUNK_BYTES))
+            .disable_seeking(true)
+            .create(output)
+            .map_err(cause)?;
+        let schema = schema(columns).to_string();
+        let schema_id =
+            writer.add_schema("kort.recording/1", "jsonschema", schema.as_bytes()).map_err(cause)?;
+        let topic = topic_of(topic);
+        let channel_id = writer.add_channel(schema_id, &topic, "json", &BTreeMap::new()).map_err(cause)?;
+        let columns = columns.iter().map(|c| c.to_string()).collect();
+        Ok(Self { writer, channel_id, beside: None, origin_ns: 0, columns, sequence: 0, message: Vec::new() })
+    }
+
+    /// A live recording: `about` is what a stranger needs to know (the rig's text above all), `origin_ns` the wall
+    /// time of `time_s = 0`, ns since 1970.
+    ///
+    /// # Errors
+    /// The output cannot be written.
+    pub fn live(
+        topic: &str,
+        columns: &[&str],
+        about: BTreeMap<String, String>,
+        origin_ns: u64,
+        output: W,
+    ) -> io::Result<Self> {
+        let mut rows = Self::create(topic, columns, output)?;
+        let about = mcap::records::Metadata { name: ABOUT.into(), metadata: about };
+        rows.writer.write_metadata(&about).map_err(cause)?;
+        let object = br#"{"type":"object"}"#;
+        let mut channel = |schema: &str, topic: &str| -> io::Result<u16> {
+            let id = rows.writer.add_schema(schema, "jsonschema", object).map_err(cause)?;
+            rows.writer.add_channel(id, topic, "json", &BTreeMap::new()).map_err(cause)
+        };
+        let state = channel(STATE, &format!("{}/state", topic_of(topic)))?;
+        let event = channel(EVENT, "/events")?;
+        rows.beside = Some([state, event]);
+        rows.origin_ns = origin_ns;
+        Ok(rows)
+    }
+
+    /// A column not sampled in this row is left out of the message.
+    ///
+    /// # Errors
+    /// The output cannot be written.
+    pub fn row(&mut self, time_s: f64, values: &[f64]) -> io::Result<()> {
+        self.message.clear();
+        write!(self.message, "{{\"time_s\":")?;
+        serde_json::to_writer(&mut self.message, &time_s)?;
+        for (name, value) in self.columns.iter().zip(values).filter(|(_, v)| !v.is_nan()) {
+            self.message.push(b',');
+            serde_json::to_writer(&mut self.message, name)?;
+            self.message.push(b':');
+            serde_json::to_writer(&mut self.message, value)?;
+        }
+        self.message.push(b'}');
+        let message = std::mem::take(&mut self.message);
+        let written = self.send(self.channel_id, time_s, &message);
+        self.message = message;
+        written
+    }
+
+    /// The thruster's state, a JSON object: setpoint, estimates with their doubt, law, limits, faults.
+    ///
+    /// # Errors
+    /// The output cannot be written.
+    pub fn state(&mut self, time_s: f64, json: &[u8]) -> io::Result<()> {
+        match self.beside {
+            Some([state, _]) => self.send(state, time_s, json),
+            None => Ok(()),
+        }
+    }
+
+    /// An event, a JSON object.
+    ///
+    /// # Errors
+    /// The output cannot be written.
+    pub fn event(&mut self, time_s: f64, json: &[u8]) -> io::Result<()> {
+        match self.beside {
+            Some([_, event]) => self.send(event, time_s, json),
+            None => Ok(()),
+        }
+    }
+
+    fn send(&mut self, channel_id: u16, time_s: f64, message: &[u8]) -> io::Result<()> {
+        // A recording that starts before zero keeps its order only in time_s.
+        let log_time = self.origin_ns + (time_s.max(0.0) * 1e9).round() as u64;
+        let header = MessageHeader { channel_id, sequence: self.sequence, log_time, publish_time: log_time };
+        self.sequence = self.sequence.wrapping_add(1);
+        self.writer.write_to_known_channel(&header, message).map_err(cause)
+    }
+
+    /// Ends the chunk and hands it to the system: what a kill may cost is what came after.
+    ///
+    /// # Errors
+    /// The output cannot be written.
+    pub fn flush(&mut self) -> io::Result<()> {
+        self.writer.flush().map_err(cause)
+    }
+
+    /// Ends the file.
+    ///
+    /// # Errors
+    /// The output cannot be written.
+    pub fn finish(mut self) -> io::Result<()> {
+        self.writer.finish().map_err(cause)?;
+        self.writer.into_inner().flush()
+    }
+}
+
+/// The system's own words: what a disk refuses with is told by the inner error alone.
+fn cause(error: mcap::McapError) -> io::Error {
+    match error {
+        mcap::McapError::Io(error) => error,
+        other => io::Error::other(other),
+    }
+}
+
+fn topic_of(topic: &str) -> String {
+    if topic.starts_with('/') { topic.to_string() } else { format!("/{topic}") }
+}
+
+/// JSON schema of a message, so that Foxglove lists the signals with unit and meaning.
+fn schema(columns: &[&str]) -> Value {
+    let about = |name: &str| match columns::find(name) {
+        Some(known) => format!("{} [{}]", known.meaning, known.unit),
+        None => units::of_column(name).map_or("1".into(), |u| u.symbol.to_string()),
+    };
+    let properties: serde_json::Map<String, Value> = std::iter::once(&"time_s")
+        .chain(columns)
+        .map(|name| ((*name).to_string(), serde_json::json!({"type": "number", "description": about(name)})))
+        .collect();
+    serde_json::json!({"type": "object", "title": "kort.recording/1", "properties": properties, "required": ["time_s"]})
+}

@@ -1,0 +1,319 @@
+//! A log of messages, as vehicles and loggers write it: topics with stamps and fields of their own.
+
+pub(crate) mod join;
+pub(crate) mod propose;
+mod survey;
+
+pub use survey::{FieldSurvey, GapSurvey, Proposal, Survey, TopicSurvey, survey};
+
+/// A stamp that lies further than this behind its topic's newest begins the clock anew, s; less is disorder of the
+/// logger.
+const RESET_S: f64 = 1.0;
+
+/// What a log holds.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Log {
+    /// The format, for people.
+    pub format: &'static str,
+    /// What the stamps count from.
+    pub clock: &'static str,
+    /// What parts the cells of a table.
+    pub delimiter: u8,
+    /// In the order of their first message.
+    pub topics: Vec<Topic>,
+    /// How often the clock began anew.
+    pub resets: usize,
+    /// What a user should know.
+    pub notes: Vec<String>,
+    /// What was lost or skipped while reading.
+    pub losses: Vec<String>,
+}
+
+/// Messages of one kind, from one instance.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Topic {
+    /// With its instance in brackets where the format has several; empty for a plain table.
+    pub name: String,
+    /// One a message, s.
+    pub stamps_s: Vec<f64>,
+    /// Where each stretch between resets of the clock begins: (stretch, message).
+    pub stretches: Vec<(usize, usize)>,
+    /// Its fields.
+    pub fields: Vec<Field>,
+    /// Messages left out since their stamp fell back a little.
+    pub stale: u64,
+}
+
+/// One field of a topic.
+#[derive(Clone, Debug)]
+pub(crate) struct Field {
+    /// Name within the topic.
+    pub name: String,
+    /// Unit, as the format says it.
+    pub unit: Option<String>,
+    /// One a message, NaN for none; empty if only the statistics were asked for.
+    pub values: Vec<f64>,
+    /// Messages with a finite number in it.
+    pub samples: u64,
+    /// Messages with a text in it.
+    pub texts: u64,
+    /// Least and greatest number.
+    pub range: Option<(f64, f64)>,
+}
+
+impl Topic {
+    /// The name by which a column map calls a field.
+    pub fn source(&self, field: &Field) -> String {
+        if self.name.is_empty() { field.name.clone() } else { format!("{}.{}", self.name, field.name) }
+    }
+
+    /// The stamp before the newest, in the same stretch.
+    fn before_newest(&self) -> Option<f64> {
+        let begins = self.stretches.last()?.1;
+        let at = self.stamps_s.len().checked_sub(2)?;
+        (at >= begins).then(|| self.stamps_s[at])
+    }
+
+    fn drop_newest(&mut self) {
+        self.stamps_s.pop();
+        for field in &mut self.fields {
+            field.values.pop();
+        }
+        self.stale += 1;
+    }
+
+    /// Messages of a stretch.
+    pub fn stretch(&self, wanted: usize) -> std::ops::Range<usize> {
+        let at = self.stretches.iter().position(|(stretch, _)| *stretch == wanted);
+        at.map_or(0..0, |at| {
+            let end = self.stretches.get(at + 1).map_or(self.stamps_s.len(), |next| next.1);
+            self.stretches[at].1..end
+        })
+    }
+}
+
+/// Two names of one thing: `battery_status.voltage_v` is `battery_status[0].voltage_v`.
+pub(crate) fn same_source(a: &str, b: &str) -> bool {
+    fn parts(name: &str) -> (&str, &str) {
+        let (topic, field) = name.split_once('.').unwrap_or((name, ""));
+        (topic.strip_suffix("[0]").unwrap_or(topic), field)
+    }
+    parts(a) == parts(b)
+}
+
+/// Takes a log's messages as a decoder finds them.
+pub(crate) struct Gather<'w> {
+    log: Log,
+    wanted: Option<&'w [String]>,
+    stretch: usize,
+    /// The message under way is left out.
+    skip: bool,
+}
+
+impl<'w> Gather<'w> {
+    /// Keeps the values of these sources; `None` keeps none, but the statistics of all.
+    pub fn new(format: &'static str, clock: &'static str, wanted: Option<&'w [String]>) -> Self {
+        let log = Log { format, clock, ..Log::default() };
+        Self { log, wanted, stretch: 0, skip: false }
+    }
+
+    /// Begins a topic.
+    pub fn topic(&mut self, name: impl Into<String>) -> usize {
+        self.log.topics.push(Topic { name: name.into(), ..Topic::default() });
+        self.log.topics.len() - 1
+    }
+
+    /// Adds a field to a topic.
+    pub fn field(&mut self, topic: usize, name: impl Into<String>, unit: Option<String>) -> usize {
+        let of = &mut self.log.topics[topic];
+        let field = Field { name: name.into(), unit, values: Vec::new(), samples: 0, texts: 0, range: None };
+        of.fields.push(field);
+        let place = of.fields.len() - 1;
+        if self.keeps(topic, place) {
+            let of = &mut self.log.topics[topic];
+            // A list with places never has a capacity of zero: that tells kept fields from others.
+            of.fields[place].values = Vec::with_capacity(64);
+            of.fields[place].values.resize(of.stamps_s.len(), f64::NAN);
+        }
+        place
+    }
+
+    fn keeps(&self, topic: usize, field: usize) -> bool {
+        let of = &self.log.topics[topic];
+        let source = of.source(&of.fields[field]);
+        self.wanted.is_some_and(|wanted| wanted.iter().any(|one| same_source(one, &source)))
+    }
+
+    /// What parts the cells of a table.
+    pub fn delimiter(&mut self, delimiter: u8) {
+        self.log.delimiter = delimiter;
+    }
+
+    /// A unit that the format tells late.
+    pub fn unit(&mut self, topic: usize, field: usize, unit: String) {
+        if let Some(field) = self.log.topics[topic].fields.get_mut(field) {
+            field.unit = Some(unit);
+        }
+    }
+
+    /// Begins a message; [`Gather::set`] fills it.
+    pub fn message(&mut self, topic: usize, stamp_s: f64) {
+        let of = &mut self.log.topics[topic];
+        self.skip = !stamp_s.is_finite();
+        let here = of.stretches.last().is_some_and(|(stretch, _)| *stretch == self.stretch);
+        if let Some(newest) = of.stamps_s.last().copied().filter(|newest| here && stamp_s <= *newest) {
+            if newest - stamp_s <= RESET_S {
+                self.skip = true;
+            } else if of.before_newest().is_some_and(|before| before < stamp_s) {
+                // One stamp far ahead, and then on as before: that one was damaged, the clock is not.
+                of.drop_newest();
+            } else {
+                self.stretch += 1;
+                self.log.resets += 1;
+            }
+        }
+        if self.skip {
+            of.stale += 1;
+            return;
+        }
+        if of.stretches.last().is_none_or(|(stretch, _)| *stretch != self.stretch) {
+            of.stretches.push((self.stretch, of.stamps_s.len()));
+        }
+        of.stamps_s.push(stamp_s);
+        for field in of.fields.iter_mut().filter(|f| f.values.capacity() > 0) {
+            field.values.push(f64::NAN);
+        }
+    }
+
+    /// A number of the message under way.
+    pub fn set(&mut self, topic: usize, field: usize, value: f64) {
+        if self.skip || !value.is_finite() {
+            return;
+        }
+        let field = &mut self.log.topics[topic].fields[field];
+        field.samples += 1;
+        field.range = Some(match field.range {
+            Some((low, high)) => (low.min(value), high.max(value)),
+            None => (value, value),
+        });
+        if let Some(last) = field.values.last_mut() {
+            *last = value;
+        }
+    }
+
+    /// A text of the message under way.
+    pub fn text(&mut self, topic: usize, field: usize) {
+        if !self.skip {
+            self.log.topics[topic].fields[field].texts += 1;
+        }
+    }
+
+    /// What a user should know.
+    pub fn note(&mut self, note: String) {
+        self.log.notes.push(note);
+    }
+
+    /// What was lost.
+    pub fn loss(&mut self, loss: String) {
+        self.log.losses.push(loss);
+    }
+
+    /// Whether any message came.
+    pub fn is_empty(&self) -> bool {
+        self.log.topics.iter().all(|topic| topic.stamps_s.is_empty())
+    }
+
+    /// The log.
+    pub fn finish(mut self) -> Log {
+        let stale: u64 = self.log.topics.iter().map(|topic| topic.stale).sum();
+        if stale > 0 {
+            self.log.losses.push(format!(
+                "{stale} message(s) are stamped no later than the one before of their kind, or far off it, and are skipped"
+            ));
+        }
+        self.log
+    }
+}
+
+/// Usual step of stamps, and stretches without a message: more than five times as long as nine in ten steps, as in a
+/// recording.
+pub(crate) fn steps(stamps_s: &[f64]) -> (f64, Vec<(f64, f64)>) {
+    let forward = || stamps_s.windows(2).filter(|w| w[1] > w[0]);
+    let mut steps: Vec<f64> = forward().map(|w| w[1] - w[0]).collect();
+    if steps.is_empty() {
+        return (f64::NAN, Vec::new());
+    }
+    steps.sort_by(f64::total_cmp);
+    let at = |part: f64| steps[((steps.len() - 1) as f64 * part) as usize];
+    let limit = 5.0 * at(0.9);
+    (at(0.5), forward().filter(|w| w[1] - w[0] > limit).map(|w| (w[0], w[1])).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn gathered(stamps: &[f64]) -> Log {
+        let wanted = ["esc.rpm".to_string()];
+        let mut gather = Gather::new("test", "s", Some(&wanted));
+        let topic = gather.topic("esc[0]");
+        let field = gather.field(topic, "rpm", None);
+        for stamp in stamps {
+            gather.message(topic, *stamp);
+            gather.set(topic, field, *stamp * 2.0);
+        }
+        gather.finish()
+    }
+
+    #[test]
+    fn the_first_instance_is_called_with_and_without_its_number() {
+        assert!(same_source("battery_status.voltage_v", "battery_status[0].voltage_v"));
+        assert!(same_source("a[0].b[0]", "a.b[0]"));
+        assert!(!same_source("battery_status[1].voltage_v", "battery_status.voltage_v"));
+        assert!(!same_source("esc_status.esc[0].rpm", "esc_status.esc.rpm"));
+    }
+
+    #[test]
+    fn a_clock_that_begins_anew_begins_a_stretch_and_disorder_does_not() {
+        let log = gathered(&[5.0, 6.0, 5.9, 7.0, 0.1, 0.2, 0.2]);
+        let topic = &log.topics[0];
+        assert_eq!(log.resets, 1);
+        assert_eq!(topic.stretch(0), 0..3);
+        assert_eq!(topic.stretch(1), 3..5);
+        assert_eq!(topic.stretch(2), 0..0);
+        assert_eq!(topic.fields[0].values, [10.0, 12.0, 14.0, 0.2, 0.4]);
+        assert_eq!(topic.stale, 2);
+        assert_eq!(log.losses.len(), 1);
+    }
+
+    #[test]
+    fn one_damaged_stamp_is_no_new_clock() {
+        let log = gathered(&[5.0, 6.0, 9e9, 7.0, 8.0]);
+        assert_eq!((log.resets, log.topics[0].stale), (0, 1));
+        assert_eq!(log.topics[0].fields[0].values, [10.0, 12.0, 14.0, 16.0]);
+    }
+
+    #[test]
+    fn a_field_that_comes_late_is_empty_before() {
+        let wanted = ["t.b".to_string()];
+        let mut gather = Gather::new("test", "s", Some(&wanted));
+        let topic = gather.topic("t");
+        gather.message(topic, 0.0);
+        let late = gather.field(topic, "b", None);
+        gather.message(topic, 1.0);
+        gather.set(topic, late, 4.0);
+        let log = gather.finish();
+        assert!(log.topics[0].fields[0].values[0].is_nan());
+        assert_eq!(log.topics[0].fields[0].values[1], 4.0);
+    }
+
+    #[test]
+    fn gaps_and_usual_step() {
+        let mut stamps: Vec<f64> = (0..50).map(|k| f64::from(k) * 0.1).collect();
+        stamps.extend((0..50).map(|k| 20.0 + f64::from(k) * 0.1));
+        let (usual, gaps) = steps(&stamps);
+        assert!((usual - 0.1).abs() < 1e-9);
+        assert_eq!(gaps.len(), 1);
+        assert_eq!(gaps[0].1, 20.0);
+    }
+}

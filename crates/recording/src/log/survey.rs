@@ -1,0 +1,170 @@
+//! What is in a log: topics, fields, units, rates, gaps, and the column map that would bring it in.
+
+use std::io::{BufReader, Read};
+
+use serde::Serialize;
+
+use super::propose::{self, propose};
+use super::{Field, Log, Topic, steps};
+use crate::error::RecordingError;
+use crate::formats;
+
+/// What is in a log.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Survey {
+    /// `kort.columns/1`.
+    pub schema: &'static str,
+    /// The file.
+    pub file: String,
+    /// Its format, for people.
+    pub format: &'static str,
+    /// What its stamps count from.
+    pub clock: &'static str,
+    /// From the first to the last stamp of its longest topic, s; none if there are no stamps with a known unit.
+    pub duration_s: Option<f64>,
+    /// How often the clock begins anew.
+    pub resets: usize,
+    /// Kinds of messages; a table has one, without a name.
+    pub topics: Vec<TopicSurvey>,
+    /// What a user should know.
+    pub notes: Vec<String>,
+    /// What was lost while reading.
+    pub losses: Vec<String>,
+    /// How to bring it in.
+    pub proposal: Proposal,
+}
+
+/// One kind of message.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TopicSurvey {
+    /// Name, with the instance in brackets where the format has several.
+    pub name: String,
+    /// How many.
+    pub messages: usize,
+    /// First stamp, s.
+    pub from_s: Option<f64>,
+    /// Last stamp, s.
+    pub to_s: Option<f64>,
+    /// Usual rate, Hz.
+    pub rate_hz: Option<f64>,
+    /// Stretches without a message.
+    pub gaps: usize,
+    /// The longest of them.
+    pub longest_gap: Option<GapSurvey>,
+    /// Its fields.
+    pub fields: Vec<FieldSurvey>,
+}
+
+/// A stretch without a message.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct GapSurvey {
+    /// Last stamp before it, s.
+    pub from_s: f64,
+    /// First stamp after it, s.
+    pub to_s: f64,
+}
+
+/// One field.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FieldSurvey {
+    /// What a column map writes as its `source`.
+    pub source: String,
+    /// Its unit, if the format or its name says one.
+    pub unit: Option<String>,
+    /// `format`, or `name`: then it is what the name claims.
+    pub unit_from: Option<&'static str>,
+    /// Numbers in it.
+    pub samples: u64,
+    /// Texts in it.
+    pub texts: u64,
+    /// Least number.
+    pub min: Option<f64>,
+    /// Greatest number.
+    pub max: Option<f64>,
+    /// The column that the proposed map makes of it.
+    pub column: Option<String>,
+}
+
+/// How a log comes in.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Proposal {
+    /// No map is needed.
+    pub native: bool,
+    /// Shipped maps that fit, as they stand behind `--columns`.
+    pub shipped: Vec<String>,
+    /// A column map as TOML, made from names and units; to be checked by a person. None if nothing in the log looks
+    /// like a column of kort.
+    pub map: Option<String>,
+}
+
+/// Reads a log and says what is in it; `name` stands in errors.
+///
+/// # Errors
+/// The log cannot be read; the error names the file, the place and what is allowed.
+pub fn survey(name: &str, reader: impl Read) -> Result<Survey, RecordingError> {
+    let log = formats::log(BufReader::with_capacity(1 << 16, reader), None)
+        .map_err(|problem| RecordingError::new(name, problem))?;
+    Ok(of(name, &log))
+}
+
+fn of(name: &str, log: &Log) -> Survey {
+    let (proposal, chosen) = propose(log);
+    let topics: Vec<TopicSurvey> = log
+        .topics
+        .iter()
+        .enumerate()
+        .filter(|(_, topic)| !topic.stamps_s.is_empty() || topic.name.is_empty())
+        .map(|(t, topic)| topic_survey(topic, |f| chosen.get(&(t, f)).map(|name| (*name).to_string())))
+        .collect();
+    let span = |topic: &TopicSurvey| topic.to_s.zip(topic.from_s).map(|(to, from)| to - from);
+    Survey {
+        schema: "kort.columns/1",
+        file: name.into(),
+        format: log.format,
+        clock: log.clock,
+        duration_s: topics.iter().filter_map(span).max_by(f64::total_cmp),
+        resets: log.resets,
+        topics,
+        notes: log.notes.clone(),
+        losses: log.losses.clone(),
+        proposal,
+    }
+}
+
+fn topic_survey(topic: &Topic, column: impl Fn(usize) -> Option<String>) -> TopicSurvey {
+    let (step_s, gaps) = steps(&topic.stamps_s);
+    let longest = gaps.iter().max_by(|a, b| (a.1 - a.0).total_cmp(&(b.1 - b.0)));
+    TopicSurvey {
+        name: topic.name.clone(),
+        messages: topic.stamps_s.len(),
+        from_s: topic.stamps_s.first().copied(),
+        to_s: topic.stamps_s.last().copied(),
+        rate_hz: (step_s > 0.0).then(|| 1.0 / step_s),
+        gaps: gaps.len(),
+        longest_gap: longest.map(|(from_s, to_s)| GapSurvey { from_s: *from_s, to_s: *to_s }),
+        fields: topic
+            .fields
+            .iter()
+            .enumerate()
+            .map(|(f, field)| field_survey(topic, field, column(f)))
+            .collect(),
+    }
+}
+
+fn field_survey(topic: &Topic, field: &Field, column: Option<String>) -> FieldSurvey {
+    let (unit, unit_from) = match (&field.unit, propose::unit_in(&field.name)) {
+        (Some(unit), _) => (Some(unit.clone()), Some("format")),
+        (None, Some(unit)) => (Some(unit.symbol.to_string()), Some("name")),
+        (None, None) => (None, None),
+    };
+    FieldSurvey {
+        source: topic.source(field),
+        unit,
+        unit_from,
+        samples: field.samples,
+        texts: field.texts,
+        min: field.range.map(|range| range.0),
+        max: field.range.map(|range| range.1),
+        column,
+    }
+}

@@ -1,0 +1,140 @@
+//! What a map cannot know and only the user can say: which motor, how many pole pairs. `{name}` in a source stands for
+//! it, `{name+1}` for the number after it.
+
+use std::collections::BTreeMap;
+
+use serde::Deserialize;
+
+use super::{MapError, fail};
+
+/// One thing asked for.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Ask {
+    /// In words.
+    meaning: String,
+    /// Taken where the user says nothing; without it the user must say it.
+    default: Option<String>,
+    /// A usual value, to check the map with and to show.
+    example: Option<String>,
+}
+
+/// What stands behind the colon of `NAME:…`.
+pub(super) struct Asked(Vec<(Option<String>, String)>);
+
+impl Asked {
+    pub fn parse(text: &str) -> Self {
+        if text.is_empty() {
+            return Self(Vec::new());
+        }
+        if !text.contains('=') {
+            return Self(vec![(None, text.into())]);
+        }
+        let one = |part: &str| match part.split_once('=') {
+            Some((key, value)) => (Some(key.trim().to_string()), value.trim().to_string()),
+            None => (None, part.trim().to_string()),
+        };
+        Self(text.split(',').map(one).collect())
+    }
+
+    /// A value without a name: the run of a file that holds several.
+    pub fn run(&self) -> Option<&str> {
+        self.0.iter().find(|(key, _)| key.is_none()).map(|(_, value)| value.as_str())
+    }
+}
+
+/// Names with their values.
+pub(super) struct Given(BTreeMap<String, String>);
+
+impl Given {
+    /// From what the map asks and the user says; without a user the examples stand.
+    pub fn new(map: &str, asks: &BTreeMap<String, Ask>, said: Option<&Asked>) -> Result<Self, MapError> {
+        let list = |wanted: &dyn Fn(&Ask) -> bool| {
+            let of = |(key, ask): (&String, &Ask)| {
+                wanted(ask).then(|| {
+                    format!("{key}={}", ask.example.as_deref().or(ask.default.as_deref()).unwrap_or("…"))
+                })
+            };
+            asks.iter().filter_map(of).collect::<Vec<_>>().join(",")
+        };
+        let pairs: Vec<(&str, &str)> = said
+            .iter()
+            .flat_map(|said| &said.0)
+            .filter_map(|(key, value)| Some((key.as_deref()?, value.as_str())))
+            .collect();
+        if let Some((key, _)) = pairs.iter().find(|(key, _)| !asks.contains_key(*key)) {
+            let known: Vec<&str> = asks.keys().map(String::as_str).collect();
+            let known = if known.is_empty() { "nothing".into() } else { known.join(", ") };
+            return Err(fail(
+                map,
+                format!("`{key}` is nothing that the map asks for; it asks for: {known}"),
+                "correct what follows the colon of --columns",
+            ));
+        }
+        let mut given = BTreeMap::new();
+        for (key, ask) in asks {
+            let stated = pairs.iter().find(|(name, _)| name == key).map(|(_, value)| *value);
+            let spare = if said.is_none() { ask.example.as_deref() } else { None };
+            let Some(value) = stated.or(ask.default.as_deref()).or(spare) else {
+                let (message, hint) = match said {
+                    Some(_) => (
+                        format!("`{key}` is not given: {}", ask.meaning),
+                        format!("--columns {map}:{}", list(&|ask| ask.default.is_none())),
+                    ),
+                    None => (
+                        format!("ask.{key} has neither `default` nor `example`"),
+                        "an example lets the map be checked".into(),
+                    ),
+                };
+                return Err(fail(map, message, &hint));
+            };
+            given.insert(key.clone(), value.to_string());
+        }
+        Ok(Self(given))
+    }
+
+    /// A text with what is given in the place of `{name}` and `{name+1}`.
+    pub fn fill(&self, map: &str, text: &str) -> Result<String, MapError> {
+        let mut out = String::new();
+        let mut rest = text;
+        while let Some((before, after)) = rest.split_once('{') {
+            out.push_str(before);
+            let Some((inside, behind)) = after.split_once('}') else {
+                return Err(fail(
+                    map,
+                    format!("\"{text}\": `{{` without `}}`"),
+                    "{name} stands for what is asked for",
+                ));
+            };
+            let (key, plus) = match inside.split_once('+') {
+                Some((key, plus)) => (key, plus.trim().parse::<u64>().ok()),
+                None => (inside, Some(0)),
+            };
+            let value = self.0.get(key.trim());
+            let filled = match (value, plus) {
+                (Some(value), Some(0)) => Some(value.clone()),
+                (Some(value), Some(plus)) => value
+                    .parse::<u64>()
+                    .ok()
+                    .and_then(|number| number.checked_add(plus))
+                    .map(|sum| sum.to_string()),
+                _ => None,
+            };
+            let Some(filled) = filled else {
+                let words = match value {
+                    Some(value) => format!("\"{text}\" needs a whole number for `{key}`; found: \"{value}\""),
+                    None => format!("\"{text}\": the map does not ask for `{key}`"),
+                };
+                return Err(fail(map, words, "[ask] lists what the user is asked for"));
+            };
+            out.push_str(&filled);
+            rest = behind;
+        }
+        out.push_str(rest);
+        Ok(out)
+    }
+
+    pub fn into_pairs(self) -> Vec<(String, String)> {
+        self.0.into_iter().collect()
+    }
+}
