@@ -284,14 +284,33 @@ fn an_ardupilot_log_reads_with_its_units_and_instances() {
     bytes[from..from + 100].fill(0x11);
     let recording = read(&write("bad.bin", &bytes), "ardupilot");
     assert!(recording.losses[0].contains("are no messages"), "{:?}", recording.losses);
-    let sound = recording.rows();
-    assert!(sound > 390, "{sound}");
+    let (rows, losses) = (recording.rows(), recording.losses);
+    assert!(rows > 390, "what is around the damage is read: {rows}");
     bytes.extend([0xff; 500]);
-    let recording = read(&write("padded.bin", bytes), "ardupilot");
-    assert_eq!(
-        recording.losses.len(),
-        1,
-        "an unwritten end of a flash chip is no loss: {:?}",
-        recording.losses
-    );
+    let padded = read(&write("padded.bin", bytes), "ardupilot");
+    assert_eq!((padded.rows(), padded.losses), (rows, losses), "an unwritten end of a flash chip is no loss");
+}
+
+/// VESC's status and CANopen's process data, as `candump -L` writes them.
+#[test]
+fn bytes_on_a_can_bus_become_columns_by_a_map() {
+    let log = write("can.log", writers::candump(200));
+    let found = columns(&log);
+    assert_eq!(found["format"], "candump");
+    let duty = field(topic(&found, "0x00000905"), "0x00000905.i16be[6]");
+    assert_eq!((&duty["min"], &duty["max"]), (&250.0.into(), &250.0.into()));
+    let rad_s = |rpm: f64| rpm * std::f64::consts::TAU / 60.0;
+    let recording = read(&log, "vesc-can:id=05,pole_pairs=7");
+    assert_eq!(recording.rows(), 200);
+    assert!(near(recording.column("shaft_speed_rad_s").unwrap()[7], rad_s(700.0)));
+    assert!(near(recording.column("current_a").unwrap()[0], -1.5));
+    assert!(near(recording.column("duty_cmd").unwrap()[0], 0.25));
+    let recording = read(&log, "canopen-402:pdo=281,command=301");
+    let speed = recording.column("shaft_speed_rad_s").unwrap();
+    assert!(near(speed[0], rad_s(100.0)) && near(speed[50], rad_s(-50.0)), "{speed:?}");
+    let command = recording.column("speed_cmd_rad_s").unwrap();
+    assert!(command[0].is_nan() && near(command[1], rad_s(100.0)) && near(command[199], rad_s(100.0)));
+    let wrong = kort(&["fit", &log, "--rig", "t200", "--columns", "vesc-can:id=06,pole_pairs=7"]);
+    assert_eq!(wrong.status.code(), Some(2));
+    assert!(stderr(&wrong).contains("0x00000906"), "{}", stderr(&wrong));
 }

@@ -82,3 +82,19 @@ pub fn dataflash(ticks: u32) -> Vec<u8> {
     }
     out
 }
+
+/// `candump -L` of a VESC with number 5 and 7 pole pairs, and of a CANopen drive with its second process data.
+pub fn candump(ticks: u32) -> String {
+    let mut out = String::new();
+    for k in 0..ticks {
+        let stamp_s = 1_700_000_000.0 + f64::from(k) * 0.01;
+        let (turns, current, duty) = (700 * k as i32, -15_i16, 250_i16);
+        out += &format!("({stamp_s:.6}) can0 00000905#{turns:08X}{current:04X}{duty:04X}\n");
+        let velocity = (100 - 3 * k as i32).swap_bytes();
+        out += &format!("({:.6}) can0 281#3706{velocity:08X}\n", stamp_s + 0.001);
+        if k % 10 == 0 {
+            out += &format!("({:.6}) can0 301#0F00{:08X}\n", stamp_s + 0.002, 100_i32.swap_bytes());
+        }
+    }
+    out
+}

@@ -19,7 +19,12 @@ const ROS2: &[u8] = include_bytes!("../../../../tests/recordings/logs/ros2-two-t
 fn seeds() -> Vec<(Vec<u8>, &'static str)> {
     let mut px4 = Vec::new();
     flate2::read::GzDecoder::new(PX4).take(40_000).read_to_end(&mut px4).unwrap();
-    vec![(px4, "px4-uavcan:bank=1"), (writers::dataflash(60), "ardupilot"), (ROS2.to_vec(), "ros2")]
+    vec![
+        (px4, "px4-uavcan:bank=1"),
+        (writers::dataflash(60), "ardupilot"),
+        (ROS2.to_vec(), "ros2"),
+        (writers::candump(100).into_bytes(), "vesc-can:id=05,pole_pairs=7"),
+    ]
 }
 
 /// A byte changed, some taken out, some put in, or the rest cut off.

@@ -1,5 +1,6 @@
 //! File formats, recognised by content when read and by the file's name when written.
 
+mod candump;
 mod cdr;
 mod csv;
 mod dataflash;
@@ -72,6 +73,7 @@ enum Content {
     Mcap,
     Ulog,
     DataFlash,
+    Candump,
 }
 
 impl Content {
@@ -81,6 +83,7 @@ impl Content {
             () if start.starts_with(::mcap::MAGIC) => Content::Mcap,
             () if start.starts_with(ulog::MAGIC) => Content::Ulog,
             () if start.starts_with(dataflash::MAGIC) => Content::DataFlash,
+            () if candump::begins(start) => Content::Candump,
             () => Content::Csv,
         }
     }
@@ -93,6 +96,7 @@ impl Content {
             Content::Mcap => "MCAP",
             Content::Ulog => "PX4 ULog",
             Content::DataFlash => "ArduPilot DataFlash",
+            Content::Candump => "candump",
         }
     }
 
@@ -103,6 +107,7 @@ impl Content {
             Content::Mcap => mcap::log(input, wanted),
             Content::Ulog => ulog::log(input, wanted),
             Content::DataFlash => dataflash::log(input, wanted),
+            Content::Candump => candump::log(input, wanted),
         }
     }
 }

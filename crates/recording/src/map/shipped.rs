@@ -12,6 +12,7 @@ shipped![
     "ardupilot",
     "ardupilot-old",
     "ardupilot-vehicle",
+    "canopen-402",
     "moteus",
     "motor-step-acoustic-air",
     "px4",
@@ -24,5 +25,6 @@ shipped![
     "rosa-rotor-air",
     "t200-static",
     "vesc",
+    "vesc-can",
     "vortex-auv-pool",
 ];

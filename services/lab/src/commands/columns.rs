@@ -22,7 +22,8 @@ Example: kort columns flight.ulg
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLE)]
 pub struct Args {
-    /// The log: CSV (plain or gzip; commas, semicolons or tabs) or MCAP
+    /// The log, plain or gzip: PX4 ULog, ArduPilot DataFlash, ROS 2 bag (MCAP), candump, MCAP with JSON, or CSV with commas,
+    /// semicolons or tabs
     #[arg(value_name = "LOG")]
     log: PathBuf,
     /// List the fields of every kind of message, not only of those that look like a thruster's
