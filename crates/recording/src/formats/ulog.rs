@@ -201,11 +201,7 @@ impl<R: BufRead> Reader<'_, R> {
             }
             b'I' => self.info(data),
             b'A' => self.subscribe(data),
-            b'D' => {
-                if self.message(data).is_none() {
-                    self.bad += 1;
-                }
-            }
+            b'D' => self.bad += u64::from(self.message(data).is_none()),
             b'O' => {
                 self.dropouts += 1;
                 self.dropped_ms += bytes(data, 0).map_or(0, |b| u64::from(u16::from_le_bytes(b)));
