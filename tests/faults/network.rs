@@ -84,7 +84,7 @@ pub fn half_open(table: &mut Table) {
     table.row(
         format!("{} half-open sockets", half.len()),
         "stop is confirmed",
-        Duration::from_millis(250),
+        Duration::from_millis(100),
         &measured,
     );
 }
