@@ -1,11 +1,16 @@
 //! How much a set of effects leaves, against noise.
 
 use std::collections::BTreeMap;
+use std::f64::consts::TAU;
 
+use kort_identify::data::{Prepared, Response};
+use kort_identify::fit::Fit;
 use kort_identify::scores;
 use kort_identify::simulate::{Problem, Stack};
+use kort_thruster::rig::Rig;
 
 use crate::constants::Constants;
+use crate::follows::follows;
 
 /// Noise variance from sample to sample, by channel.
 type Floor = BTreeMap<&'static str, f64>;
@@ -22,20 +27,129 @@ pub fn excess(problem: &Problem, residual: &Stack, floor: &Floor) -> f64 {
         .sum()
 }
 
-/// The channel on which a residual is largest against what noise of such a sensor can be, with its size over
-/// full scale, if it is more than that.
-pub fn more_than_noise(problem: &Problem, residual: &Stack, floor: &Floor) -> Option<(&'static str, f64)> {
+/// More error than noise.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rest {
+    /// The channel on which it is largest against what may be.
+    pub channel: &'static str,
+    /// Root mean square over full scale.
+    pub size: f64,
+    /// Over what may be.
+    pub ratio: f64,
+}
+
+/// What a fit leaves that is no noise: either it follows what the machine does by more than our equations may err, or
+/// it is larger, most of the time, than sensors of this kind are.
+pub fn more_than_noise(problem: &Problem, fit: &Fit, residual: &Stack, floor: &Floor) -> Option<Rest> {
+    let may_err =
+        problem.spectrum.variances(problem.floor.with_actions(&fit.actions, &problem.criterion).levels());
+    let following = follows(problem, fit, residual);
+    let lasting = lasting(problem, residual);
+    let mut all = Vec::new();
+    for (r, recording) in problem.recordings.iter().enumerate() {
+        for (c, channel) in recording.channels.iter().enumerate() {
+            let rest = |size: f64, may: f64| Rest {
+                channel: channel.response.name(),
+                size: size / channel.full_scale,
+                ratio: size / may.max(1e-300),
+            };
+            all.push(rest(following[r][c], may_err[r][c].sqrt()));
+            let noise = floor.get(channel.response.name()).copied().unwrap_or(0.0);
+            let beyond = (lasting[r][c] - noise).max(0.0).sqrt();
+            let practical = practical(channel.response) * channel.full_scale;
+            all.push(rest(beyond, practical.hypot(resolution(problem.rig, recording, channel.response))));
+        }
+    }
+    all.into_iter().filter(|rest| rest.ratio > 1.0).max_by(|a, b| a.ratio.total_cmp(&b.ratio))
+}
+
+/// Largest error of good sensors over their full scale, beyond the noise from one sample to the next.
+fn practical(response: Response) -> f64 {
     let constants = Constants::built_in().remainder;
-    let full = scores::full_scales(problem);
-    scores::sums(problem, residual, |r, row| !problem.masked[r][row])
-        .into_iter()
-        .map(|(name, (sum, n))| {
-            let noise = floor.get(name).copied().unwrap_or(0.0);
-            let size = (sum / n.max(1) as f64 - noise).max(0.0).sqrt() / full[name];
-            let allowed = if name == "flow_m_s" { constants.practical_flow } else { constants.practical };
-            (name, size, size / allowed)
-        })
-        .filter(|(_, _, ratio)| *ratio > 1.0)
-        .max_by(|a, b| a.2.total_cmp(&b.2))
-        .map(|(name, size, _)| (name, size))
+    if response == Response::Flow { constants.practical_flow } else { constants.practical }
+}
+
+/// Error of a speed from an encoder's counts, rad/s: counts are off by a uniform rounding each, differenced over an
+/// interval and smoothed by the stated filter.
+fn resolution(rig: &Rig, recording: &Prepared, response: Response) -> f64 {
+    let Some(counts) = rig.sensors.encoder_counts_per_rev else { return 0.0 };
+    let rounding_rad = TAU / counts / 12.0_f64.sqrt();
+    match response {
+        Response::ShaftSpeed => {
+            let filter_s = rig.sensors.speed_filter_time_constant_s.unwrap_or(0.0);
+            let share = if filter_s > 0.0 { 1.0 - (-recording.tick_s / filter_s).exp() } else { 1.0 };
+            rounding_rad / recording.tick_s * share * (2.0 / (2.0 - share)).sqrt()
+        }
+        Response::ShaftAngle => {
+            let row_s = recording.duration_s() / (recording.time_s.len() - 1) as f64;
+            rounding_rad / row_s * 2.0_f64.sqrt()
+        }
+        _ => 0.0,
+    }
+}
+
+/// Pieces of a recording a second.
+const PIECES_A_SECOND: f64 = 4.0;
+/// Share of the pieces that count: what a log missed about a step of the command shows in few.
+const USUAL: f64 = 0.9;
+
+/// Mean square of a residual without its largest tenth, in quarters of a second, by recording and channel.
+fn lasting(problem: &Problem, residual: &Stack) -> Vec<Vec<f64>> {
+    let of = |r: usize, c: usize| {
+        let recording = &problem.recordings[r];
+        let mut pieces: BTreeMap<i64, (f64, usize)> = BTreeMap::new();
+        for (row, error) in recording.channels[c].rows.iter().zip(&residual[r][c]) {
+            if !problem.masked[r][*row] {
+                let piece = pieces.entry((recording.time_s[*row] * PIECES_A_SECOND) as i64).or_default();
+                *piece = (piece.0 + error * error, piece.1 + 1);
+            }
+        }
+        let mut pieces: Vec<(f64, usize)> = pieces.into_values().collect();
+        pieces.sort_by(|a, b| (a.0 / a.1 as f64).total_cmp(&(b.0 / b.1 as f64)));
+        pieces.truncate((USUAL * pieces.len() as f64).ceil() as usize);
+        let (sum, n) = pieces.iter().fold((0.0, 0), |(s, n), piece| (s + piece.0, n + piece.1));
+        sum / n.max(1) as f64
+    };
+    (0..residual.len()).map(|r| (0..residual[r].len()).map(|c| of(r, c)).collect()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use kort_identify::scores::noise_floor;
+
+    use super::more_than_noise;
+    use crate::stand;
+
+    /// Whether an error of the shaft's speed, in hundredths of its full scale of 30 rad/s, is more than noise.
+    fn more(error: impl Fn(f64, f64, f64) -> f64) -> bool {
+        stand::left(
+            |speed, time, noise| 0.3 * error(speed, time, noise),
+            |problem, fit, residual| {
+                more_than_noise(problem, fit, residual, &noise_floor(problem, residual)).is_some()
+            },
+        )
+    }
+
+    #[test]
+    fn noise_of_any_size_is_noise() {
+        assert!(!more(|_, _, noise| 0.2 * noise));
+        assert!(!more(|_, _, noise| 6.0 * noise));
+    }
+
+    #[test]
+    fn what_follows_the_speed_is_none_however_much_noise_is_about() {
+        assert!(more(|speed, _, noise| 3.0 * (2.0 * speed).sin() + 4.0 * noise));
+        assert!(
+            !more(|speed, _, noise| 0.1 * (2.0 * speed).sin() + 4.0 * noise),
+            "less than our equations may err"
+        );
+    }
+
+    #[test]
+    fn what_follows_nothing_counts_from_a_practical_size_and_for_most_of_the_time_on() {
+        assert!(more(|_, time, noise| 4.0 * (0.7 * time).sin() + 0.2 * noise));
+        assert!(!more(|_, time, noise| 1.0 * (0.7 * time).sin() + 0.2 * noise));
+        let two_seconds = |time: f64| if (11.0..13.0).contains(&time) { 20.0 } else { 0.0 };
+        assert!(!more(|_, time, noise| two_seconds(time) * (0.7 * time).sin() + 0.2 * noise));
+    }
 }

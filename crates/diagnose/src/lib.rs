@@ -9,14 +9,18 @@ pub mod decide;
 pub mod diagnose;
 mod experiment;
 pub mod flexible;
+mod follows;
 mod left;
 mod locate;
 mod nameless;
+mod place;
 pub mod posterior;
 mod probe;
 pub mod report;
 mod screen;
 mod search;
+#[cfg(test)]
+mod stand;
 pub mod traces;
 mod unknown;
 mod words;

@@ -1,11 +1,12 @@
 //! The report of a diagnosis: fits on training rows, scores on the others, and everything put in its place.
 
-use kort_identify::data::Series;
+use kort_identify::data::{Series, available};
 use kort_identify::fit::Fit;
 use kort_identify::heldout::held_out_rows;
 use kort_identify::hypothesis::Member;
 use kort_identify::scores::{self, HeldOut, parameters};
 use kort_identify::simulate::{Problem, Stack};
+use kort_thruster::effects::Path;
 use kort_thruster::rig::Rig;
 
 use crate::constants::Constants;
@@ -13,8 +14,9 @@ use crate::decide::{Circumstances, Decision, Named, decide};
 use crate::diagnose::Options;
 use crate::experiment;
 use crate::flexible::is_term;
-use crate::left;
+use crate::left::{self, Rest};
 use crate::locate::{self, locate};
+use crate::place;
 use crate::posterior::{Explanation, presence};
 use crate::report::{Alternative, Baseline, Finding, Mismatch, Remainder, Report, SetReport, Verdict};
 use crate::search::{Search, Set};
@@ -129,7 +131,7 @@ impl<'a, 'p> Writer<'a, 'p> {
         let named_full = self.residual(named_fit);
         let whole = (self.excess(&baseline_full) - self.excess(&last_full)).max(1e-300);
         let left = (self.excess(&named_full) - self.excess(&last_full)).max(0.0) / whole;
-        let rest = left::more_than_noise(problem, &last_full, &self.floor);
+        let rest = left::more_than_noise(problem, self.last, &last_full, &self.floor);
         let circumstances = Circumstances {
             thin: thin.is_some(),
             broke_down: false,
@@ -181,10 +183,10 @@ impl<'a, 'p> Writer<'a, 'p> {
                 findings.push((share, finding));
             }
         }
-        if let (Some((channel, size)), Verdict::Unexplained) = (rest, decision.verdict)
+        if let (Some(rest), Verdict::Unexplained) = (rest, decision.verdict)
             && mismatch.is_empty()
         {
-            mismatch.push((1.0, self.bare(channel, size, &baseline_full, &speed)));
+            mismatch.push((1.0, self.bare(rest, &baseline_full, &speed)));
         }
         // In the order of what each removes; of rivals the likeliest first.
         findings.sort_by(|a, b| b.0.total_cmp(&a.0).then(b.1.probability.total_cmp(&a.1.probability)));
@@ -214,8 +216,8 @@ impl<'a, 'p> Writer<'a, 'p> {
                     nrmse: words::nrmse(problem, &named_full),
                 })
             }
-            (None, Some((channel, size))) => {
-                let bare = self.bare(channel, size, &last_full, &speed);
+            (None, Some(rest)) => {
+                let bare = self.bare(rest, &last_full, &speed);
                 let share = self.excess(&last_full) / self.excess(&baseline_full).max(1e-300);
                 Some(Remainder {
                     share_of_excess_error: share.clamp(0.0, 1.0),
@@ -278,24 +280,20 @@ impl<'a, 'p> Writer<'a, 'p> {
         (report, traces(problem, &baseline_full, &last_full, &speed))
     }
 
-    /// A mismatch that neither name nor term describes, located by its error alone.
-    fn bare(&self, channel: &str, size: f64, residual: &Stack, speed: &[Vec<f64>]) -> Mismatch {
+    /// A mismatch that neither name nor term describes: located by its error, on the path by which a cause that is
+    /// free in time would explain most of it.
+    fn bare(&self, rest: Rest, residual: &Stack, speed: &[Vec<f64>]) -> Mismatch {
         let nothing: Stack =
             residual.iter().map(|r| r.iter().map(|c| vec![0.0; c.len()]).collect()).collect();
         let located = locate(self.problem, residual, &nothing, speed);
+        let offered = available(self.options.model, self.series, &self.problem.recordings);
+        let path = place::path(self.problem, self.last, self.rig, &offered);
         Mismatch {
-            path: match channel {
-                "current_a" => "drive",
-                "shaft_speed_rad_s" | "shaft_angle_rad" => "shaft",
-                "flow_m_s" => "flow",
-                "thrust_n" => "sensor",
-                _ => "blade",
-            }
-            .into(),
-            channel: channel.into(),
-            regime: format!("{} ({:.1} % of full scale above the noise)", located.regime, 100.0 * size),
+            path: path.map_or("sensor", Path::name).into(),
+            channel: rest.channel.into(),
+            regime: format!("{} ({:.1} % of full scale that is no noise)", located.regime, 100.0 * rest.size),
             time_s: located.spans,
-            significance_sigma: size / Constants::built_in().remainder.practical,
+            significance_sigma: rest.ratio,
             share_of_excess_error: 1.0,
         }
     }

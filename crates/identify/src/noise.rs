@@ -96,6 +96,11 @@ impl Floor {
         Self(floor)
     }
 
+    /// Variance by band, in squares of the full scale.
+    pub fn levels(&self) -> &[f64] {
+        &self.0
+    }
+
     /// With the doubt of what drives the model (mean square by band).
     pub fn with_doubt(&self, doubt: &[f64]) -> Self {
         Self(self.0.iter().zip(doubt).map(|(f, d)| f + d).collect())

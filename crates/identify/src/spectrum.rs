@@ -132,6 +132,20 @@ impl Spectrum {
             .map(|b| all[b.lines.clone()].iter().map(|v| v * v).sum::<f64>() / b.lines.len() as f64)
             .collect()
     }
+
+    /// Mean of a variance by band over the lines of each channel of each recording, in its unit squared. What a
+    /// channel shares with another counts with it.
+    pub fn variances(&self, by_band: &[f64]) -> Vec<Vec<f64>> {
+        let mean = |frame: &Frame| {
+            let bands = self.bands.iter().zip(by_band).filter(|(b, _)| frame.lines.contains(&b.lines.start));
+            let sum: f64 = bands.map(|(b, v)| v * b.lines.len() as f64).sum();
+            sum / frame.lines.len().max(1) as f64 * frame.full_scale.powi(2)
+        };
+        let of = |frames: &Vec<Frame>| {
+            frames.iter().map(|f| mean(f) + f.less.map_or(0.0, |other| mean(&frames[other]))).collect()
+        };
+        self.frames.iter().map(of).collect()
+    }
 }
 
 impl Frame {

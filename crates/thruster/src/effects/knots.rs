@@ -14,7 +14,7 @@ pub(super) const SPEED: [&str; MOST] = knot_names!("_m_s";
     39 40 41 42 43 44 45 46 47 48 49 50 51 52 53 54 55 56 57 58 59 60 61 62 63 64 65 66 67 68 69 70 71 72 73
     74 75 76 77 78 79 80 81 82);
 /// Names of knots of a share.
-pub(super) const SHARE: [&str; MOST] = knot_names!("";
+pub const SHARE: [&str; MOST] = knot_names!("";
     1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23 24 25 26 27 28 29 30 31 32 33 34 35 36 37 38
     39 40 41 42 43 44 45 46 47 48 49 50 51 52 53 54 55 56 57 58 59 60 61 62 63 64 65 66 67 68 69 70 71 72 73
     74 75 76 77 78 79 80 81 82);
@@ -26,7 +26,7 @@ const CLOSEST_S: f64 = 0.8;
 
 /// The distance of the knots, then the knots: one every 0.8 s or every eightieth of the recording,
 /// whichever is longer.
-pub(super) fn specs(
+pub fn specs(
     scale: &Scale,
     names: &[&'static str; MOST],
     unit: &'static str,
@@ -48,7 +48,7 @@ pub(super) fn specs(
 }
 
 /// Straight pieces; the knots repeat past the last one, so a recording may begin at any time.
-pub(super) struct Knots<T> {
+pub struct Knots<T> {
     spacing_s: f64,
     values: Vec<T>,
 }

@@ -191,7 +191,7 @@ pub fn one_start(_: &Scale) -> Vec<Vec<f64>> {
     Vec::new()
 }
 
-mod knots;
+pub mod knots;
 mod memory;
 mod needs;
 mod spec;
