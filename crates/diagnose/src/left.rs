@@ -138,7 +138,7 @@ mod tests {
 
     #[test]
     fn what_follows_the_speed_is_none_however_much_noise_is_about() {
-        assert!(more(|speed, _, noise| 3.0 * (2.0 * speed).sin() + 4.0 * noise));
+        assert!(more(|speed, _, noise| 1.5 * (2.0 * speed).sin() + 4.0 * noise));
         assert!(
             !more(|speed, _, noise| 0.1 * (2.0 * speed).sin() + 4.0 * noise),
             "less than our equations may err"

@@ -21,7 +21,7 @@ pub fn left<R>(error: impl Fn(f64, f64, f64) -> f64, look: impl FnOnce(&Problem,
     let levels: Vec<f64> = (0..ROWS / 100).map(|_| rng.random_range(-5.0..5.0)).collect();
     let columns = vec![
         ("current_cmd_a".into(), (0..ROWS).map(|k| levels[k / 100]).collect()),
-        ("shaft_speed_rad_s".into(), (0..ROWS).map(|k| 30.0 * (k as f64 * 0.7).sin()).collect()),
+        ("shaft_speed_rad_s".into(), (0..ROWS).map(|k| 30.0 * (k as f64 * 0.01).sin()).collect()),
     ];
     let time_s = (0..ROWS).map(|k| 0.01 * k as f64).collect();
     let series = [Series { name: "log".into(), time_s, columns }];
