@@ -191,17 +191,17 @@ fn drive(model: &mut ControlModel, rig: &Rig, effects: &[Built]) {
         model.supply_v = model.supply_v.map(|v| v * idle.supply_v / stated_v);
         model.winding_resistance_ohm = model.winding_resistance_ohm.map(|_| idle.resistance_ohm);
     }
-    model.delay_s += effects
-        .iter()
-        .zip(built(rig, model.period_s))
-        .filter(|((d, e), _)| d.shifts_time && e.hooks().drive)
-        .map(|(_, (_, mut fresh))| delay_s(fresh.as_mut(), model))
-        .sum::<f64>();
+    // What shifts the command in time is a delay; what rounds it, ahead of the amplifier, one more lag.
+    for ((d, e), (_, mut fresh)) in effects.iter().zip(built(rig, model.period_s)) {
+        if e.hooks().drive {
+            let late_s = late_s(fresh.as_mut(), model);
+            if d.shifts_time { model.delay_s += late_s } else { model.amplifier_lag_s += late_s }
+        }
+    }
 }
 
-/// How long a step of the command is away, s.
-fn delay_s(effect: &mut dyn Effect, model: &ControlModel) -> f64 {
-    let full = 0.5 * model.current_limit_a;
+/// How late a step of the command arrives in the mean, s.
+fn late_s(effect: &mut dyn Effect, model: &ControlModel) -> f64 {
     let mut passed = |command: f64| {
         let mut drive = Drive { command, current_limit_a: model.current_limit_a, ..empty() };
         effect.drive(&Tick::default(), &mut drive);
@@ -209,7 +209,12 @@ fn delay_s(effect: &mut dyn Effect, model: &ControlModel) -> f64 {
     };
     passed(0.0);
     let ticks = (LONGEST_S / model.period_s).ceil() as u32;
-    let missing = (0..ticks).map(|_| 1.0 - passed(full) / full).sum::<f64>();
+    let arrived: Vec<f64> = (0..ticks).map(|_| passed(0.5 * model.current_limit_a)).collect();
+    let whole = arrived.last().copied().unwrap_or(0.0);
+    if whole == 0.0 {
+        return 0.0;
+    }
+    let missing: f64 = arrived.iter().map(|command| 1.0 - command / whole).sum();
     (missing * model.period_s).max(0.0)
 }
 

@@ -1,5 +1,6 @@
 //! The drive follows its command more slowly than stated.
 
+use super::memory::FirstOrder;
 use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, commanded};
 use crate::plant::{Drive, Tick};
 use crate::real::Real;
@@ -9,7 +10,8 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     id: "amplifier_lag",
     path: Path::Drive,
     what: "the current loop, or a speed controller's firmware, follows the command with a longer first-order lag than stated",
-    equation: "im' = (sat(i*) - im)/(ta + e); ta stated, e [s]",
+    equation: "im' = (sat(i*) - im)/(ta + e); ta stated, e [s]: the current loop; or u' = (u* - u)/tc, tc [s]: the command \
+               itself, ahead of what the amplifier makes of it",
     signature: "every response to a command is late and rounded by a fixed time, at all amplitudes and speeds; \
                 a recorded current shows the lag itself",
     confused_with: &["transport_delay", "encoder_filter_lag", "entrained_water_inertia", "clock_skew"],
@@ -18,20 +20,33 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     commonness: 3.0,
     shifts_time: false,
     nonparametric: false,
-    forms: &[],
+    forms: &[&[0], &[1]],
     parameters,
-    starts: |scale| [0.005_f64, 0.015, 0.05].iter().map(|lag| vec![lag.max(scale.tick_s)]).collect(),
+    starts: |scale| {
+        [0.005_f64, 0.015, 0.05].map(|lag| lag.max(scale.tick_s)).map(|lag| vec![lag, lag]).to_vec()
+    },
     needs: commanded,
-    build: both!(|values, _| Box::new(AmplifierLag { extra_s: values[0] })),
+    build: both!(|values, context| Box::new(AmplifierLag {
+        extra_s: values[0],
+        command_lag_s: values[1],
+        command: FirstOrder::new(),
+        tick_s: context.tick_s,
+    })),
 };
 
-/// Negative where the drive is faster than stated; a tenth of the stated lag stays.
+/// The first is negative where the drive is faster than stated; a tenth of the stated lag stays.
 fn parameters(scale: &Scale) -> Vec<Spec> {
-    vec![Spec::strength("extra_lag_s", "s", 2.0 * scale.tick_s, -0.9 * scale.tick_s, 0.5).sigma(0.02)]
+    vec![
+        Spec::strength("extra_lag_s", "s", 2.0 * scale.tick_s, -0.9 * scale.tick_s, 0.5).sigma(0.02),
+        Spec::strength("command_lag_s", "s", 2.0 * scale.tick_s, 0.0, 0.5).sigma(0.02),
+    ]
 }
 
 struct AmplifierLag<T> {
     extra_s: T,
+    command_lag_s: T,
+    command: FirstOrder<T>,
+    tick_s: f64,
 }
 
 impl<T: Real> Effect<T> for AmplifierLag<T> {
@@ -41,5 +56,6 @@ impl<T: Real> Effect<T> for AmplifierLag<T> {
 
     fn drive(&mut self, _: &Tick, drive: &mut Drive<T>) {
         drive.time_constant_s = (drive.time_constant_s + self.extra_s).max(drive.time_constant_s * 0.1);
+        drive.command = self.command.mean_of_held(drive.command, self.command_lag_s, self.tick_s);
     }
 }

@@ -72,6 +72,26 @@ impl<T: Real> FirstOrder<T> {
     }
 }
 
+impl<T: Real> FirstOrder<T> {
+    /// The mean over this tick of the lagged signal, for an input that is held over the tick.
+    pub fn mean_of_held(&mut self, input: T, lag_s: T, tick_s: f64) -> T {
+        if !self.started {
+            *self = Self { input, output: input, started: true };
+            return input;
+        }
+        let behind = self.output - input;
+        if lag_s > 1e-3 * tick_s {
+            let left = (T::from(-tick_s) / lag_s).exp();
+            self.output = input + behind * left;
+            input + behind * (T::ONE - left) * lag_s / tick_s
+        } else {
+            // Hardly a lag: what is left of the step is its area alone.
+            self.output = input;
+            input + behind * lag_s / tick_s
+        }
+    }
+}
+
 /// A delay of which a share is dead time and the rest a first-order lag.
 pub(super) struct DelayedLag<T> {
     dead_time_s: T,
@@ -113,6 +133,17 @@ mod tests {
         assert_eq!(past.ago(0.0), 19.0);
         assert!((past.ago(0.005) - 16.5).abs() < 1e-9);
         assert!((past.ago(0.01) - 14.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_held_step_arrives_as_its_exponential_tick_by_tick() {
+        let mut lag = FirstOrder::new();
+        lag.mean_of_held(0.0, 0.02, 0.002);
+        let missing: f64 = (0..200).map(|_| 1.0 - lag.mean_of_held(1.0, 0.02, 0.002)).sum::<f64>() * 0.002;
+        assert!((missing - 0.02).abs() < 1e-9, "the step is late by the lag in the mean: {missing}");
+        let mut none = FirstOrder::new();
+        none.mean_of_held(0.0, 0.0, 0.002);
+        assert_eq!(none.mean_of_held(1.0, 0.0, 0.002), 1.0);
     }
 
     #[test]
