@@ -21,7 +21,7 @@ pub struct Constants {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RemainderConstants {
-    /// Of force, torque, current and speed, above the noise from sample to sample, most of the time.
+    /// Of force, torque, current and speed, above the noise from sample to sample.
     pub practical: f64,
     /// Of an axial flow.
     pub practical_flow: f64,

@@ -39,7 +39,7 @@ pub struct Rest {
 }
 
 /// What a fit leaves that is no noise: either it follows what the machine does by more than our equations may err, or
-/// it is larger, most of the time, than sensors of this kind are.
+/// it is larger than sensors of this kind err.
 pub fn more_than_noise(problem: &Problem, fit: &Fit, residual: &Stack, floor: &Floor) -> Option<Rest> {
     let may_err =
         problem.spectrum.variances(problem.floor.with_actions(&fit.actions, &problem.criterion).levels());
@@ -90,10 +90,13 @@ fn resolution(rig: &Rig, recording: &Prepared, response: Response) -> f64 {
 
 /// Pieces of a recording a second.
 const PIECES_A_SECOND: f64 = 4.0;
-/// Share of the pieces that count: what a log missed about a step of the command shows in few.
+/// Share of the pieces that count where a log's rows are uneven: a step of the command that was lost between two rows
+/// shows in few.
 const USUAL: f64 = 0.9;
+/// Ratio of long to short intervals, nine tenths of all between them, from which on rows are uneven.
+const UNEVEN: f64 = 1.5;
 
-/// Mean square of a residual without its largest tenth, in quarters of a second, by recording and channel.
+/// Mean square of a residual, by recording and channel; of an uneven log without the worst tenth of its pieces.
 fn lasting(problem: &Problem, residual: &Stack) -> Vec<Vec<f64>> {
     let of = |r: usize, c: usize| {
         let recording = &problem.recordings[r];
@@ -105,19 +108,29 @@ fn lasting(problem: &Problem, residual: &Stack) -> Vec<Vec<f64>> {
             }
         }
         let mut pieces: Vec<(f64, usize)> = pieces.into_values().collect();
-        pieces.sort_by(|a, b| (a.0 / a.1 as f64).total_cmp(&(b.0 / b.1 as f64)));
-        pieces.truncate((USUAL * pieces.len() as f64).ceil() as usize);
+        if is_uneven(&recording.time_s) {
+            pieces.sort_by(|a, b| (a.0 / a.1 as f64).total_cmp(&(b.0 / b.1 as f64)));
+            pieces.truncate((USUAL * pieces.len() as f64).ceil() as usize);
+        }
         let (sum, n) = pieces.iter().fold((0.0, 0), |(s, n), piece| (s + piece.0, n + piece.1));
         sum / n.max(1) as f64
     };
     (0..residual.len()).map(|r| (0..residual[r].len()).map(|c| of(r, c)).collect()).collect()
 }
 
+/// Whether intervals from row to row differ much.
+fn is_uneven(time_s: &[f64]) -> bool {
+    let mut steps: Vec<f64> = time_s.windows(2).map(|w| w[1] - w[0]).collect();
+    steps.sort_by(f64::total_cmp);
+    let at = |share: f64| steps.get((share * steps.len() as f64) as usize).copied().unwrap_or(0.0);
+    at(0.95) > UNEVEN * at(0.05)
+}
+
 #[cfg(test)]
 mod tests {
     use kort_identify::scores::noise_floor;
 
-    use super::more_than_noise;
+    use super::{is_uneven, more_than_noise};
     use crate::stand;
 
     /// Whether an error of the shaft's speed, in hundredths of its full scale of 30 rad/s, is more than noise.
@@ -146,10 +159,16 @@ mod tests {
     }
 
     #[test]
-    fn what_follows_nothing_counts_from_a_practical_size_and_for_most_of_the_time_on() {
-        assert!(more(|_, time, noise| 4.0 * (0.7 * time).sin() + 0.2 * noise));
+    fn what_follows_nothing_counts_from_a_practical_size_on() {
+        assert!(more(|_, time, noise| 6.0 * (0.7 * time).sin() + 0.2 * noise));
         assert!(!more(|_, time, noise| 1.0 * (0.7 * time).sin() + 0.2 * noise));
-        let two_seconds = |time: f64| if (11.0..13.0).contains(&time) { 20.0 } else { 0.0 };
-        assert!(!more(|_, time, noise| two_seconds(time) * (0.7 * time).sin() + 0.2 * noise));
+    }
+    #[test]
+    fn rows_are_uneven_where_most_intervals_differ() {
+        let even: Vec<f64> =
+            (0..400).filter(|k| !(150..200).contains(k)).map(|k| 0.01 * f64::from(k)).collect();
+        let uneven: Vec<f64> = (0..400).map(|k| 0.01 * (f64::from(k) + 0.4 * f64::from(k % 2))).collect();
+        assert!(!is_uneven(&even), "a gap is no uneven log");
+        assert!(is_uneven(&uneven));
     }
 }
