@@ -35,8 +35,10 @@ const BELIEVED: f64 = 0.7;
 const PRACTICAL: f64 = 0.1;
 
 /// What is known before deciding.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Circumstances {
+    /// Members of the likeliest set that do less than our equations may err by: nothing to state.
+    pub negligible: Vec<&'static str>,
     /// The recordings have too little in them.
     pub thin: bool,
     /// The simulation breaks down on the stated rig.
@@ -50,11 +52,12 @@ pub struct Circumstances {
 }
 
 /// Decides from the posterior over sets, likeliest first.
-pub fn decide(explanations: &[Explanation], circumstances: Circumstances) -> Decision {
+pub fn decide(explanations: &[Explanation], circumstances: &Circumstances) -> Decision {
     let empty: Set = Vec::new();
     let best = explanations.first().map_or(&empty, |e| &e.set);
     let term = best.iter().copied().find(|id| is_term(id));
-    let members: Vec<&'static str> = best.iter().copied().filter(|id| !is_term(id)).collect();
+    let stands = |id: &&'static str| !is_term(id) && !circumstances.negligible.contains(id);
+    let members: Vec<&'static str> = best.iter().copied().filter(stands).collect();
     // How likely a name is among all that was fitted, and whether it stands in a world that the catalogue holds.
     let among_names = |effect: &str| presence(explanations, effect, 1.0);
     let stated = |effect: &str| {
@@ -129,7 +132,7 @@ mod tests {
     use super::*;
     use crate::posterior::posterior;
 
-    fn decided(costs: &[(&[&'static str], f64)], circumstances: Circumstances) -> Decision {
+    fn decided(costs: &[(&[&'static str], f64)], circumstances: &Circumstances) -> Decision {
         let costs = costs.iter().map(|(set, cost)| (set.to_vec(), *cost)).collect();
         decide(&posterior(costs, 3.0, 0.03), circumstances)
     }
@@ -137,11 +140,13 @@ mod tests {
     #[test]
     fn verdicts_follow_from_the_posterior() {
         let usual = Circumstances { beside_unknown: 0.75, ..Circumstances::default() };
-        let left = Circumstances { left: 0.4, ..usual };
-        let thin = Circumstances { thin: true, ..usual };
-        let much = Circumstances { more_than_noise: true, ..usual };
-        let broke_down = Circumstances { broke_down: true, ..usual };
-        type Case<'a> = (&'a [(&'a [&'static str], f64)], Circumstances, Verdict);
+        let left = Circumstances { left: 0.4, ..usual.clone() };
+        let thin = Circumstances { thin: true, ..usual.clone() };
+        let much = Circumstances { more_than_noise: true, ..usual.clone() };
+        let broke_down = Circumstances { broke_down: true, ..usual.clone() };
+        let tiny = Circumstances { negligible: vec!["windage_drag"], ..usual.clone() };
+        let (usual, left, thin, much, broke_down, tiny) = (&usual, &left, &thin, &much, &broke_down, &tiny);
+        type Case<'a> = (&'a [(&'a [&'static str], f64)], &'a Circumstances, Verdict);
         let table: &[Case] = &[
             (&[(&[], 0.0), (&["windage_drag"], 12.0)], usual, Verdict::NoMismatch),
             (&[(&["windage_drag"], 0.0), (&[], 80.0)], usual, Verdict::Explained),
@@ -156,11 +161,13 @@ mod tests {
             ),
             (&[(&[], 0.0), (&["windage_drag"], 12.0)], much, Verdict::Unexplained),
             (&[(&["windage_drag"], 0.0), (&[], 80.0)], much, Verdict::PartlyExplained),
+            (&[(&["windage_drag"], 0.0), (&[], 80.0)], tiny, Verdict::NoMismatch),
+            (&[(&["duct_loss", "windage_drag"], 0.0), (&[], 80.0)], tiny, Verdict::Explained),
             (&[(&[], 0.0)], thin, Verdict::InsufficientData),
             (&[], broke_down, Verdict::InsufficientData),
         ];
         for (costs, circumstances, verdict) in table {
-            assert_eq!(decided(costs, *circumstances).verdict, *verdict, "{costs:?}");
+            assert_eq!(decided(costs, circumstances).verdict, *verdict, "{costs:?}");
         }
     }
 
@@ -168,12 +175,12 @@ mod tests {
     fn beside_more_than_noise_a_name_is_stated_lower_and_still_believed() {
         let costs: &[(&[&'static str], f64)] = &[(&["windage_drag"], 0.0), (&[], 80.0)];
         let usual = Circumstances { beside_unknown: 0.75, ..Circumstances::default() };
-        let much = Circumstances { more_than_noise: true, ..usual };
-        let (alone, beside) = (decided(costs, usual), decided(costs, much));
+        let much = Circumstances { more_than_noise: true, ..usual.clone() };
+        let (alone, beside) = (decided(costs, &usual), decided(costs, &much));
         assert!((beside.named[0].probability - 0.75 * alone.named[0].probability).abs() < 1e-12);
         // The factor is not counted again where a nameless term stands in the set already.
         let with_term: &[(&[&'static str], f64)] = &[(&["unknown_shaft_step", "windage_drag"], 0.0)];
-        let (once, twice) = (decided(with_term, usual), decided(with_term, much));
+        let (once, twice) = (decided(with_term, &usual), decided(with_term, &much));
         assert!((once.named[0].probability - twice.named[0].probability).abs() < 1e-12);
         assert_eq!(beside.verdict, Verdict::PartlyExplained);
     }
@@ -186,7 +193,7 @@ mod tests {
                 (&["duct_loss", "coulomb_friction"], 1.0),
                 (&["duct_loss"], 70.0),
             ],
-            Circumstances { beside_unknown: 0.75, ..Circumstances::default() },
+            &Circumstances { beside_unknown: 0.75, ..Circumstances::default() },
         );
         let names: Vec<&str> = decision.named.iter().map(|n| n.effect).collect();
         assert_eq!(names, ["duct_loss", "windage_drag", "coulomb_friction"]);

@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 
 use kort_identify::data::{Prepared, Response};
 use kort_identify::fit::Fit;
+use kort_identify::hypothesis::Member;
 use kort_identify::scores;
 use kort_identify::simulate::{Problem, Stack};
 use kort_thruster::rig::Rig;
@@ -61,6 +62,20 @@ pub fn more_than_noise(problem: &Problem, fit: &Fit, residual: &Stack, floor: &F
         }
     }
     all.into_iter().filter(|rest| rest.ratio > 1.0).max_by(|a, b| a.ratio.total_cmp(&b.ratio))
+}
+
+/// Effects of a fit that do less, on every channel, than our equations may err by, each with what it does at most over
+/// full scale: such a name would be one for the error of an equation.
+pub fn negligible(problem: &Problem, fit: &Fit) -> Vec<(&'static str, f64)> {
+    let may_err = problem.spectrum.variances(problem.floor.levels());
+    let small = |(member, action): (&Member, &Vec<f64>)| {
+        let acts = problem.spectrum.variances(action);
+        let channels = acts.iter().flatten().zip(may_err.iter().flatten());
+        let full = problem.recordings.iter().flat_map(|r| &r.channels).map(|c| c.full_scale);
+        let share = acts.iter().flatten().zip(full).map(|(v, full)| v.sqrt() / full).fold(0.0, f64::max);
+        channels.clone().all(|(acts, may)| acts < may).then_some((member.effect.id, share))
+    };
+    fit.hypothesis.effects.iter().zip(&fit.actions).filter_map(small).collect()
 }
 
 /// Largest error of good sensors over their full scale, beyond the noise from one sample to the next.

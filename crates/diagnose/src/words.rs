@@ -90,6 +90,15 @@ pub fn nrmse(problem: &Problem, residual: &Stack) -> BTreeMap<String, f64> {
         .collect()
 }
 
+/// A name that is likely and of no size.
+pub fn negligible(id: &str, share: f64) -> String {
+    format!(
+        "{} would fit, but does no more than {:.2} % of full scale, less than the equations themselves may err: it is not stated",
+        capital(&plain(id)),
+        100.0 * share
+    )
+}
+
 /// Coefficients that the baseline's fit needs far from what the rig states: a symptom even where the fit
 /// is good.
 pub fn strained(baseline: &Fit) -> Option<String> {

@@ -132,14 +132,16 @@ impl<'a, 'p> Writer<'a, 'p> {
         let whole = (self.excess(&baseline_full) - self.excess(&last_full)).max(1e-300);
         let left = (self.excess(&named_full) - self.excess(&last_full)).max(0.0) / whole;
         let rest = left::more_than_noise(problem, self.last, &last_full, &self.floor);
+        let negligible = left::negligible(problem, self.last);
         let circumstances = Circumstances {
+            negligible: negligible.iter().map(|n| n.0).collect(),
             thin: thin.is_some(),
             broke_down: false,
             left,
             beside_unknown: self.beside_unknown,
             more_than_noise: rest.is_some(),
         };
-        let decision = decide(&self.explanations, circumstances);
+        let decision = decide(&self.explanations, &circumstances);
 
         let baseline_trained = self.trained(self.baseline);
         let last_trained =
@@ -239,6 +241,7 @@ impl<'a, 'p> Writer<'a, 'p> {
         if let (Some(why), Verdict::InsufficientData) = (&thin, decision.verdict) {
             notes.insert(0, why.clone());
         }
+        notes.extend(negligible.iter().map(|(id, share)| words::negligible(id, *share)));
         notes.extend(words::strained(self.baseline));
         notes.extend(words::unused(self.series, problem));
         let std_baseline = problem.standard_errors(self.baseline);
@@ -272,7 +275,7 @@ impl<'a, 'p> Writer<'a, 'p> {
             findings,
             explanations: self.listed(),
             remainder,
-            alternatives: self.alternatives(&decision, empty_cost),
+            alternatives: self.alternatives(&decision, &circumstances.negligible, empty_cost),
             empirical_term,
             next_experiment,
             notes,
@@ -346,13 +349,13 @@ impl<'a, 'p> Writer<'a, 'p> {
     }
 
     /// Names that were fitted and are less likely, likeliest first.
-    fn alternatives(&self, decision: &Decision, empty_cost: f64) -> Vec<Alternative> {
+    fn alternatives(&self, decision: &Decision, negligible: &[&str], empty_cost: f64) -> Vec<Alternative> {
         let best_cost = self.search.cost(&self.best);
         let mut others: Vec<(f64, f64, &'static str)> = self
             .search
             .effects
             .iter()
-            .filter(|e| !decision.named.iter().any(|n| n.effect == e.id))
+            .filter(|e| !decision.named.iter().any(|n| n.effect == e.id) && !negligible.contains(&e.id))
             .filter_map(|e| {
                 let holding = self.search.fits.keys().filter(|set| set.contains(&e.id));
                 let cost = holding.map(|set| self.search.cost(set)).min_by(f64::total_cmp)?;
