@@ -36,7 +36,15 @@ pub(super) fn choose_driving(series: &Series, rig: &Rig, speed_driven: bool) -> 
     // What a shaft that follows its record shows: the propeller's load on a stand.
     let answered = rig.propeller.is_some() && ["thrust_n", "torque_n_m", "flow_m_s"].into_iter().any(varies);
     let powered = rig.motor.winding_resistance_ohm.is_some() && electrical_power(series).is_some();
-    Some(if powered && !answered { Driving::Power } else { Driving::Speed })
+    // A command that is held all the while drives all the same where nothing else can be compared.
+    let held =
+        |name: &&&str| series.column(name).is_some_and(|c| c.iter().any(|v| v.is_finite() && *v != 0.0));
+    Some(match commands.iter().find(held) {
+        _ if answered => Driving::Speed,
+        _ if powered => Driving::Power,
+        Some(command) => Driving::Command(command),
+        None => Driving::Speed,
+    })
 }
 
 /// Electrical power into the motor, W: recorded, or the supply's voltage times its current.
@@ -77,4 +85,31 @@ pub(super) fn instead(series: &Series, rig: &Rig, driving: &str) -> String {
         found.push_str(&format!("\nnote: {sag}"));
     }
     found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn driving(command: f64, with_thrust: bool) -> Option<Driving> {
+        let rig =
+            Rig::from_toml(include_str!("../../../../config/thrusters/whitcomb-yoerger-1999.toml")).unwrap();
+        let wave = |k: usize| (k as f64 * 0.1).sin();
+        let mut columns = vec![
+            ("current_cmd_a".into(), vec![command; 200]),
+            ("shaft_speed_rad_s".into(), (0..200).map(wave).collect()),
+        ];
+        if with_thrust {
+            columns.push(("thrust_n".into(), (0..200).map(wave).collect()));
+        }
+        let time_s = (0..200).map(|k| 0.01 * k as f64).collect();
+        choose_driving(&Series { name: "log".into(), time_s, columns }, &rig, false)
+    }
+
+    #[test]
+    fn a_command_that_is_held_drives_where_nothing_but_the_speed_can_answer() {
+        assert_eq!(driving(3.0, false), Some(Driving::Command("current_cmd_a")));
+        assert_eq!(driving(3.0, true), Some(Driving::Speed));
+        assert_eq!(driving(0.0, false), Some(Driving::Speed), "a drive that is off drives nothing");
+    }
 }
