@@ -41,6 +41,8 @@ pub struct Circumstances {
     pub negligible: Vec<&'static str>,
     /// The recordings have too little in them.
     pub thin: bool,
+    /// Members of the likeliest set that do the same all the time: of one operating point they tell one number.
+    pub steady: Vec<&'static str>,
     /// The simulation breaks down on the stated rig.
     pub broke_down: bool,
     /// Share of the squared error above the noise that the likeliest set's names leave.
@@ -83,9 +85,10 @@ pub fn decide(explanations: &[Explanation], circumstances: &Circumstances) -> De
         }
     }
     let believed = |n: &Named| among_names(n.effect) >= BELIEVED && n.rivals.is_empty();
+    let changes = |n: &Named| !circumstances.steady.contains(&n.effect);
     let verdict = if circumstances.broke_down
         // Steady data cannot part physics from parameters; that something changed in mid-run they show.
-        || circumstances.thin && term.is_none() && !named.iter().any(believed)
+        || circumstances.thin && term.is_none() && !named.iter().any(|n| believed(n) && changes(n))
     {
         Verdict::InsufficientData
     } else if named.is_empty() {
@@ -143,9 +146,11 @@ mod tests {
         let left = Circumstances { left: 0.4, ..usual.clone() };
         let thin = Circumstances { thin: true, ..usual.clone() };
         let much = Circumstances { more_than_noise: true, ..usual.clone() };
+        let one_point = Circumstances { steady: vec!["windage_drag"], ..thin.clone() };
         let broke_down = Circumstances { broke_down: true, ..usual.clone() };
         let tiny = Circumstances { negligible: vec!["windage_drag"], ..usual.clone() };
-        let (usual, left, thin, much, broke_down, tiny) = (&usual, &left, &thin, &much, &broke_down, &tiny);
+        let (usual, left, thin, much) = (&usual, &left, &thin, &much);
+        let (one_point, broke_down, tiny) = (&one_point, &broke_down, &tiny);
         type Case<'a> = (&'a [(&'a [&'static str], f64)], &'a Circumstances, Verdict);
         let table: &[Case] = &[
             (&[(&[], 0.0), (&["windage_drag"], 12.0)], usual, Verdict::NoMismatch),
@@ -164,6 +169,8 @@ mod tests {
             (&[(&["windage_drag"], 0.0), (&[], 80.0)], tiny, Verdict::NoMismatch),
             (&[(&["duct_loss", "windage_drag"], 0.0), (&[], 80.0)], tiny, Verdict::Explained),
             (&[(&[], 0.0)], thin, Verdict::InsufficientData),
+            (&[(&["windage_drag"], 0.0), (&[], 80.0)], thin, Verdict::Explained),
+            (&[(&["windage_drag"], 0.0), (&[], 80.0)], one_point, Verdict::InsufficientData),
             (&[], broke_down, Verdict::InsufficientData),
         ];
         for (costs, circumstances, verdict) in table {

@@ -78,6 +78,23 @@ pub fn negligible(problem: &Problem, fit: &Fit) -> Vec<(&'static str, f64)> {
     fit.hypothesis.effects.iter().zip(&fit.actions).filter_map(small).collect()
 }
 
+/// Share of what an effect does that is the same all the time, from which on it is steady.
+const STEADY: f64 = 0.9;
+
+/// Effects of a fit that only shift each channel.
+pub fn steady(problem: &Problem, fit: &Fit) -> Vec<&'static str> {
+    let bands = &problem.spectrum.bands;
+    // The first band of each channel is its constant.
+    let first = |b: usize| b == 0 || !bands[b - 1].continues;
+    let shifts = |action: &Vec<f64>| {
+        let power = |b: usize| action[b] * bands[b].lines.len() as f64;
+        let whole: f64 = (0..bands.len()).map(power).sum();
+        (0..bands.len()).filter(|b| first(*b)).map(power).sum::<f64>() > STEADY * whole
+    };
+    let effects = fit.hypothesis.effects.iter().zip(&fit.actions);
+    effects.filter(|(_, action)| shifts(action)).map(|(member, _)| member.effect.id).collect()
+}
+
 /// Largest error of good sensors over their full scale, beyond the noise from one sample to the next.
 fn practical(response: Response) -> f64 {
     let constants = Constants::built_in().remainder;

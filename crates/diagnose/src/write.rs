@@ -136,6 +136,7 @@ impl<'a, 'p> Writer<'a, 'p> {
         let circumstances = Circumstances {
             negligible: negligible.iter().map(|n| n.0).collect(),
             thin: thin.is_some(),
+            steady: left::steady(problem, self.last),
             broke_down: false,
             left,
             beside_unknown: self.beside_unknown,
