@@ -14,10 +14,10 @@ use crate::constants::Constants;
 use crate::follows::follows;
 
 /// Noise variance from sample to sample, by channel.
-type Floor = BTreeMap<&'static str, f64>;
+type Noise = BTreeMap<&'static str, f64>;
 
 /// Squared error above the noise over full scale, all channels.
-pub fn excess(problem: &Problem, residual: &Stack, floor: &Floor) -> f64 {
+pub fn excess(problem: &Problem, residual: &Stack, floor: &Noise) -> f64 {
     let full = scores::full_scales(problem);
     scores::sums(problem, residual, |r, row| !problem.masked[r][row])
         .into_iter()
@@ -41,7 +41,7 @@ pub struct Rest {
 
 /// What a fit leaves that is no noise: either it follows what the machine does by more than our equations may err, or
 /// it is larger than sensors of this kind err.
-pub fn more_than_noise(problem: &Problem, fit: &Fit, residual: &Stack, floor: &Floor) -> Option<Rest> {
+pub fn more_than_noise(problem: &Problem, fit: &Fit, residual: &Stack, floor: &Noise) -> Option<Rest> {
     let may_err =
         problem.spectrum.variances(problem.floor.with_actions(&fit.actions, &problem.criterion).levels());
     let following = follows(problem, fit, residual);
@@ -67,13 +67,16 @@ pub fn more_than_noise(problem: &Problem, fit: &Fit, residual: &Stack, floor: &F
 /// Effects of a fit that do less, on every channel, than our equations may err by, each with what it does at most over
 /// full scale: such a name would be one for the error of an equation.
 pub fn negligible(problem: &Problem, fit: &Fit) -> Vec<(&'static str, f64)> {
-    let may_err = problem.spectrum.variances(problem.floor.levels());
+    // The form error alone: doubts of stamps and of what runs between samples are no error of an equation.
+    let signal: Vec<f64> = problem.spectrum.bands.iter().map(|band| band.signal).collect();
+    let share = problem.criterion.form_error.powi(2);
+    let signals = problem.spectrum.variances(&signal);
     let small = |(member, action): (&Member, &Vec<f64>)| {
         let acts = problem.spectrum.variances(action);
-        let channels = acts.iter().flatten().zip(may_err.iter().flatten());
+        let mut channels = acts.iter().flatten().zip(signals.iter().flatten());
         let full = problem.recordings.iter().flat_map(|r| &r.channels).map(|c| c.full_scale);
-        let share = acts.iter().flatten().zip(full).map(|(v, full)| v.sqrt() / full).fold(0.0, f64::max);
-        channels.clone().all(|(acts, may)| acts < may).then_some((member.effect.id, share))
+        let most = acts.iter().flatten().zip(full).map(|(v, full)| v.sqrt() / full).fold(0.0, f64::max);
+        channels.all(|(acts, signal)| *acts < share * signal).then_some((member.effect.id, most))
     };
     fit.hypothesis.effects.iter().zip(&fit.actions).filter_map(small).collect()
 }

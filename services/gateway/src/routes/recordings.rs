@@ -168,7 +168,7 @@ async fn remove(
         (status = 200, description = "The file", headers(("content-disposition" = String, description = "Name to save it under")),
             content((Vec<u8> = "application/octet-stream"), (String = "text/csv"))),
         (status = 400, description = "`malformed-path`, `malformed-query`", body = Problem, content_type = "application/problem+json"),
-        (status = 404, description = "`unknown-recording`", body = Problem, content_type = "application/problem+json")))]
+        (status = 404, description = "`unknown-recording`: there is none of this name, or nothing of it can be read yet", body = Problem, content_type = "application/problem+json")))]
 async fn fetch(
     State(app): State<Arc<App>>,
     Path(name): Path<String>,
@@ -203,10 +203,16 @@ async fn as_it_is(path: &std::path::Path) -> Result<Body, Problem> {
 
 /// Recordings are kept as MCAP; CSV is made of it when it is asked for.
 fn as_csv(path: &std::path::Path) -> Result<Vec<u8>, Problem> {
-    let recording = kort_recording::Recording::read(path, None).map_err(|error| unreadable(path, error))?;
+    let recording = kort_recording::Recording::read(path, None).map_err(nothing_yet)?;
     let mut text = std::io::Cursor::new(Vec::new());
     recording.write(kort_recording::Format::Csv, &mut text).map_err(|error| unreadable(path, error))?;
     Ok(text.into_inner())
+}
+
+/// A recording that has just begun has no complete chunk, and one that a killed process left may have none at all.
+fn nothing_yet(error: impl std::fmt::Display) -> Problem {
+    Problem::new(Kind::UnknownRecording, format!("nothing of it can be read: {error}"))
+        .hint("a running recording is written within a second; as `.mcap` the file is sent as it is")
 }
 
 fn unreadable(path: &std::path::Path, error: impl std::fmt::Display) -> Problem {
