@@ -126,6 +126,7 @@ fn a_late_drive_and_late_sensors_leave_the_loop_stable() {
         for (id, sizes) in [
             ("transport_delay", &[("delay_s", 10.0)][..]),
             ("amplifier_lag", &[("extra_lag_s", 4.0)]),
+            ("amplifier_lag", &[("command_lag_s", 4.0)]),
             ("thrust_sensor_lag", &[("thrust_lag_s", 3.0)]),
         ] {
             let effect = [known(&rig, id, sizes)];

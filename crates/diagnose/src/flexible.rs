@@ -186,7 +186,8 @@ macro_rules! term {
     };
 }
 
-fn flow_seen(rig: &Rig, available: &Available) -> Result<(), &'static str> {
+/// Needs water with an axial flow of its own.
+pub(crate) fn flow_seen(rig: &Rig, available: &Available) -> Result<(), &'static str> {
     wet(rig, available)?;
     if available.axial_flow_modelled { Ok(()) } else { Err("the baseline has no axial flow") }
 }

@@ -36,6 +36,7 @@ pub fn follows(problem: &Problem, fit: &Fit, residual: &Stack) -> Vec<Vec<f64>> 
     for (r, recording) in problem.recordings.iter().enumerate() {
         let (from, to) = (recording.time_s[0], recording.time_s[recording.time_s.len() - 1]);
         for (c, channel) in recording.channels.iter().enumerate() {
+            // A sensor slower than the log keeps all its samples.
             let few = channel.rows.len() * every < recording.time_s.len() * 2;
             let every = if few { 1 } else { every };
             let picks =

@@ -15,6 +15,7 @@ use kort_thruster::real::Real;
 use kort_thruster::rig::Rig;
 use rayon::prelude::*;
 
+use crate::flexible::flow_seen;
 use crate::nameless::nameless;
 use crate::probe::{probe, promises};
 
@@ -97,11 +98,6 @@ macro_rules! place {
             build: both!(|values, _: &Context<_>| InTime::boxed(Place::$place, values)),
         };
     };
-}
-
-fn flow_seen(rig: &Rig, available: &Available) -> Result<(), &'static str> {
-    wet(rig, available)?;
-    if available.axial_flow_modelled { Ok(()) } else { Err("the baseline has no axial flow") }
 }
 
 fn torque_measured(_: &Rig, available: &Available) -> Result<(), &'static str> {

@@ -196,11 +196,17 @@ fn rate(topic: &Topic, stretch: usize) -> String {
     }
 }
 
+/// Topics in use beside the one whose messages are the rows.
+fn beside(taken: &[Taken], grid: usize) -> Vec<usize> {
+    let mut topics: Vec<usize> = taken.iter().map(|one| one.topic).filter(|topic| *topic != grid).collect();
+    topics.sort_unstable();
+    topics.dedup();
+    topics
+}
+
 /// How several rates became one.
 fn words(log: &Log, taken: &[Taken], grid: usize, stretch: usize) -> String {
-    let mut others: Vec<usize> = taken.iter().map(|one| one.topic).filter(|topic| *topic != grid).collect();
-    others.sort_unstable();
-    others.dedup();
+    let others = beside(taken, grid);
     let mut text = format!(
         "{}, stamps are {}; the rows are the messages of {}",
         log.format,
@@ -219,9 +225,6 @@ fn words(log: &Log, taken: &[Taken], grid: usize, stretch: usize) -> String {
 
 /// Gaps in the topics beside the one that makes the rows, whose gaps are those of the recording.
 fn silences(log: &Log, taken: &[Taken], grid: usize, stretch: usize) -> Vec<String> {
-    let mut topics: Vec<usize> = taken.iter().map(|one| one.topic).filter(|topic| *topic != grid).collect();
-    topics.sort_unstable();
-    topics.dedup();
     let line = |place: usize| {
         let topic = &log.topics[place];
         let (_, gaps) = steps(&topic.stamps_s[topic.stretch(stretch)]);
@@ -229,7 +232,7 @@ fn silences(log: &Log, taken: &[Taken], grid: usize, stretch: usize) -> Vec<Stri
         let (name, count) = (&topic.name, gaps.len());
         Some(format!("{count} gap(s) in `{name}`, the longest from {} to {} s", longest.0, longest.1))
     };
-    topics.into_iter().filter_map(line).collect()
+    beside(taken, grid).into_iter().filter_map(line).collect()
 }
 
 #[cfg(test)]

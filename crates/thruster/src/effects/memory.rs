@@ -70,9 +70,7 @@ impl<T: Real> FirstOrder<T> {
         self.input = input;
         self.output
     }
-}
 
-impl<T: Real> FirstOrder<T> {
     /// The mean over this tick of the lagged signal, for an input that is held over the tick.
     pub fn mean_of_held(&mut self, input: T, lag_s: T, tick_s: f64) -> T {
         if !self.started {
