@@ -184,6 +184,7 @@ proptest! {
             (Body::Setpoint, r#"{"thrust_n": 25.0"#),
             (Body::Lease, r#"{"holder": "bench""#),
             (Body::Controller, r#"{"controller": "velocity_servo""#),
+            (Body::Excitation, r#"{"limit": 60"#),
             (Body::Rig, r#"{"revision": 1"#),
             (Body::Diagnosis, r#"{"last_s": 60"#),
             (Body::Recording, r#"{"name": "x""#),

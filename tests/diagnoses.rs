@@ -1,4 +1,4 @@
-//! Diagnoses of a running thruster, from outside: begun, followed, read, used, gone back from, cancelled.
+//! Diagnoses of a running thruster and the test signals for them, from outside: played, begun, followed, read, used, gone back from, cancelled.
 
 mod common;
 
@@ -145,6 +145,131 @@ fn a_diagnosis_gives_way_is_cancelled_and_ends_with_its_gateway() {
         assert_eq!(states, [(&json!(id), &json!("cancelled")), (&json!(second), &json!("failed"))]);
         assert_eq!(stack.http("DELETE", &format!("/diagnoses/{id}"), None).unwrap().0, 204);
         assert_eq!(stack.http("GET", &format!("/diagnoses/{id}"), None).unwrap().0, 404);
+    });
+}
+
+#[test]
+fn a_test_signal_plays_under_the_lease_and_ends_at_zero() {
+    common::in_real_time(|| {
+        let mut stack = Stack::start();
+        let ramp = |to: f64, duration_s: f64| json!({"segments": [{"kind": "ramp", "from": 0, "to": to, "duration_s": duration_s}]});
+        // What it would do is told without a lease; what it may not do is refused before anything moves.
+        let preview = stack.expect("POST", "/excitation?dry_run=true", Some(ramp(60.0, 4.0)));
+        assert_eq!((&preview["state"], preview["preview"][500][1].as_f64()), (&json!("preview"), Some(30.0)));
+        for (body, slug) in [
+            (ramp(60.0, 4.0), "lease-required"),
+            (ramp(1e4, 4.0), "out-of-range"),
+            (json!({"segments": [{"kind": "noise"}]}), "invalid-field"),
+            (json!({"toml": "segments = 1"}), "invalid-field"),
+            (json!({}), "invalid-field"),
+            (json!({"diagnosis": "t1-none"}), "unknown-diagnosis"),
+        ] {
+            let (_, problem) = stack.http("POST", "/excitation", Some(body.clone())).unwrap();
+            assert_eq!(problem["type"], format!("urn:kort:problem:{slug}"), "{body}: {problem}");
+        }
+        let (status, none) = stack.http("DELETE", "/excitation", None).unwrap();
+        assert_eq!((status, &none["type"]), (409, &json!("urn:kort:problem:no-excitation")));
+
+        stack.thrust(5.0, 60_000);
+        let mut body = ramp(60.0, 3.0);
+        body["record"] = json!("ramp");
+        let begun = stack.expect("POST", "/excitation", Some(body.clone()));
+        assert_eq!((&begun["state"], &begun["recording"]), (&json!("playing"), &json!("ramp")));
+        assert_eq!(stack.http("POST", "/excitation", Some(ramp(1.0, 1.0))).unwrap().0, 409);
+        wait("the setpoint to follow", || {
+            let state = stack.state()?;
+            (state["setpoint"]["thrust_n"].as_f64()? > 40.0
+                && state["excitation"]["elapsed_s"].as_f64()? > 2.0)
+                .then_some(())
+        });
+        wait("its end at zero", || {
+            let state = stack.state()?;
+            (state["excitation"].is_null() && state["setpoint"] == json!({"thrust_n": 0.0})).then_some(())
+        });
+        assert_eq!(stack.expect("GET", "/excitation", None)["state"], "complete");
+        wait("its recording", || {
+            let list = stack.get("/v1/recordings")?;
+            let done = list.as_array()?.iter().find(|r| r["name"] == "ramp")?.clone();
+            (done["state"] == "complete" && done["duration_s"].as_f64()? > 3.0).then_some(())
+        });
+
+        // A scenario file in shares, ended by hand, by a setpoint, and by a disarming.
+        let chirp = include_str!("../config/scenarios/chirp.toml");
+        let shares = json!({"toml": chirp, "limit": 40.0});
+        for (method, path, body, left) in [
+            ("DELETE", "/excitation", None, json!({"thrust_n": 0.0})),
+            ("PUT", "/setpoint", Some(json!({"thrust_n": 7.0})), json!({"thrust_n": 7.0})),
+            ("POST", "/disarm", None, json!({"thrust_n": 0.0})),
+        ] {
+            let begun = stack.expect("POST", "/excitation", Some(shares.clone()));
+            assert_eq!(
+                (begun["peak"].as_f64().map(f64::round), &begun["name"]),
+                (Some(32.0), &json!("chirp"))
+            );
+            wait("it to play", || (stack.state()?["setpoint"]["thrust_n"] == 20.0).then_some(()));
+            stack.expect(method, path, body);
+            let last = stack.expect("GET", "/excitation", None);
+            assert!(last["state"] == "ended" && last["ended_by"].is_string(), "{last}");
+            wait("what comes after", || (stack.state()?["setpoint"] == left).then_some(()));
+        }
+        // Armed anew it stands still.
+        stack.expect("POST", "/arm", None);
+        std::thread::sleep(Duration::from_millis(300));
+        assert_eq!(stack.state().unwrap()["setpoint"], json!({"thrust_n": 0.0}));
+        let events = stack.get("/v1/events").unwrap();
+        let kinds = |kind: &str| events.as_array().unwrap().iter().filter(|e| e["kind"] == kind).count();
+        assert_eq!((kinds("excitation_started"), kinds("excitation_ended")), (4, 4), "{events}");
+    });
+}
+
+/// A diagnosis that is kept from before, with its recording and a short experiment that it proposes.
+fn kept(site: &Site, id: &str) {
+    let folder = site.folder.path().join("kort-state/diagnoses").join(id);
+    std::fs::create_dir_all(&folder).unwrap();
+    let info = json!({"id": id, "thruster": "t1", "owner": "local", "state": "done", "of": "the last 60 s", "rig_number": 1,
+        "rig_revision": "", "started": "2026-01-01T12:00:00.000Z", "elapsed_s": 1.0});
+    std::fs::write(folder.join("info.json"), info.to_string()).unwrap();
+    let scenario = json!({"name": "separate-a-b", "command": "share", "effects": [{"effect": "coulomb_friction"}],
+        "segments": [{"kind": "steps", "values": [0.3, -0.3], "each_s": 0.8}]});
+    let report = json!({"next_experiment": {"separates": ["a", "b"], "scenario": scenario}});
+    std::fs::write(folder.join("report.json"), report.to_string()).unwrap();
+    let made = std::process::Command::new(common::KORT)
+        .args(["simulate", "--rig", "whitcomb-yoerger-1999", "--scenario", "torque-step-9.2", "-o"])
+        .arg(folder.join("recording.mcap"))
+        .output()
+        .unwrap();
+    assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+}
+
+/// The experiment that a diagnosis proposes is played by one call, recorded, and diagnosed together with the first.
+#[test]
+fn a_proposed_experiment_is_played_and_diagnosed_with_the_first() {
+    common::in_real_time(|| {
+        let site = Site::new();
+        kept(&site, "t1-first");
+        let mut stack = Stack::start_at(site);
+        stack.thrust(5.0, 60_000);
+        let body = json!({"diagnosis": "t1-first", "limit": 60.0});
+        let begun = stack.expect("POST", "/excitation", Some(body));
+        assert_eq!((&begun["peak"], &begun["left_out"]), (&json!(18.0), &json!(["effects"])), "{begun}");
+        let recording = begun["recording"].as_str().unwrap().to_owned();
+        let id = wait("its diagnosis", || {
+            let last = stack.expect("GET", "/excitation", None);
+            assert_ne!(last["state"], "ended", "{last}");
+            last["diagnosis"].as_str().map(str::to_owned)
+        });
+        let info = stack.expect("GET", &format!("/diagnoses/{id}"), None);
+        assert_eq!((&info["recording"], &info["after"]), (&json!(recording), &json!("t1-first")));
+        let pid = wait("its process", || job(&stack));
+        let asked = std::fs::read_to_string(format!("/proc/{pid}/cmdline")).unwrap();
+        let files: Vec<&str> = asked.split('\0').filter(|word| word.ends_with(".mcap")).collect();
+        assert!(
+            files.len() == 2
+                && files[0].ends_with("t1-first/recording.mcap")
+                && files[1].ends_with(&format!("{recording}.mcap")),
+            "{files:?}"
+        );
+        assert_eq!(stack.expect("DELETE", &format!("/diagnoses/{id}"), None)["state"], "cancelled");
     });
 }
 

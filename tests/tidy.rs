@@ -23,7 +23,7 @@ const DIRECTION: &[(&str, &[&str])] = &[
     ("crates/soak", &["kort-thruster", "kort-scenario", "kort-control", "kort-proto"]),
     ("services/servo", &["kort-thruster", "kort-scenario", "kort-proto"]),
     ("services/controller", &["kort-thruster", "kort-control", "kort-proto"]),
-    ("services/gateway", &["kort-thruster", "kort-control", "kort-recording", "kort-proto"]),
+    ("services/gateway", &["kort-thruster", "kort-scenario", "kort-control", "kort-recording", "kort-proto"]),
     (
         "services/lab",
         &[

@@ -41,6 +41,10 @@ pub enum EventKind {
     Stopped,
     /// A setpoint was accepted; while it moves, one a second is noted.
     Commanded,
+    /// A test signal was begun.
+    ExcitationStarted,
+    /// A test signal is complete, or was ended.
+    ExcitationEnded,
     /// The control law or its parameters were changed.
     ControllerChanged,
     /// Another revision of the rig description is in force.

@@ -146,6 +146,26 @@ pub enum Segment {
     },
 }
 
+impl Segment {
+    /// Its kind, as written.
+    pub const fn kind(&self) -> &'static str {
+        match self {
+            Segment::Hold { .. } => "hold",
+            Segment::Steps { .. } => "steps",
+            Segment::Staircase { .. } => "staircase",
+            Segment::Ramp { .. } => "ramp",
+            Segment::Reversals { .. } => "reversals",
+            Segment::Sine { .. } => "sine",
+            Segment::Chirp { .. } => "chirp",
+            Segment::Multisine { .. } => "multisine",
+            Segment::Prbs { .. } => "prbs",
+            Segment::RandomLevels { .. } => "random_levels",
+            Segment::Points { .. } => "points",
+            Segment::Replay { .. } => "replay",
+        }
+    }
+}
+
 fn order() -> u32 {
     9
 }

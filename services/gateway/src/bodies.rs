@@ -3,7 +3,8 @@
 use crate::extract::{Json, OptionalJson};
 use crate::problem::Problem;
 use crate::routes::bodies::{
-    ControllerRequest, DiagnosisRequest, LeaseRequest, RecordingRequest, RigRequest, incoming,
+    ControllerRequest, DiagnosisRequest, ExcitationRequest, LeaseRequest, RecordingRequest, RigRequest,
+    incoming,
 };
 use crate::view::Setpoint;
 
@@ -16,6 +17,8 @@ pub enum Body {
     Lease,
     /// `PUT …/controller`
     Controller,
+    /// `POST …/excitation`
+    Excitation,
     /// `POST …/rig`
     Rig,
     /// `POST …/diagnoses`
@@ -28,10 +31,11 @@ pub enum Body {
 
 impl Body {
     /// Every kind.
-    pub const ALL: [Body; 7] = [
+    pub const ALL: [Body; 8] = [
         Body::Setpoint,
         Body::Lease,
         Body::Controller,
+        Body::Excitation,
         Body::Rig,
         Body::Diagnosis,
         Body::Recording,
@@ -47,6 +51,7 @@ impl Body {
             Body::Setpoint => Json::<Setpoint>::from_bytes(bytes).map(drop),
             Body::Lease => Json::<LeaseRequest>::from_bytes(bytes).map(drop),
             Body::Controller => Json::<ControllerRequest>::from_bytes(bytes).map(drop),
+            Body::Excitation => Json::<ExcitationRequest>::from_bytes(bytes).map(drop),
             Body::Rig => Json::<RigRequest>::from_bytes(bytes).map(drop),
             Body::Diagnosis => OptionalJson::<DiagnosisRequest>::from_bytes(bytes).map(drop),
             Body::Recording => OptionalJson::<RecordingRequest>::from_bytes(bytes).map(drop),

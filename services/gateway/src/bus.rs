@@ -350,8 +350,12 @@ impl Bridge {
         desk.expire(now);
         // Nothing is lost here: a setpoint is accepted only once this thread has heard the arming.
         if !heard.armed(now) {
-            desk.rest();
+            desk.rest(now, "the drive is not armed");
         }
+        if let Some(fault) = Fault::in_set(heard.faults(now)).next() {
+            desk.end_excitation_at_zero(now, Some(fault.name()));
+        }
+        desk.advance(now);
         let (kind, value) = match desk.setpoint() {
             Some(Setpoint::ThrustN(value)) => (SetpointKind::Thrust, value),
             Some(Setpoint::SpeedRadS(value)) => (SetpointKind::Speed, value),

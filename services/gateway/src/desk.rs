@@ -2,10 +2,13 @@
 //!
 //! Pure: the caller hands in the time and what is known of the thruster.
 
+mod excitation;
+
 use std::time::{Duration, Instant};
 
 use kort_proto::events::EventKind;
 
+use crate::excitation::Playing;
 use crate::lease::{Lease, LeaseDesk, Wanted};
 use crate::problem::{Kind, Problem};
 use crate::view::{Setpoint, SetpointRange};
@@ -37,6 +40,8 @@ pub struct Desk {
     version: u64,
     notes: Vec<Note>,
     noted: Option<(Instant, Setpoint)>,
+    /// The test signal that plays, or the last one.
+    excitation: Option<Playing>,
 }
 
 impl Desk {
@@ -52,6 +57,7 @@ impl Desk {
             version: 0,
             notes: Vec::new(),
             noted: None,
+            excitation: None,
         }
     }
 
@@ -91,7 +97,7 @@ impl Desk {
                 self.note(EventKind::LeaseTaken, &who, format!("{who} took command for {} ms", wanted.ttl_ms))
             }
             Some(from) => {
-                self.rest();
+                self.rest(now, &format!("{who} took command"));
                 self.note(EventKind::LeaseTakenOver, &who, format!("{who} took command from {from}"));
             }
         }
@@ -109,7 +115,7 @@ impl Desk {
         let who = self.lease.current(now).map(Lease::who).unwrap_or_default();
         self.lease.give(&self.thruster, id, now)?;
         self.version += 1;
-        self.rest();
+        self.rest(now, "command was given up");
         self.note(EventKind::LeaseGivenUp, &who, format!("{who} gave command up"));
         Ok(())
     }
@@ -117,6 +123,7 @@ impl Desk {
     /// Accepts a setpoint from the lease's holder and renews the lease.
     pub fn command(&mut self, id: Option<&str>, setpoint: Setpoint, now: Instant) -> Result<Lease, Problem> {
         let lease = self.renew(id, now)?;
+        self.end_excitation(now, Some("its holder gave a setpoint"));
         self.setpoint = Some(setpoint);
         self.given = Some(now);
         self.generation += 1;
@@ -125,8 +132,9 @@ impl Desk {
         Ok(lease)
     }
 
-    /// Back to rest: disarmed, or nobody commands any more.
-    pub fn rest(&mut self) {
+    /// Back to rest: disarmed, or nobody commands any more; `why` is told of a test signal that this ends.
+    pub fn rest(&mut self, now: Instant, why: &str) {
+        self.end_excitation(now, Some(why));
         if self.setpoint.take().is_some() {
             self.generation += 1;
             self.version += 1;
@@ -156,7 +164,7 @@ impl Desk {
         let holder = self.lease.holder();
         if self.lease.expire(now) {
             self.version += 1;
-            self.rest();
+            self.rest(now, "the lease ran out");
             let who = holder.unwrap_or_default();
             self.note(EventKind::LeaseExpired, &who, format!("the lease of {who} ran out"));
         }
@@ -175,7 +183,7 @@ impl Desk {
 
     /// Notes the setpoint if it changed, at most once a second; the last one is noted in the end.
     fn note_setpoint(&mut self, now: Instant) {
-        let Some(setpoint) = self.setpoint else { return };
+        let Some(setpoint) = self.setpoint.filter(|_| self.playing().is_none()) else { return };
         let due = self
             .noted
             .is_none_or(|(at, known)| known != setpoint && now.saturating_duration_since(at) >= NOTE_EVERY);

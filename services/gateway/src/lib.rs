@@ -17,6 +17,7 @@ mod durations;
 mod energy;
 mod error;
 mod events;
+mod excitation;
 mod extract;
 mod gate;
 mod heard;
@@ -336,8 +337,9 @@ async fn serve(
     let events = Events::start(&settings.events, Arc::clone(&recorder))
         .map_err(|error| GatewayError::Events { folder: settings.events.clone(), error })?;
     recorder.tell_to(&events);
-    let diagnoses = Diagnoses::open(&settings.diagnoses, settings.diagnosis, Arc::clone(&events))
-        .map_err(|error| GatewayError::Diagnoses { folder: settings.diagnoses.clone(), error })?;
+    let diagnoses =
+        Diagnoses::open(&settings.diagnoses, &settings.recordings, settings.diagnosis, Arc::clone(&events))
+            .map_err(|error| GatewayError::Diagnoses { folder: settings.diagnoses.clone(), error })?;
     let diagnoses = Arc::new(diagnoses);
     let (stop_streams, stopping) = watch::channel(false);
 

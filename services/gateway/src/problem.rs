@@ -36,6 +36,8 @@ pub enum Kind {
     NoRecording,
     RecordingActive,
     DiagnosisActive,
+    ExcitationActive,
+    NoExcitation,
     BodyTooLarge,
     UnsupportedMediaType,
     InvalidField,
@@ -52,7 +54,7 @@ pub enum Kind {
 
 impl Kind {
     /// All kinds, for the documentation and the tests.
-    pub const ALL: [Kind; 38] = [
+    pub const ALL: [Kind; 40] = [
         Kind::MalformedJson,
         Kind::MalformedPath,
         Kind::MalformedQuery,
@@ -79,6 +81,8 @@ impl Kind {
         Kind::NoRecording,
         Kind::RecordingActive,
         Kind::DiagnosisActive,
+        Kind::ExcitationActive,
+        Kind::NoExcitation,
         Kind::BodyTooLarge,
         Kind::UnsupportedMediaType,
         Kind::InvalidField,
@@ -132,6 +136,8 @@ impl Kind {
                 (S::CONFLICT, "recording-active", "A recording is running or has this name")
             }
             Kind::DiagnosisActive => (S::CONFLICT, "diagnosis-active", "A diagnosis is running"),
+            Kind::ExcitationActive => (S::CONFLICT, "excitation-active", "A test signal is playing"),
+            Kind::NoExcitation => (S::CONFLICT, "no-excitation", "No test signal is playing"),
             Kind::BodyTooLarge => (S::PAYLOAD_TOO_LARGE, "body-too-large", "The body is too large"),
             Kind::UnsupportedMediaType => {
                 (S::UNSUPPORTED_MEDIA_TYPE, "unsupported-media-type", "The body must be application/json")
@@ -225,6 +231,11 @@ impl Problem {
     /// Is it of this kind?
     pub fn is(&self, kind: Kind) -> bool {
         self.type_uri.strip_prefix("urn:kort:problem:") == Some(kind.entry().1)
+    }
+
+    /// What happened, without the way out.
+    pub fn detail(&self) -> &str {
+        &self.detail
     }
 
     /// The HTTP status code.

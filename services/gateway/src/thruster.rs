@@ -1,5 +1,6 @@
 //! One thruster as the gateway sees it: what it asks (the desk) and what it last heard.
 
+mod command;
 mod law;
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, mpsc};
@@ -14,8 +15,9 @@ use kort_proto::signals::Kind as SignalKind;
 use tokio::sync::oneshot;
 
 use crate::bus::Bell;
-use crate::desk::{Desk, check_range};
+use crate::desk::Desk;
 use crate::events::Events;
+use crate::excitation::ExcitationStep;
 use crate::heard::Heard;
 use crate::lease::{Lease, Wanted};
 use crate::problem::{Kind, Problem};
@@ -153,27 +155,6 @@ impl Thruster {
         self.desk().give(id, Instant::now())
     }
 
-    /// Puts a setpoint in force.
-    pub fn command(&self, lease: Option<&str>, setpoint: Setpoint) -> Result<(Lease, Instant), Problem> {
-        check_range(setpoint, self.range())?;
-        let now = Instant::now();
-        let heard = self.heard();
-        let mut desk = self.desk();
-        desk.lease.check(&self.id, lease, now)?;
-        self.ready()?;
-        if let Some(fault) = Fault::in_set(heard.faults(now)).next() {
-            return Err(latched(fault));
-        }
-        if !heard.armed(now) {
-            return Err(Problem::new(
-                Kind::NotArmed,
-                format!("thruster {} is disarmed and takes no setpoint", self.id),
-            )
-            .hint(format!("POST /v1/thrusters/{}/arm first", self.id)));
-        }
-        desk.command(lease, setpoint, now).map(|lease| (lease, now))
-    }
-
     /// Arms, at rest. `who` asks, for the event log; `lease` must be the one in force, if there is one.
     pub async fn arm(&self, who: &str, lease: Option<&str>) -> Result<(), Problem> {
         let now = Instant::now();
@@ -183,7 +164,7 @@ impl Thruster {
             return Err(latched(fault));
         }
         if !self.heard().armed(now) {
-            self.desk().rest();
+            self.desk().rest(now, "it was armed anew");
             // The servo arms only under a controller that asks for nothing: one that has not heard yet of a disarming
             // a moment ago is told.
             self.ask(request(RequestKind::Disarm), &[Process::Controller], Kind::Refused).await?;
@@ -197,10 +178,11 @@ impl Thruster {
 
     /// Disarms; the controller need not be there.
     pub async fn disarm(&self, who: &str) -> Result<(), Problem> {
-        self.desk().rest();
+        let why = format!("{who} disarmed");
+        self.desk().rest(Instant::now(), &why);
         self.ask(request(RequestKind::Disarm), &[Process::Servo], Kind::Refused).await?;
         self.settle(|heard, now| !heard.armed(now)).await;
-        self.desk().rest();
+        self.desk().rest(Instant::now(), &why);
         self.did(who, None, EventKind::Disarmed, "disarmed");
         Ok(())
     }
@@ -280,6 +262,11 @@ impl Thruster {
                 id: id.clone(),
                 step: step.clone(),
                 elapsed_s: now.saturating_duration_since(*began).as_secs_f64(),
+            }),
+            excitation: desk.playing().map(|playing| ExcitationStep {
+                name: playing.signal.name.clone(),
+                elapsed_s: playing.elapsed_s(now),
+                duration_s: playing.signal.duration_s,
             }),
             faults: Fault::in_set(heard.shown_faults(now)).map(|fault| self.fault_view(fault)).collect(),
             limits: Limit::in_set(heard.limits(now))

@@ -8,6 +8,7 @@ use utoipa::openapi::RefOr;
 use utoipa::openapi::schema::{ObjectBuilder, Schema, SchemaType, Type};
 use utoipa::{PartialSchema, ToSchema};
 
+use crate::excitation::ExcitationStep;
 use crate::extract::Object;
 
 /// Everything known of one thruster at one instant.
@@ -47,6 +48,8 @@ pub struct ThrusterState {
     pub mismatch: Option<MismatchView>,
     /// The diagnosis of it that runs; null if none does.
     pub diagnosis: Option<DiagnosisStep>,
+    /// The test signal that plays; null if none does.
+    pub excitation: Option<ExcitationStep>,
     /// Latched faults.
     pub faults: Vec<FaultView>,
     /// Limits in force: no faults, they say what holds the thruster back now.

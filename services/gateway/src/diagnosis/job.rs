@@ -11,7 +11,7 @@ use kort_proto::signals::SIGNALS;
 use kort_recording::LiveMcap;
 use serde_json::Value;
 
-use super::{Diagnoses, DiagnosisInfo, DiagnosisState, FindingView, Options, Subject};
+use super::{Diagnoses, DiagnosisInfo, DiagnosisState, FindingView, LAST_MINUTES, Options, Subject};
 use crate::rig::differ;
 use crate::ring::Row;
 use crate::thruster::lock;
@@ -25,6 +25,8 @@ const LOSSY: i32 = 3;
 pub struct Job {
     /// Its folder.
     pub folder: PathBuf,
+    /// Recordings that come before it: all are fitted together.
+    pub before: Vec<PathBuf>,
     /// Of what.
     pub subject: Subject,
     /// How.
@@ -70,14 +72,14 @@ impl Job {
             Subject::Recording(_, file) => file.clone(),
             Subject::Last(_, rows) => {
                 diagnoses.step("writing the last minutes down");
-                let file = in_folder("recording.mcap");
+                let file = in_folder(LAST_MINUTES);
                 write_rows(&file, rows, &self.rig)?;
                 file
             }
         };
         let threads = std::thread::available_parallelism().map_or(1, |n| n.get().div_ceil(2));
         let mut command = Command::new(&diagnoses.program);
-        command.arg("diagnose").arg(recording).arg("--rig").arg(in_folder("rig.toml"));
+        command.arg("diagnose").args(&self.before).arg(recording).arg("--rig").arg(in_folder("rig.toml"));
         command.args(["--json", "--jobs", &threads.to_string(), "--job", &std::process::id().to_string()]);
         command.arg("--html").arg(in_folder("report.html")).arg("-o").arg(in_folder("found.toml"));
         command.args(["--model", &self.options.model]);

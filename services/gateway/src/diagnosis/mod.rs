@@ -5,6 +5,7 @@
 //! found, and the rows of the last minutes where there was no recording.
 
 mod job;
+mod sequel;
 mod view;
 
 use std::fs;
@@ -27,6 +28,9 @@ use crate::thruster::{Thruster, lock};
 use crate::token::{Identity, Role};
 
 pub use view::{DiagnosisInfo, DiagnosisState, FindingView};
+
+/// The rows of the last minutes, in a diagnosis's folder.
+const LAST_MINUTES: &str = "recording.mcap";
 
 /// What is diagnosed.
 #[derive(Debug)]
@@ -52,6 +56,7 @@ pub struct Options {
 #[derive(Debug)]
 pub struct Diagnoses {
     folder: PathBuf,
+    recordings: PathBuf,
     limits: DiagnosisLimits,
     program: PathBuf,
     events: Arc<Events>,
@@ -79,10 +84,16 @@ impl Diagnoses {
     ///
     /// # Errors
     /// The folder cannot be made.
-    pub fn open(folder: &Path, limits: DiagnosisLimits, events: Arc<Events>) -> io::Result<Diagnoses> {
+    pub fn open(
+        folder: &Path,
+        recordings: &Path,
+        limits: DiagnosisLimits,
+        events: Arc<Events>,
+    ) -> io::Result<Diagnoses> {
         fs::create_dir_all(folder)?;
         let diagnoses = Diagnoses {
             folder: folder.to_owned(),
+            recordings: recordings.to_owned(),
             limits,
             program: std::env::current_exe()?,
             events,
@@ -109,8 +120,13 @@ impl Diagnoses {
         rig: &RigDesk,
         who: &Identity,
         subject: Subject,
+        after: Option<&str>,
         options: Options,
     ) -> Result<DiagnosisInfo, Problem> {
+        let before = match after {
+            Some(id) => self.recordings_of(&self.find(&thruster.id, id)?, sequel::FILES_MAX)?,
+            None => Vec::new(),
+        };
         let mut running = lock(&self.running);
         if let Some(other) = &*running {
             return Err(Problem::new(
@@ -138,6 +154,11 @@ impl Diagnoses {
                 Subject::Recording(name, _) => format!("recording {name}"),
                 Subject::Last(time_s, _) => format!("the last {time_s:.0} s"),
             },
+            recording: match &subject {
+                Subject::Recording(name, _) => Some(name.clone()),
+                Subject::Last(..) => None,
+            },
+            after: after.map(str::to_owned),
             rig_number: entry.number,
             rig_revision: entry.revision,
             started: humantime::format_rfc3339_millis(now).to_string(),
@@ -164,7 +185,7 @@ impl Diagnoses {
         });
         drop(running);
         thruster.set_diagnosis(Some((info.id.clone(), "starting".into(), began)));
-        let job = job::Job { folder: self.folder.join(&info.id), subject, options, rig: rig_text };
+        let job = job::Job { folder: self.folder.join(&info.id), before, subject, options, rig: rig_text };
         let theirs = Arc::clone(self);
         let spawned = std::thread::Builder::new().name("diagnosis".into()).spawn(move || job.run(&theirs));
         if let Err(error) = spawned {

@@ -19,6 +19,12 @@ pub struct DiagnosisInfo {
     /// Of what: `recording NAME`, or `the last N s`.
     #[schema(example = "the last 300 s")]
     pub of: String,
+    /// Name of the recording that it is of; null for the last minutes.
+    #[serde(default)]
+    pub recording: Option<String>,
+    /// Diagnosis whose recordings are fitted together with this one; null if it stands alone.
+    #[serde(default)]
+    pub after: Option<String>,
     /// Number of the rig's revision that it is compared with.
     pub rig_number: u32,
     /// That revision, as recordings name it.

@@ -50,6 +50,9 @@ pub struct DiagnosisRequest {
     #[serde(default)]
     #[schema(minimum = 1, maximum = 3600, default = 300)]
     last_s: Option<f64>,
+    /// Name of an earlier diagnosis: its recordings are fitted together with this one.
+    #[serde(default)]
+    after: Option<String>,
     /// Model to compare with; model2 if left out.
     #[serde(default = "model_default")]
     #[schema(schema_with = model_schema)]
@@ -85,6 +88,7 @@ impl Default for DiagnosisRequest {
         DiagnosisRequest {
             recording: None,
             last_s: None,
+            after: None,
             model: model_default(),
             with: Vec::new(),
             seed: None,
@@ -124,7 +128,7 @@ async fn list(
     responses(
         (status = 202, description = "It runs", body = DiagnosisInfo),
         (status = 400, description = "`malformed-json`, `malformed-body`", body = Problem, content_type = "application/problem+json"),
-        (status = 404, description = "`unknown-thruster`, `unknown-recording`", body = Problem, content_type = "application/problem+json"),
+        (status = 404, description = "`unknown-thruster`, `unknown-recording`; `unknown-diagnosis`: the one that it comes after", body = Problem, content_type = "application/problem+json"),
         (status = 409, description = "`diagnosis-active`; `recording-active`: it still runs; `no-recording`: nothing was heard of this thruster yet; `refused`: the recording is another thruster's", body = Problem, content_type = "application/problem+json"),
         (status = 413, description = "`body-too-large`", body = Problem, content_type = "application/problem+json"),
         (status = 415, description = "`unsupported-media-type`", body = Problem, content_type = "application/problem+json"),
@@ -140,6 +144,7 @@ async fn start(
     let rig = Arc::clone(app.rig(&id)?);
     let request = request.unwrap_or_default();
     let options = options(&request)?;
+    let after = request.after;
     let subject = match (request.recording, request.last_s) {
         (Some(_), Some(_)) => {
             return Err(Problem::new(
@@ -155,7 +160,8 @@ async fn start(
         (None, last_s) => last(&app, &id, last_s.unwrap_or(LAST_DEFAULT_S)).await?,
     };
     let diagnoses = Arc::clone(app.diagnoses());
-    let info = blocking(move || diagnoses.start(&thruster, &rig, &who, subject, options)).await?;
+    let info =
+        blocking(move || diagnoses.start(&thruster, &rig, &who, subject, after.as_deref(), options)).await?;
     Ok((StatusCode::ACCEPTED, axum::Json(info)))
 }
 

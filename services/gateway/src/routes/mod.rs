@@ -6,6 +6,7 @@ mod controller;
 mod diagnoses;
 mod docs;
 mod events;
+mod excitation;
 mod faults;
 mod health;
 mod lease;
@@ -23,6 +24,7 @@ pub use controller::{ControllerRequest, ControllerView, LawParameter};
 pub mod bodies {
     pub use super::controller::ControllerRequest;
     pub use super::diagnoses::DiagnosisRequest;
+    pub use super::excitation::ExcitationRequest;
     pub use super::lease::LeaseRequest;
     pub use super::recordings::RecordingRequest;
     pub use super::rig::RigRequest;
@@ -50,6 +52,7 @@ pub fn router(app: Arc<App>) -> Router {
         .merge(lease::routes())
         .merge(arming::routes())
         .merge(setpoint::routes())
+        .merge(excitation::routes())
         .merge(stop::routes())
         .merge(events::routes())
         .merge(controller::routes())
