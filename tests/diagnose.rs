@@ -222,16 +222,33 @@ fn a_mismatch_without_a_name_is_unexplained() {
 }
 
 #[test]
-fn rows_after_a_long_gap_are_left_out_and_said() {
-    let gap = Table::read(clean())
-        .map("time_s", |k, t| (t.parse::<f64>().unwrap() + if k < 400 { 0.0 } else { 5.0 }).to_string());
-    let file = gap.save("gap.csv");
-    let output = kort(&["diagnose", &file, "--rig", STAND, "--json"]);
-    assert_eq!(output.status.code(), Some(3), "{}", stderr(&output));
-    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
-    lab::check_diagnosis(&report);
-    assert_eq!(report["verdict"], "no_mismatch", "{}", report["summary"]);
-    assert!(report["notes"].to_string().contains("gap"), "{}", report["notes"]);
+fn rows_after_a_long_gap_or_a_pause_are_left_out_and_said() {
+    for (missing_s, said) in [(3.0, "1 gaps longer than 3 intervals"), (7200.0, "pauses 1 times")] {
+        let later = |k: usize| if k < 400 { 0.0 } else { missing_s };
+        let silent = Table::read(clean())
+            .map("time_s", |k, t| (t.parse::<f64>().unwrap() + later(k)).to_string())
+            .save("silent.csv");
+        let output = kort(&["diagnose", &silent, "--rig", STAND, "--json"]);
+        assert_eq!(output.status.code(), Some(3), "{}", stderr(&output));
+        let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+        lab::check_diagnosis(&report);
+        assert_eq!(report["verdict"], "no_mismatch", "{}", report["summary"]);
+        assert!(report["notes"].to_string().contains(said), "{}", report["notes"]);
+    }
+}
+
+#[test]
+fn of_a_long_recording_stretches_are_compared_and_said() {
+    let friction =
+        effect("coulomb_friction", "coulomb_torque_n_m = 0.3, stribeck_rise = 0.0, stribeck_speed_rad_s = 2");
+    let long = random_levels(-0.95, 0.95, "").replace("duration_s = 12", "duration_s = 600");
+    let report = diagnose(&[&simulate("long.csv", dry_rig(), &(long + &friction))], dry_rig(), &[]);
+    assert_eq!(found(&report).first(), Some(&"coulomb_friction"), "{}", report["summary"]);
+    let torque = report["findings"][0]["parameters"][0]["value"].as_f64().unwrap();
+    assert!((torque - 0.3).abs() < 0.03, "{torque} N m of 0.3");
+    let notes = report["notes"].to_string();
+    assert!(notes.contains("of 600 s the 200 s in which most moves are compared, in "), "{notes}");
+    assert!(!notes.contains("pauses") && !notes.contains("misses rows"), "{notes}");
 }
 
 #[test]

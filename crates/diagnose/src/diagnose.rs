@@ -59,13 +59,13 @@ pub fn diagnose(
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<Diagnosis, DataError> {
     let constants = Constants::built_in();
-    let Setup { problem, mut baseline, notes, thin } =
-        Setup::new(series, rig, options.model, constants.criterion)?;
+    let Setup { series, problem, mut baseline, notes, thin } =
+        Setup::of_stretches(series, rig, options.model, constants.criterion)?;
     for effect in &options.with {
         let values = baseline.start.clone();
         baseline = baseline.with(&values, Member::new(effect, &problem.scale), &problem.scale);
     }
-    let offered = available(options.model, series, &problem.recordings);
+    let offered = available(options.model, &series, &problem.recordings);
     let candidates = candidates(rig, &offered, &options.with);
     let mut search = Search::new(&problem, candidates, &constants);
     let best = search.run(&baseline, progress);
@@ -84,7 +84,7 @@ pub fn diagnose(
         rarity: search.rarity(set),
     });
     let evidence = evidence.collect();
-    let (report, traces) = Writer::new(&search, explanations, series, rig, options).write(notes, thin);
+    let (report, traces) = Writer::new(&search, explanations, &series, rig, options).write(notes, thin);
     Ok(Diagnosis { report, traces, evidence })
 }
 

@@ -2,7 +2,7 @@
 
 use kort_thruster::rig::Rig;
 
-use crate::data::Series;
+use crate::data::{Series, pause_s};
 use crate::gaps::GAP_INTERVALS;
 
 /// What the checks found: words for the report, and rows to leave out.
@@ -305,16 +305,16 @@ fn gaps(series: &Series, out: &mut Checked) {
     let mut steps: Vec<f64> = series.time_s.windows(2).map(|w| w[1] - w[0]).collect();
     steps.sort_by(f64::total_cmp);
     let Some(usual) = steps.get(steps.len() / 2).copied() else { return };
-    let wide = series.time_s.windows(2).filter(|w| w[1] - w[0] > GAP_INTERVALS * usual).count();
-    if wide == 0 {
-        return;
-    }
+    let pause_s = pause_s(&series.time_s);
+    let missed: Vec<f64> =
+        steps.into_iter().filter(|s| *s > GAP_INTERVALS * usual && *s <= pause_s).collect();
+    let wide = missed.len();
     // What the drive did in a long gap is not known, nor then the state after it.
     let mut long = 0;
     let mut known_from_s = f64::NEG_INFINITY;
     for (k, w) in series.time_s.windows(2).enumerate() {
         if w[1] - w[0] > (GAP_INTERVALS * usual).max(LONG_GAP_S) {
-            long += 1;
+            long += usize::from(w[1] - w[0] <= pause_s);
             known_from_s = w[1] + SETTLE_S;
         }
         out.masked[k + 1] |= w[1] < known_from_s;
@@ -331,11 +331,23 @@ fn gaps(series: &Series, out: &mut Checked) {
         0 => String::new(),
         _ => format!("; the {SETTLE_S} s after each of the {long} longer than {LONG_GAP_S} s are left out"),
     };
+    let Some(longest) = missed.last() else { return };
     out.notes.push(format!(
-        "{}: the log misses rows (log_gaps): {wide} gaps longer than 3 intervals (longest {:.3} s){follow}; the model runs across them with its inputs straight, and only rows that are there are compared{left_out}",
-        series.name,
-        steps[steps.len() - 1]
+        "{}: the log misses rows (log_gaps): {wide} gaps longer than 3 intervals (longest {longest:.3} s){follow}; the model runs across them with its inputs straight, and only rows that are there are compared{left_out}",
+        series.name
     ));
+}
+
+/// What a log's pauses do, in words.
+pub fn pauses(series: &Series) -> Option<String> {
+    let pause_s = pause_s(&series.time_s);
+    let lengths = || series.time_s.windows(2).map(|w| w[1] - w[0]).filter(|s| *s > pause_s);
+    let longest = lengths().max_by(f64::total_cmp)?;
+    Some(format!(
+        "{}: the log pauses {} times for more than {pause_s} s (longest {longest:.0} s): after each the simulation starts anew from the recorded state, and {SETTLE_S} s are left out",
+        series.name,
+        lengths().count()
+    ))
 }
 
 #[cfg(test)]

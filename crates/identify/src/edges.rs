@@ -66,8 +66,11 @@ impl Problem<'_> {
 }
 
 impl Prepared {
-    /// Control ticks between a row and the one before it.
+    /// Control ticks between a row and the one before it; in a pause nothing can be placed.
     fn ticks_before(&self, row: usize) -> usize {
+        if self.after_pause(row) {
+            return 1;
+        }
         ((self.time_s[row] - self.time_s[row - 1]) / self.tick_s).round().max(1.0) as usize
     }
 

@@ -31,7 +31,7 @@ impl Prepared {
         let turns = self.command.windows(3).filter(|w| (w[1] - w[0]) * (w[2] - w[1]) < 0.0).count();
         let often_1_s = (self.edges.len() + turns) as f64 / self.duration_s();
         (1..self.time_s.len())
-            .filter(|row| self.after_gap(*row, usual_s))
+            .filter(|row| self.after_gap(*row, usual_s) && !self.after_pause(*row))
             .filter(|row| often_1_s * (self.time_s[*row] - self.time_s[row - 1]) > MISSED)
             .collect()
     }
@@ -42,9 +42,7 @@ impl Prepared {
             commands.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), c| (l.min(*c), h.max(*c)));
         let mut other = commands.to_vec();
         for row in silent {
-            let tick = |k: usize| {
-                (((self.time_s[k] - self.time_s[0]) / self.tick_s).round() as usize).min(other.len())
-            };
+            let tick = |k: usize| self.stimulus.logs[k].0.min(other.len());
             let (from, to) = (tick(row - 1), tick(*row));
             for command in &mut other[from..to] {
                 *command = if *command - low > high - *command { low } else { high };

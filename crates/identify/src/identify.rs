@@ -139,7 +139,7 @@ pub fn identify(
     options: &Options,
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<FitReport, DataError> {
-    let Setup { mut problem, mut baseline, mut notes, thin } =
+    let Setup { mut problem, mut baseline, mut notes, thin, .. } =
         Setup::new(series, rig, options.model, options.criterion)?;
     notes.extend(thin);
     let typical = problem.scale.torque_n_m / problem.scale.shaft_speed_rad_s;

@@ -6,6 +6,7 @@
 pub mod checks;
 pub mod data;
 pub mod edges;
+mod excerpt;
 pub mod fit;
 mod gaps;
 pub mod heldout;

@@ -1,7 +1,7 @@
 //! What no log of a thruster holds, refused before a simulation would need endless memory or leave
 //! the range of floating-point numbers.
 
-use crate::data::{DataError, KNOWN, Series};
+use crate::data::{DataError, KNOWN, Series, pause_s};
 
 /// Largest size that a value of the contract's columns may have, in their units.
 const MOST: f64 = 1e6;
@@ -36,15 +36,18 @@ pub fn implausible(series: &Series, interval_s: f64) -> Result<(), DataError> {
 /// # Errors
 /// Names the span, its longest gap and what is allowed.
 pub fn too_long(series: &Series, tick_s: f64) -> Result<(), DataError> {
-    let (first, last) = (series.time_s[0], series.time_s[series.time_s.len() - 1]);
-    if (last - first) / tick_s <= MOST_TICKS {
+    let pause_s = pause_s(&series.time_s);
+    let steps = series.time_s.windows(2).map(|w| w[1] - w[0]);
+    let seconds: f64 = steps.filter(|step| *step <= pause_s).sum();
+    if seconds / tick_s <= MOST_TICKS {
         return Ok(());
     }
-    let longest = series.time_s.windows(2).max_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0])));
+    let gaps = series.time_s.windows(2).filter(|w| w[1] - w[0] <= pause_s);
+    let longest = gaps.max_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0])));
     Err(DataError::TooLong {
         recording: series.name.clone(),
-        seconds: last - first,
+        seconds,
         most_s: MOST_TICKS * tick_s,
-        gap_s: longest.map_or([first, last], |w| [w[0], w[1]]),
+        gap_s: longest.map_or([series.time_s[0]; 2], |w| [w[0], w[1]]),
     })
 }

@@ -8,12 +8,17 @@ use kort_thruster::rig::Rig;
 
 use crate::checks;
 use crate::data::{DataError, Driving, Prepared, Response, Series, possible_drivers, spread};
+use crate::excerpt;
 use crate::hypothesis::{Hypothesis, Inputs, UNSTATED_TOL, nothing_stated};
 use crate::noise::Criterion;
+use crate::refuse;
 use crate::simulate::Problem;
+use crate::spectrum::median_interval;
 
 /// A problem ready to fit.
 pub struct Setup<'a> {
+    /// What is compared: the recordings, or the stretches of them that were chosen.
+    pub series: Vec<Series>,
     /// The problem.
     pub problem: Problem<'a>,
     /// The baseline with its free numbers.
@@ -25,11 +30,49 @@ pub struct Setup<'a> {
 }
 
 impl<'a> Setup<'a> {
+    /// Prepares recordings for many hypotheses: of what is long, the stretches in which most moves.
+    ///
+    /// # Errors
+    /// As [`Setup::new`].
+    pub fn of_stretches(
+        series: &[Series],
+        rig: &'a Rig,
+        model: ModelName,
+        criterion: Criterion,
+    ) -> Result<Self, DataError> {
+        let Some(rows) = excerpt::stretches(series, rig) else {
+            return Self::new(series, rig, model, criterion);
+        };
+        for one in series {
+            refuse::implausible(one, median_interval(&one.time_s))?;
+        }
+        let parts: Vec<Series> =
+            series.iter().zip(&rows).map(|(one, rows)| excerpt::excerpt(one, rows)).collect();
+        let mut setup = Self::prepare(&parts, rig, model, criterion)?;
+        for (one, prepared) in series.iter().zip(&mut setup.problem.recordings) {
+            prepared.lay_means(one);
+        }
+        let words = series.iter().zip(&rows).map(|(one, rows)| excerpt::words(one, rows));
+        setup.notes.splice(0..0, words.chain(series.iter().filter_map(checks::pauses)));
+        Ok(setup)
+    }
+
     /// Prepares recordings for a model.
     ///
     /// # Errors
     /// [`DataError`] if a recording cannot be compared with a model at all.
     pub fn new(
+        series: &[Series],
+        rig: &'a Rig,
+        model: ModelName,
+        criterion: Criterion,
+    ) -> Result<Self, DataError> {
+        let mut setup = Self::prepare(series, rig, model, criterion)?;
+        setup.notes.extend(series.iter().filter_map(checks::pauses));
+        Ok(setup)
+    }
+
+    fn prepare(
         series: &[Series],
         rig: &'a Rig,
         model: ModelName,
@@ -83,7 +126,7 @@ impl<'a> Setup<'a> {
                 recording.lay_extra(&name, one.column(&name).unwrap_or(&[]), sizes);
             }
         }
-        Ok(Self { problem, baseline, notes, thin })
+        Ok(Self { series: series.to_vec(), problem, baseline, notes, thin })
     }
 }
 

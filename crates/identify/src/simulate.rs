@@ -327,7 +327,11 @@ fn run<T: Real>(
     while let Some((row, _)) = next.next_if(|(_, (tick, part))| *tick == 0 && *part == 0.0) {
         log(row, &before, (&before, &before));
     }
+    let mut leaps = recording.leaps.iter().peekable();
     for (i, (tick, command)) in stimulus.ticks.iter().zip(commands).enumerate() {
+        if let Some(leap) = leaps.next_if(|leap| leap.tick == i) {
+            plant.leap(tick.time_s, leap);
+        }
         let Some((_, (at, part))) = next.peek() else { break };
         let shows = *at == i && *part > 0.0 || *at == i + 1 && *part == 0.0;
         if shows {

@@ -28,7 +28,11 @@ impl Prepared {
         plant.start(self.time_s[0], speed, flow, current, angle);
         let (mut course, mut lasting) = (vec![[speed, flow, current]], Vec::new());
         let commands = self.commands(&vec![0; self.edges.len()]);
-        for (tick, command) in self.stimulus.ticks.iter().zip(&commands) {
+        let mut leaps = self.leaps.iter().peekable();
+        for (i, (tick, command)) in self.stimulus.ticks.iter().zip(&commands).enumerate() {
+            if let Some(leap) = leaps.next_if(|leap| leap.tick == i) {
+                plant.leap(tick.time_s, leap);
+            }
             plant.step(&Tick { command: *command, ..*tick });
             let truth = plant.truth();
             course.push([truth.shaft_speed_rad_s, truth.axial_m_s, truth.current_a]);

@@ -46,11 +46,10 @@ impl Prepared {
         let n = c.len();
         let mut edge_at: Vec<Option<usize>> = vec![None; n + 2];
         self.edges.iter().zip(ticks_before).for_each(|(row, before)| edge_at[*row] = Some(*before));
-        let t0 = self.time_s[0];
         let mut row = 0;
         let mut commands = Vec::with_capacity(ticks);
-        for i in 0..ticks {
-            let t = t0 + i as f64 * self.tick_s;
+        for tick in &self.stimulus.ticks {
+            let t = tick.time_s;
             while row + 2 < n && self.time_s[row + 1] <= t + 0.02 * self.tick_s {
                 row += 1;
             }

@@ -1,6 +1,6 @@
 //! A recording made ready for simulation: inputs on the control grid, responses on the log grid.
 
-use kort_thruster::plant::{Course, Driven, Stimulus, Tick, load_inertia_kg_m2};
+use kort_thruster::plant::{Course, Driven, Leap, Stimulus, Tick, load_inertia_kg_m2};
 use kort_thruster::rig::{AmplifierKind, Load, Rig};
 
 use crate::refuse;
@@ -11,17 +11,20 @@ mod command;
 mod driving;
 mod error;
 mod fill;
+mod pauses;
 mod scale;
 mod start;
 
 pub use channel::{Channel, rates};
 pub use columns::{KNOWN, possible_drivers, spread};
 pub use error::DataError;
+pub use pauses::pause_s;
 pub use scale::{COLUMN, available, scale};
 
 use command::{find_edges, smooth_between, steps_of};
 use driving::{choose_driving, driving_power, instead};
 use fill::{filled, held, linear, median_step};
+use pauses::leap_to;
 use start::start_state;
 
 /// A measured response that a model can be compared with.
@@ -143,6 +146,10 @@ pub struct Prepared {
     pub tick_s: f64,
     /// State at the first row: shaft speed, axial flow, current, angle.
     pub start: [f64; 4],
+    /// The interval from row to row beyond which the log has paused, s.
+    pub pause_s: f64,
+    /// Pauses that are passed over without ticks, in order.
+    pub leaps: Vec<Leap>,
     /// Shaft speed at each row, where it drives.
     pub speed_between: Vec<f64>,
     /// The column that is laid beside the inputs as a possible driver of what is left.
@@ -193,6 +200,15 @@ fn returns(series: &Series, rig: &Rig, driving: Driving) -> bool {
 const COARSEST_TICK_S: f64 = 0.002;
 const FEWEST_ROWS: usize = 20;
 
+/// Step at which the plant is integrated under a log of this usual interval, s.
+pub fn control_period_s(rig: &Rig, row_s: f64) -> f64 {
+    let tick_s = match rig.sensors.control_rate_hz {
+        Some(rate) if 1.0 / rate <= row_s * 1.001 => 1.0 / rate,
+        _ => row_s,
+    };
+    tick_s / (tick_s / COARSEST_TICK_S).ceil().max(1.0)
+}
+
 impl Prepared {
     /// Prepares a recording for a rig. A shaft-speed drive is chosen only where `speed_driven`
     /// asks for it (Model 3) or nothing else can drive.
@@ -221,13 +237,7 @@ impl Prepared {
             let found = instead(series, rig, driving.column());
             return Err(DataError::NoResponse { recording, driving: driving.column(), found });
         }
-        let tick_s = match rig.sensors.control_rate_hz {
-            Some(rate) if 1.0 / rate <= row_s * 1.001 => {
-                let tick = 1.0 / rate;
-                tick / (tick / COARSEST_TICK_S).ceil().max(1.0)
-            }
-            _ => row_s / (row_s / COARSEST_TICK_S).ceil().max(1.0),
-        };
+        let tick_s = control_period_s(rig, row_s);
         refuse::too_long(series, tick_s)?;
         let column = series.column(driving.column()).unwrap_or(&[]);
         // A command stands until the next; a response moves on between its samples.
@@ -248,6 +258,8 @@ impl Prepared {
             ticks_per_row: (row_s / tick_s).round() as usize,
             tick_s,
             start: [0.0; 4],
+            pause_s: pause_s(&series.time_s),
+            leaps: Vec::new(),
             speed_between: Vec::new(),
             extra: None,
             observer_rad_s: if returns(series, rig, driving) { 0.0 } else { OBSERVER_RAD_S },
@@ -268,19 +280,21 @@ impl Prepared {
         let t0 = self.time_s[0];
         let end = (self.time_s[self.time_s.len() - 1] - t0) / self.tick_s;
         let count = (end - 1e-6).ceil().max(1.0) as usize;
-        self.stimulus.logs = self
-            .time_s
-            .iter()
-            .map(|t| {
-                let at = (t - t0) / self.tick_s;
-                let near = at.round();
-                if (at - near).abs() < 0.02 {
-                    (near as usize, 0.0)
-                } else {
-                    (at.floor() as usize, at - at.floor())
-                }
-            })
-            .collect();
+        let mut pauses = self.pauses().into_iter().peekable();
+        let mut passed = 0;
+        for (row, t) in self.time_s.iter().enumerate() {
+            if let Some(pause) = pauses.next_if(|pause| pause.row == row) {
+                passed += pause.to - pause.from;
+                let leap = leap_to(series, row, pause.to - passed);
+                self.leaps.push(leap);
+            }
+            let at = (t - t0) / self.tick_s;
+            let near = at.round();
+            let (tick, part) =
+                if (at - near).abs() < 0.02 { (near, 0.0) } else { (at.floor(), at - at.floor()) };
+            self.stimulus.logs.push((tick as usize - passed, part));
+        }
+        let mut pauses = self.pauses().into_iter().peekable();
         let ambient = series.column("ambient_m_s").map(filled);
         let supply = series.column("supply_v").map(filled);
         let angle = series.column("shaft_angle_rad").map(filled);
@@ -293,7 +307,11 @@ impl Prepared {
         let speed = (self.driving == Driving::Speed).then(|| self.driving_speed(series, rig));
         let mut ticks = Vec::with_capacity(count);
         let mut row = 0;
-        for i in 0..count {
+        let mut i = 0;
+        while i < count {
+            if let Some(pause) = pauses.next_if(|pause| pause.from == i) {
+                i = pause.to;
+            }
             let time_s = t0 + i as f64 * self.tick_s;
             let next_s = time_s + self.tick_s;
             while row + 2 < self.time_s.len() && self.time_s[row + 1] <= time_s + 0.02 * self.tick_s {
@@ -323,6 +341,7 @@ impl Prepared {
                 observed_speed_rad_s: measured_speed.as_deref().map(|s| at(s, next_s)),
                 course: Course::Any,
             });
+            i += 1;
         }
         self.stimulus.ticks = ticks;
         self.speed_between = speed.unwrap_or_default();

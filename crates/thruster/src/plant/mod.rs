@@ -5,6 +5,7 @@
 mod drive;
 mod explicit;
 mod friction;
+mod leap;
 mod load;
 mod measuring;
 mod observer;
@@ -16,6 +17,7 @@ mod stiff;
 mod tests;
 
 pub use crate::blade::Foil;
+pub use leap::Leap;
 pub use load::load_inertia_kg_m2;
 pub use run::{Response, Stimulus, simulate, simulate_each};
 pub use state::{Balance, Course, Drive, Driven, Local, Sensed, Tick};

@@ -1,0 +1,149 @@
+//! The stretches of a long recording that are compared.
+//!
+//! What hypotheses cost grows with the time that is simulated, what the recording tells does not: most of an hour is
+//! more of the same. Of a long recording stretches are taken in which most moves, half of them spread over its whole
+//! length, so that what changes slowly shows as well; between them the simulation leaps.
+
+use std::ops::Range;
+
+use kort_thruster::rig::Rig;
+
+use crate::data::{KNOWN, Series, control_period_s, pause_s};
+use crate::spectrum::median_interval;
+
+/// Control ticks that are simulated for one hypothesis at most: 200 s at 500 Hz.
+const MOST_TICKS: f64 = 1e5;
+/// Stretches of one recording.
+const STRETCHES: usize = 10;
+
+/// The rows of each recording that are compared; none where all are.
+pub fn stretches(series: &[Series], rig: &Rig) -> Option<Vec<Vec<Range<usize>>>> {
+    let ticks = |one: &Series| {
+        let pause_s = pause_s(&one.time_s);
+        let seconds: f64 = one.time_s.windows(2).map(|w| w[1] - w[0]).filter(|s| *s <= pause_s).sum();
+        seconds / control_period_s(rig, median_interval(&one.time_s))
+    };
+    let all: f64 = series.iter().map(ticks).sum();
+    // Less than twice as much is not worth leaving something out.
+    if all.is_nan() || all <= 2.0 * MOST_TICKS {
+        return None;
+    }
+    Some(series.iter().map(|one| of_one(one, MOST_TICKS / all)).collect())
+}
+
+/// A recording without the rows that are not compared.
+pub fn excerpt(series: &Series, rows: &[Range<usize>]) -> Series {
+    let kept = |values: &[f64]| rows.iter().flat_map(|r| &values[r.clone()]).copied().collect();
+    Series {
+        name: series.name.clone(),
+        time_s: kept(&series.time_s),
+        columns: series.columns.iter().map(|(name, values)| (name.clone(), kept(values))).collect(),
+    }
+}
+
+/// What was left out, in words.
+pub fn words(series: &Series, rows: &[Range<usize>]) -> String {
+    let span = |r: &Range<usize>| series.time_s[r.end - 1] - series.time_s[r.start];
+    let (first, last) = (series.time_s[0], series.time_s[series.time_s.len() - 1]);
+    format!(
+        "{}: of {:.0} s the {:.0} s in which most moves are compared, in {} stretches; between them only what is slow (heat, a tank's return flow) is followed",
+        series.name,
+        last - first,
+        rows.iter().map(span).sum::<f64>(),
+        rows.len()
+    )
+}
+
+/// Rows of one recording, a share of its length.
+fn of_one(series: &Series, share: f64) -> Vec<Range<usize>> {
+    let rows = series.time_s.len();
+    let blocks = ((STRETCHES as f64 / share).round() as usize).clamp(1, rows);
+    let bounds: Vec<usize> = (0..=blocks).map(|k| k * rows / blocks).collect();
+    let moves = movement(series, &bounds);
+    let livelier = |a: &usize, b: &usize| moves[*b].total_cmp(&moves[*a]);
+    let spread = STRETCHES / 2;
+    let mut chosen: Vec<usize> = (0..spread)
+        .filter_map(|s| (s * blocks / spread..(s + 1) * blocks / spread).min_by(livelier))
+        .collect();
+    let mut rest: Vec<usize> = (0..blocks).filter(|k| !chosen.contains(k)).collect();
+    rest.sort_by(livelier);
+    chosen.extend(rest.into_iter().take(STRETCHES - spread));
+    chosen.sort_unstable();
+    let mut stretches: Vec<Range<usize>> = Vec::new();
+    for k in chosen {
+        match stretches.last_mut() {
+            Some(last) if last.end == bounds[k] => last.end = bounds[k + 1],
+            _ => stretches.push(bounds[k]..bounds[k + 1]),
+        }
+    }
+    stretches
+}
+
+/// How much moves in each block: the variance of every signal there, over its variance in all.
+fn movement(series: &Series, bounds: &[usize]) -> Vec<f64> {
+    let mut moves = vec![0.0; bounds.len() - 1];
+    for (_, values) in series.columns.iter().filter(|(name, _)| KNOWN.contains(&name.as_str())) {
+        let all = variance(values);
+        if all > 0.0 {
+            for (k, moved) in moves.iter_mut().enumerate() {
+                *moved += variance(&values[bounds[k]..bounds[k + 1]]) / all;
+            }
+        }
+    }
+    moves
+}
+
+fn variance(values: &[f64]) -> f64 {
+    let known = || values.iter().filter(|v| v.is_finite());
+    let n = known().count().max(1) as f64;
+    let mean = known().sum::<f64>() / n;
+    known().map(|v| (v - mean).powi(2)).sum::<f64>() / n
+}
+
+#[cfg(test)]
+mod tests {
+    use kort_thruster::rig::Rig;
+
+    use super::{excerpt, stretches};
+    use crate::data::Series;
+
+    /// An hour at 20 Hz in which a drive is only used from 2000 to 2100 s, and hums a little all the time.
+    fn hour() -> Series {
+        let time_s: Vec<f64> = (0..72_000).map(|k| 0.05 * f64::from(k)).collect();
+        let used = |t: f64| if (2000.0..2100.0).contains(&t) { 5.0 } else { 0.01 };
+        let command = time_s.iter().map(|t| used(*t) * (3.0 * t).sin()).collect();
+        let speed = time_s.iter().map(|t| used(*t) * (3.0 * t - 0.4).sin()).collect();
+        let columns = vec![("current_cmd_a".into(), command), ("shaft_speed_rad_s".into(), speed)];
+        Series { name: "hour".into(), time_s, columns }
+    }
+
+    fn rig() -> Rig {
+        Rig::from_toml(
+            "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = 0.01\ntorque_constant_nm_a = 1.0\n",
+        )
+        .unwrap()
+    }
+
+    #[test]
+    fn of_an_hour_what_is_used_is_compared_and_something_of_every_part() {
+        let hour = hour();
+        let rows = &stretches(std::slice::from_ref(&hour), &rig()).unwrap()[0];
+        let part = excerpt(&hour, rows);
+        assert!((3000..5000).contains(&part.time_s.len()), "{}", part.time_s.len());
+        let in_use = part.time_s.iter().filter(|t| (2000.0..2100.0).contains(*t)).count();
+        assert!(in_use > 1800, "{in_use}");
+        for fifth in 0..5 {
+            let (from, to) = (720.0 * f64::from(fifth), 720.0 * f64::from(fifth + 1));
+            assert!(part.time_s.iter().any(|t| (from..to).contains(t)), "nothing from {from} to {to} s");
+        }
+        assert!(part.time_s.windows(2).all(|w| w[0] < w[1]));
+    }
+
+    #[test]
+    fn a_short_recording_is_compared_whole() {
+        let mut short = hour();
+        short.time_s.truncate(6000);
+        short.columns.iter_mut().for_each(|c| c.1.truncate(6000));
+        assert!(stretches(&[short], &rig()).is_none());
+    }
+}
