@@ -244,7 +244,7 @@ fn fifty_megabytes_too_long_to_compare_are_refused() {
     }
     out.flush().unwrap();
     drop(out);
-    let output = kort(&["diagnose", &file, "--rig", STAND, "--json"]);
+    let output = kort(&["fit", &file, "--rig", STAND, "--json"]);
     let said = stderr(&output);
     assert_eq!(output.status.code(), Some(2), "{said}");
     assert!(said.contains("large.csv") && said.contains("20000 s") && said.contains("hint:"), "{said}");
