@@ -52,7 +52,7 @@ pub struct ExcitationRequest {
     limit: Option<f64>,
     /// Seed of random segments; the scenario's, or 1.
     #[serde(default)]
-    seed: Option<u64>,
+    seed: Option<u32>,
     /// Name of a recording made along with it.
     #[serde(default)]
     #[schema(pattern = "^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")]
@@ -212,7 +212,7 @@ fn wanted(app: &App, id: &str, request: ExcitationRequest) -> Result<Wanted, Pro
             .hint("{\"segments\": [{\"kind\": \"hold\", \"value\": 10, \"duration_s\": 5}]}"));
         }
     };
-    wanted.seed = seed.unwrap_or(wanted.seed);
+    wanted.seed = seed.map_or(wanted.seed, u64::from);
     Ok(wanted)
 }
 
