@@ -19,6 +19,7 @@ const DIRECTION: &[(&str, &[&str])] = &[
     ("crates/control", &["kort-thruster"]),
     ("crates/identify", &["kort-thruster"]),
     ("crates/diagnose", &["kort-thruster", "kort-scenario", "kort-identify"]),
+    ("crates/calibrate", &["kort-thruster", "kort-identify", "kort-proto"]),
     ("crates/reproduce", &["kort-thruster"]),
     ("crates/soak", &["kort-thruster", "kort-scenario", "kort-control", "kort-proto"]),
     ("services/servo", &["kort-thruster", "kort-scenario", "kort-proto"]),
@@ -33,6 +34,7 @@ const DIRECTION: &[(&str, &[&str])] = &[
             "kort-recording",
             "kort-identify",
             "kort-diagnose",
+            "kort-calibrate",
             "kort-truth",
             "kort-proof",
             "kort-reproduce",
@@ -54,6 +56,7 @@ const PURE: &[&str] = &[
     "crates/control",
     "crates/identify",
     "crates/diagnose",
+    "crates/calibrate",
     "crates/reproduce",
     "crates/soak",
 ];

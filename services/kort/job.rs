@@ -12,16 +12,25 @@ use crate::{FAILED, fail};
 /// # Errors
 /// The parent is gone already.
 pub fn begin(parent: u32) -> Result<(), ExitCode> {
-    let _ = set_parent_process_death_signal(Some(Signal::KILL));
-    // The parent may have ended before the line above.
-    let theirs = i32::try_from(parent).ok().and_then(Pid::from_raw);
-    if theirs.is_none() || getppid() != theirs {
-        return Err(fail(FAILED, &format!("process {parent} did not start this one, or is gone")));
-    }
+    follow(parent, Signal::KILL)?;
     // Where the one is not permitted the other still helps.
     let _ = nice(19);
     if let Some(words) = idle() {
         eprintln!("warning: {words}");
+    }
+    Ok(())
+}
+
+/// Has this process get a signal when its parent ends.
+///
+/// # Errors
+/// The parent is gone already.
+pub fn follow(parent: u32, last: Signal) -> Result<(), ExitCode> {
+    let _ = set_parent_process_death_signal(Some(last));
+    // The parent may have ended before the line above.
+    let theirs = i32::try_from(parent).ok().and_then(Pid::from_raw);
+    if theirs.is_none() || getppid() != theirs {
+        return Err(fail(FAILED, &format!("process {parent} did not start this one, or is gone")));
     }
     Ok(())
 }

@@ -13,6 +13,7 @@ use clap::{Args, Parser, Subcommand};
 use kort_proto::config::Config;
 use kort_proto::messages::Trip;
 use kort_proto::transport::Deployment;
+use rustix::process::Signal;
 
 /// Done.
 const DONE: u8 = 0;
@@ -57,6 +58,9 @@ enum Command {
         /// The stop that ended the servo before: time in ns, thrust in N, shaft speed in rad/s
         #[arg(long, value_name = "NS,N,RAD/S", hide = true, value_parser = trip, allow_hyphen_values = true)]
         tripped: Option<Trip>,
+        /// The process that started this one: the servo ends with it
+        #[arg(long, value_name = "PID", hide = true)]
+        parent: Option<u32>,
     },
     /// The controller alone: from setpoint to drive command
     #[command(after_help = "Example: kort controller --config config/kort.toml --thruster t1")]
@@ -145,8 +149,11 @@ fn dispatch(command: Command) -> Result<ExitCode, ExitCode> {
             let (config, deployment) = service.load()?;
             finish(up::run(&config, &deployment))
         }
-        Command::Servo { service, which, join, latched, tripped } => {
+        Command::Servo { service, which, join, latched, tripped, parent } => {
             log();
+            if let Some(parent) = parent {
+                job::follow(parent, Signal::TERM)?;
+            }
             let (config, deployment) = service.load()?;
             let inherited =
                 kort_servo::Inherited { latched: latched.latched, tripped: tripped.unwrap_or_default() };

@@ -1,6 +1,7 @@
 //! The service on emulated drives: armed, commanded, recorded; then with every fault of the link and of the drive.
 //! Each ends at zero torque at the motor within its bound, with a fault latched, and nothing is resumed.
 
+mod calibrate;
 #[path = "../common/mod.rs"]
 mod common;
 mod link;

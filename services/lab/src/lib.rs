@@ -1,9 +1,10 @@
-//! The laboratory: simulate, fit, diagnose, explain, soak, reproduce, prove.
+//! The laboratory: simulate, fit, diagnose, explain, calibrate, soak, reproduce, prove.
 //!
 //! [`Command`] is what the program `kort` shows of it; [`run`] does one. To add a subcommand:
 //! a file in `commands/` with `Args` and `run`, and a line in [`Command`].
 
 mod believed;
+pub mod calibrate;
 pub mod check;
 pub mod commands;
 pub mod failure;

@@ -1,5 +1,6 @@
 //! One file a subcommand.
 
+mod calibrate;
 mod columns;
 mod diagnose;
 mod explain;
@@ -17,6 +18,8 @@ use crate::failure::{Failure, Outcome};
 /// The laboratory's subcommands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
+    /// Calibrate a thruster on its drive: signs, zeros, friction, inertia, lags, thrust map; writes a rig and a recording
+    Calibrate(calibrate::Calibrate),
     /// Say what is in a log of others, and propose a column map for it
     Columns(columns::Args),
     /// Find what the model left out: where, what, how much better with it
@@ -49,6 +52,7 @@ impl Command {
     /// Does it.
     pub fn run(self) -> Result<Outcome, Failure> {
         match self {
+            Command::Calibrate(args) => calibrate::run(&args),
             Command::Columns(args) => columns::run(&args),
             Command::Diagnose(diagnose) => diagnose.run(),
             Command::Explain(args) => explain::run(&args),

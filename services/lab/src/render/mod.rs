@@ -1,5 +1,6 @@
 //! Self-contained HTML pages: no script, no outside file; readable at phone and desktop width.
 
+pub mod calibration;
 mod curves;
 pub mod diagnosis;
 pub mod fit;
