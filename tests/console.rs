@@ -186,7 +186,7 @@ fn an_operator_takes_command_thrusts_records_and_stops() {
 
         for chart in ["thrust", "speed", "current", "flow"] {
             let colours = page.eval(&format!(
-            "(() => {{ const c = document.getElementById('plot-{chart}'); const d = c.getContext('2d').getImageData(0, 60, c.width, c.height - 90).data; \
+            "(() => {{ const c = document.querySelector('#plot-{chart} canvas'); const d = c.getContext('2d').getImageData(0, 60, c.width, c.height - 90).data; \
              const seen = new Set(); for (let i = 0; i < d.length; i += 4) if (d[i + 3]) seen.add(`${{d[i]}},${{d[i + 1]}},${{d[i + 2]}}`); return seen.size; }})()"
         ));
             assert!(colours.as_u64().unwrap() > 3, "the plot of {chart} shows curves: {colours} colours");
@@ -228,6 +228,85 @@ fn an_operator_takes_command_thrusts_records_and_stops() {
             url.starts_with(&home) || url.starts_with(&home.replace("http", "ws")) || url.starts_with("data:")
         };
         assert!(page.asked.len() > 5 && page.asked.iter().all(ours), "{:?}", page.asked);
+    });
+}
+
+/// A test signal is previewed, played, ended and recorded; recordings come over the plots, one against the other.
+#[test]
+fn a_bench_engineer_plays_signals_and_compares_runs() {
+    common::in_real_time(|| {
+        let stack = Stack::start();
+        let Some(mut page) = Browser::open(&format!("http://127.0.0.1:{}/", stack.site.port)) else { return };
+        page.until("document.readyState === 'complete' && typeof state !== 'undefined'");
+        page.until(&text_is("link", "live"));
+        // What the gateway kept before the page was there is in the plots, and the signal's course is shown.
+        page.until("live.t.length > 5 && live.t[0] < state.time_s");
+        page.until(&text_is("signal-text", "staircase: 14.0 s, up to 60.0 N"));
+        page.eval("$('signal-limit').value = 50; preview()");
+        page.until(&text_is("signal-text", "a limit of 50"));
+        assert_eq!(page.eval("$('play').disabled"), json!(true), "what is refused is not played");
+        page.eval("lease_ttl_ms = 60000");
+        page.click("take");
+        page.until(&text_is("lease-text", "You have the lease"));
+        page.click("arm");
+        page.until("state.armed");
+        for (name, level) in [("first", 20), ("second", 40)] {
+            page.eval("$('signal-kind').value = 'steps'; showFields()");
+            let fill = format!(
+                "$('signal-level').value = {level}; $('signal-each_s').value = 0.6; $('signal-record').value = '{name}'; $('play').dataset.ready = ''; preview()"
+            );
+            page.eval(&fill);
+            page.click("play");
+            page.until("state.excitation !== null && !$('signal-end').disabled");
+            page.until("state.excitation === null && state.setpoint.thrust_n === 0");
+            page.until(&format!(
+                "[...document.querySelectorAll('#recordings button')].some((b) => b.ariaLabel === 'compare {name}')"
+            ));
+        }
+        page.until(&text_is("log", "steps is complete"));
+        // Ended by hand.
+        page.eval("$('signal-kind').value = 'sine'; $('play').dataset.ready = ''; showFields(); $('signal-record').value = ''");
+        page.click("play");
+        page.until("state.excitation !== null");
+        page.click("signal-end");
+        page.until(&text_is("log", "sine ended: local ended it"));
+
+        for words in ["show first", "compare second"] {
+            page.eval(&format!(
+                "[...document.querySelectorAll('#recordings button')].find((b) => b.ariaLabel === '{words}').click()"
+            ));
+            page.until(&text_is("run-text", words.split(' ').next_back().unwrap()));
+        }
+        // The second asks for 20 N more than the first while both are up: seen in the plot's own data.
+        page.eval("$('difference').click(); shownSignals.add('thrust_error_n')");
+        page.until("charts[0].shown && charts[0].shown.endsWith('true|true')");
+        let difference =
+            "Math.max(...charts[0].plot.data[1 + charts[0].signals.length].filter((v) => v !== null))";
+        let newton = page.eval(difference).as_f64().unwrap();
+        assert!((15.0..41.0).contains(&newton), "B - A of the commanded thrust: {newton}");
+        page.eval("zoomTo(0.2, 0.8)");
+        page.until("charts[0].plot.scales.x.max === 0.8");
+        assert!(
+            page.eval("tableOf(...shownNow())").as_str().unwrap().starts_with("time_s,thrust_cmd_n,thrust_n")
+        );
+        page.until("(pictureOf().then((blob) => { window.pictured = blob.size; }), window.pictured > 2000)");
+        page.click("zoom-out");
+        for (theme, width) in [("light", 1280), ("dark", 1280), ("light", 390), ("dark", 390)] {
+            let features = json!([{"name": "prefers-color-scheme", "value": theme}]);
+            page.call("Emulation.setEmulatedMedia", json!({ "features": features }));
+            let size = json!({"width": width, "height": 2600, "deviceScaleFactor": 1, "mobile": false});
+            page.call("Emulation.setDeviceMetricsOverride", size);
+            std::thread::sleep(Duration::from_millis(400));
+            let wide = page.eval("document.documentElement.scrollWidth").as_u64().unwrap();
+            assert!(wide <= width, "{theme} at {width} px: the page is {wide} px wide");
+            page.picture(&format!("{}/target/console-{theme}-{width}.png", env!("CARGO_MANIFEST_DIR")));
+        }
+        page.eval("$('run-live').click()");
+        page.until("run === null && document.getElementById('run').hidden");
+        assert_eq!(
+            page.errors.iter().filter(|e| !e.contains("status of 422")).collect::<Vec<_>>(),
+            Vec::<&String>::new()
+        );
     });
 }
 

@@ -3,16 +3,6 @@ const $ = (id) => document.getElementById(id);
 const RENEW_EVERY_MS = 500, STREAM_HZ = 25, DRAW_EVERY_MS = 50, STALE_MS = 700, WAIT_MS = 4000;
 let lease_ttl_ms = 3000, thruster = null, lease = null, socket = null, state = null, heard_ms = 0, paused_s = null, limitsOf = {}, recording = null, taken_ms = 0, drawn_ms = 0;
 
-const charts = [
-  new StripChart($("plot-thrust"), "thrust", "N", [
-    { name: "commanded", color: "--quiet", dash: [5, 4], atLeast: 4 }, { name: "measured", color: "--blue" }, { name: "estimated", color: "--orange" }]),
-  new StripChart($("plot-speed"), "shaft speed", "rad/s", [
-    { name: "commanded", color: "--quiet", dash: [5, 4], atLeast: 4 }, { name: "measured", color: "--green" }]),
-  new StripChart($("plot-current"), "motor current", "A", [
-    { name: "commanded", color: "--quiet", dash: [5, 4], atLeast: 1 }, { name: "measured", color: "--purple" }]),
-  new StripChart($("plot-flow"), "axial flow", "m/s", [
-    { name: "measured", color: "--blue", atLeast: 0.4 }, { name: "estimated", color: "--orange" }, { name: "ambient, estimated", color: "--green", dash: [2, 3] }]),
-];
 const TILES = [
   ["thrust", "N", (s) => s.measured.thrust_n, 1], ["thrust, estimated", "N", (s) => s.estimated.thrust_n, 1],
   ["shaft speed", "rad/s", (s) => s.measured.shaft_speed_rad_s, 1], ["shaft speed", "rpm", (s) => scaled(s.measured.shaft_speed_rad_s, 30 / Math.PI), 0],
@@ -34,8 +24,8 @@ function log(message, bad) {
   while ($("log").children.length > 200) $("log").lastChild.remove();
 }
 
-// One request; a problem document becomes a line in the log and a thrown error.
-async function call(method, path, body) {
+// One request; a problem document becomes a line in the log (unless it is told elsewhere) and a thrown error.
+async function call(method, path, body, quiet) {
   const headers = {};
   if (body !== undefined) headers["Content-Type"] = "application/json";
   if (lease) headers["Lease-Id"] = lease;
@@ -52,8 +42,8 @@ async function call(method, path, body) {
   if (answer.status === 401) askToken();
   const answered = await answer.json();
   if (!answer.ok) {
-    log(`${answered.title}: ${answered.detail}${answered.hint ? ` (hint: ${answered.hint})` : ""}`, true);
-    throw new Error(answered.title);
+    if (!quiet) log(`${answered.title}: ${answered.detail}${answered.hint ? ` (hint: ${answered.hint})` : ""}`, true);
+    throw new Error(quiet ? answered.detail : answered.title);
   }
   return answered;
 }
@@ -85,41 +75,37 @@ function connect() {
 }
 
 function record(s) {
-  const t = s.time_s, points = charts[0].points[0];
-  if (points.length && t < points[points.length - 1][0]) charts.forEach((chart) => chart.clear());
-  const set = s.setpoint || {}, cmd = s.commanded || {};
-  charts[0].push(t, [set.thrust_n ?? cmd.thrust_cmd_n ?? null, s.measured.thrust_n, s.estimated.thrust_n]);
-  charts[1].push(t, [set.speed_rad_s ?? cmd.speed_cmd_rad_s ?? null, s.measured.shaft_speed_rad_s]);
-  charts[2].push(t, [cmd.current_cmd_a ?? null, s.measured.current_a]);
-  charts[3].push(t, [s.measured.flow_m_s, s.estimated.flow_m_s, s.estimated.ambient_m_s]);
+  const set = s.setpoint || {}, cmd = s.commanded || {}, est = s.estimated;
+  live.push(s.time_s, { ...s.measured, ...cmd, thrust_cmd_n: set.thrust_n ?? cmd.thrust_cmd_n, speed_cmd_rad_s: set.speed_rad_s ?? cmd.speed_cmd_rad_s,
+    estimated_thrust_n: est.thrust_n, estimated_flow_m_s: est.flow_m_s, estimated_ambient_m_s: est.ambient_m_s });
 }
 
 function show() {
-  const live = !isStale();
+  const fresh = !isStale();
   const age_s = state ? (performance.now() - heard_ms) / 1000 + (state.age_s ?? 0) : null;
-  chip("link", live ? "live" : age_s === null ? "no link" : `values are ${age_s.toFixed(1)} s old`, live ? "good" : "bad");
-  document.body.classList.toggle("stale", !live);
-  $("send").disabled = !live || !lease || !state.armed;
-  $("zero-button").disabled = !live;
+  chip("link", fresh ? "live" : age_s === null ? "no link" : `values are ${age_s.toFixed(1)} s old`, fresh ? "good" : "bad");
+  document.body.classList.toggle("stale", !fresh);
+  $("send").disabled = !fresh || !lease || !state.armed;
+  $("zero-button").disabled = !fresh;
   if (state) {
-    const end_s = paused_s ?? state.time_s + (live ? Math.min(0.2, (performance.now() - heard_ms) / 1000) : 0);
     if (performance.now() - drawn_ms >= DRAW_EVERY_MS) { // not every frame: renewing the lease comes first
       drawn_ms = performance.now();
-      charts.forEach((chart) => chart.draw(end_s, Number($("span").value)));
+      const [source, from_s, to_s] = shownNow();
+      charts.forEach((chart) => chart.draw(source, from_s, to_s));
     }
-    showState(state, live);
+    showState(state, fresh);
   }
   requestAnimationFrame(show);
 }
 
 let shown = 0;
-function showState(s, live) {
+function showState(s, fresh) {
   if (performance.now() - shown < 100) return;
   shown = performance.now();
   TILES.forEach(([, , value, digits], i) => { $("tiles").children[i].querySelector("i").textContent = text(value(s), digits); });
   $("time").textContent = `servo time ${s.time_s.toFixed(2)} s`;
-  chip("armed", !live ? `${s.armed ? "armed" : "disarmed"} when last heard` : s.armed ? "armed" : "disarmed", s.armed && live ? "warn" : "");
-  $("arm").disabled = s.armed || !live; $("disarm").disabled = false;
+  chip("armed", !fresh ? `${s.armed ? "armed" : "disarmed"} when last heard` : s.armed ? "armed" : "disarmed", s.armed && fresh ? "warn" : "");
+  $("arm").disabled = s.armed || !fresh; $("disarm").disabled = false;
 
   const mine = lease && s.lease;
   // A state that was on its way when the lease was granted does not know of it.
@@ -128,7 +114,7 @@ function showState(s, live) {
     : mine ? "You have the lease." : `“${s.lease.holder}” has the lease.`;
   $("lease-bar").style.width = s.lease ? `${Math.min(100, s.lease.expires_in_ms / lease_ttl_ms * 100)}%` : "0";
   $("take").textContent = s.lease && !mine ? "Take over" : "Take lease";
-  $("take").disabled = Boolean(mine) || !live; $("give").disabled = !lease;
+  $("take").disabled = Boolean(mine) || !fresh; $("give").disabled = !lease;
   $("setpoint-text").textContent = `in force: ${Object.entries(s.setpoint).map(([name, value]) => `${name} = ${value.toFixed(2)}`).join(", ")}`
     + (!lease ? " — take the lease to change it" : !s.armed ? " — arm to change it" : "");
 
@@ -247,7 +233,11 @@ async function loadRecordings() {
   recording = list.find((item) => item.state === "recording") ?? null;
   $("record").textContent = recording ? "Stop" : "Start";
   $("recording-text").textContent = recording ? `recording ${recording.name}: ${recording.rows} rows` : "";
-  $("recordings").replaceChildren(...list.map((item) => cells([item.name, String(item.rows), `${item.duration_s.toFixed(1)} s`,
+  const shown = JSON.stringify(list);
+  if ($("recordings").dataset.shown === shown) return; // a button is not taken away from under the finger
+  $("recordings").dataset.shown = shown;
+  $("recordings").replaceChildren(...list.map((item) => cells([item.name, String(item.rows), `${item.duration_s.toFixed(1)} s`, item.state === "recording" ? "" : [["show", replay], ["compare", compare]].map(([words, action]) =>
+      Object.assign(document.createElement("button"), { textContent: words, ariaLabel: `${words} ${item.name}`, onclick: () => action(item.name).catch(() => {}) })),
     ["csv", "mcap"].map((format) => {
       const link = Object.assign(document.createElement("a"),
         { href: `/v1/recordings/${encodeURIComponent(item.name)}?format=${format}`, textContent: format, download: `${item.name}.${format}` });
@@ -286,9 +276,9 @@ click("pause", async () => {
 });
 $("thruster").addEventListener("change", () => choose($("thruster").value));
 async function choose(id) {
-  thruster = id; lease = null; state = null; charts.forEach((chart) => chart.clear());
+  thruster = id; lease = null; state = null; live.clear();
   limitsOf = (await call("GET", base())).range; showKind();
-  connect(); await loadController();
+  connect(); loadHistory().catch(() => {}); await loadController();
 }
 $("login").addEventListener("submit", (event) => {
   event.preventDefault();

@@ -1,7 +1,7 @@
 "use strict";
 // Diagnosis: path lights, what the model left out, use it, go back, and what that did to the thrust.
 const LOOK_EVERY_MS = 2000, SETTLE_S = 5, ERROR_SPAN_S = 60;
-let found = null, revised = null; // the newest diagnosis of this thruster; when which revision came, by this page
+let found = null, revised = null, proposed = null; // the newest diagnosis of this thruster; when which revision came, by this page
 
 const diagnosesOf = () => `${base()}/diagnoses`;
 const says = (id, words) => { if ($(id).textContent !== words) $(id).textContent = words; }; // read aloud when it changes
@@ -49,8 +49,33 @@ async function loadDiagnosis() {
     cells([f.effect.replaceAll("_", " "), f.path, f.probability.toFixed(2), percent(f.excess_error_removed), f.statement])));
   const link = Object.assign(document.createElement("a"), { href: `${diagnosesOf()}/${found.id}/report`, target: "_blank", textContent: `report of ${found.id}` });
   link.addEventListener("click", (event) => openPage(event, link));
-  $("report").replaceChildren(...(found.state === "done" ? [link] : []));
+  const place = Object.assign(document.createElement("button"), { textContent: "Show it here", onclick: () => placePage(link).catch(() => {}) });
+  $("report").replaceChildren(...(found.state === "done" ? [link, " ", place] : []));
+  $("page").hidden = true;
+  const report = found.state === "done" ? (await call("GET", `${diagnosesOf()}/${found.id}`)).report : null;
+  proposed = report?.next_experiment ? found.id : null;
+  says("next-text", proposed ? `Next experiment: ${report.next_experiment.excitation}, to part ${report.next_experiment.separates.join(" from ").replaceAll("_", " ")}. ${report.next_experiment.why}` : "");
 }
+// The report in place: without scripts, in a frame of its own.
+async function placePage(link) {
+  if (!$("page").hidden) { $("page").hidden = true; return; }
+  const answer = await fetch(link.href, { headers: token ? { Authorization: `Bearer ${token}` } : {} });
+  if (!answer.ok) { log(`${link.textContent}: ${answer.status}`, true); return; }
+  $("page").srcdoc = await answer.text(); $("page").hidden = false;
+}
+click("experiment", async () => {
+  const limit = $("signal-limit").value === "" ? {} : { limit: Number($("signal-limit").value) }, body = { diagnosis: proposed, ...limit };
+  const would = await call("POST", `${base()}/excitation?dry_run=true`, body);
+  const unit = would.command === "thrust_n" ? "N" : "rad/s";
+  if (!confirm(`Play ${would.name} on ${thruster} for ${would.duration_s.toFixed(0)} s, up to ${would.peak.toFixed(1)} ${unit}? It is recorded and diagnosed together with ${proposed}.`)) return;
+  await play(body);
+});
+// Thrust error in the minute before the revision and since, one over the other.
+click("overlay", async () => {
+  shownSignals.add("thrust_error_n"); $("show-thrust_error_n").checked = true;
+  const zero_s = revised.time_s, before = live.cut(zero_s - ERROR_SPAN_S, zero_s, zero_s - ERROR_SPAN_S), since = live.cut(zero_s + SETTLE_S, zero_s + SETTLE_S + ERROR_SPAN_S, zero_s + SETTLE_S);
+  showRun({ a: before, b: since, names: ["the minute before", `since revision ${revised.number}`], at_s: null, playing: null, difference: false });
+});
 setInterval(() => { if (!document.hidden) loadDiagnosis().catch(() => {}); }, LOOK_EVERY_MS);
 
 // A link cannot carry the token: with one, the page is fetched and opened.
@@ -87,20 +112,11 @@ function came(answer) {
 }
 
 // Thrust error, root mean square, over the minute before a revision came and since; what settles is left out.
-function rms(from_s, to_s) {
-  const [asked, measured] = charts[0].points;
-  let sum = 0, n = 0;
-  for (let i = 0; i < asked.length; i += 1) {
-    const [t, want] = asked[i], got = measured[i][1];
-    if (t < from_s || t > to_s || want === null || got === null || want === undefined) continue;
-    sum += (want - got) ** 2; n += 1;
-  }
-  return n > STREAM_HZ ? Math.sqrt(sum / n) : null;
-}
 function showError() {
-  if (!revised || revised.time_s > state.time_s) { says("error-text", ""); return; }
-  const before = rms(revised.time_s - ERROR_SPAN_S, revised.time_s);
-  const since = rms(Math.max(revised.time_s + SETTLE_S, state.time_s - ERROR_SPAN_S), state.time_s);
+  $("overlay").disabled = !revised || revised.time_s > state.time_s;
+  if ($("overlay").disabled) { says("error-text", ""); return; }
+  const before = live.rms("thrust_error_n", revised.time_s - ERROR_SPAN_S, revised.time_s);
+  const since = live.rms("thrust_error_n", Math.max(revised.time_s + SETTLE_S, state.time_s - ERROR_SPAN_S), state.time_s);
   const told = (n) => (n === null ? "not known yet" : `${n.toFixed(2)} N rms`);
   const worse = before !== null && since !== null && since > 1.2 * before + 0.05;
   says("error-text", `Thrust error: ${told(before)} in the minute before revision ${revised.number}, ${told(since)} since${worse ? ": larger than before. Back undoes it." : "."}`);
@@ -120,7 +136,7 @@ async function offer() {
 setInterval(() => { if (!document.hidden && thruster) offer().catch(() => {}); }, 5000);
 setTimeout(() => { if (thruster) { offer().catch(() => {}); loadDiagnosis().catch(() => {}); } }, 500);
 $("thruster").addEventListener("change", () => {
-  found = null; revised = null;
+  found = null; revised = null; proposed = null; $("page").hidden = true;
   for (const id of ["findings", "diagnosis-of"]) delete $(id).dataset.shown;
   $("findings").replaceChildren(); $("report").replaceChildren(); says("diagnosis-text", "");
   offer().catch(() => {});

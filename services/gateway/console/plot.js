@@ -1,127 +1,190 @@
 "use strict";
-// A strip chart on a canvas: several curves over the last seconds, one unit per chart.
-// Each curve holds [time_s, value] pairs; null values leave gaps.
-class StripChart {
-  constructor(canvas, title, unit, curves) {
-    Object.assign(this, { canvas, title, unit, curves, points: curves.map(() => []), hover: null });
-    canvas.addEventListener("mousemove", (event) => { this.hover = event.offsetX; });
-    canvas.addEventListener("mouseleave", () => { this.hover = null; });
-  }
+// Plots: a chart per unit, drawn by uPlot, over one source of columns: the live signals, or one or two runs.
+const LIVE_POINTS = 20000; // more than ten minutes of the stream
+// name, chart, label, colour, dash, shown at first; the names are the recording's columns
+const SIGNALS = [
+  ["thrust_cmd_n", "N", "commanded", "--quiet", [5, 4], true], ["thrust_n", "N", "measured", "--blue", [], true],
+  ["estimated_thrust_n", "N", "estimated", "--orange", [], true], ["thrust_error_n", "N", "error", "--red", [], false],
+  ["speed_cmd_rad_s", "rad/s", "commanded", "--quiet", [5, 4], true], ["shaft_speed_rad_s", "rad/s", "measured", "--green", [], true],
+  ["current_cmd_a", "A", "commanded", "--quiet", [5, 4], true], ["current_a", "A", "measured", "--purple", [], true],
+  ["flow_m_s", "m/s", "measured", "--blue", [], true], ["estimated_flow_m_s", "m/s", "estimated", "--orange", [], true],
+  ["ambient_m_s", "m/s", "ambient", "--purple", [], false], ["estimated_ambient_m_s", "m/s", "ambient, estimated", "--green", [2, 3], true],
+  ["voltage_cmd_v", "V", "motor, commanded", "--quiet", [5, 4], false], ["supply_v", "V", "supply", "--purple", [], false],
+  ["torque_n_m", "N m", "blade torque", "--green", [], false], ["temperature_c", "°C", "motor", "--red", [], false],
+  ["duty_cmd", "1", "duty, commanded", "--quiet", [], false], ["shaft_angle_rad", "rad", "shaft angle", "--blue", [], false], ["depth_m", "m", "depth", "--blue", [], false],
+];
+const TITLES = { N: "thrust", "rad/s": "shaft speed", A: "motor current", "m/s": "axial flow", V: "voltage", "N m": "torque", "°C": "temperature", 1: "duty", rad: "angle", m: "depth" };
+const IDS = { N: "plot-thrust", "rad/s": "plot-speed", A: "plot-current", "m/s": "plot-flow" };
+const shownSignals = new Set(SIGNALS.filter((signal) => signal[5]).map(([name]) => name));
 
-  push(time_s, values) {
-    values.forEach((value, i) => this.points[i].push([time_s, value]));
-    if (this.points[0].length > 40000) this.points.forEach((list) => list.splice(0, 10000));
+// Columns over time. Nothing measured is null: a gap.
+class Columns {
+  constructor() { this.clear(); }
+  clear() { this.t = []; this.c = Object.fromEntries(SIGNALS.map(([name]) => [name, []])); }
+  push(t, row) {
+    if (this.t.length && t <= this.t[this.t.length - 1]) { if (t < this.t[this.t.length - 1]) this.clear(); else return; }
+    this.t.push(t);
+    const error = row.thrust_cmd_n == null || row.thrust_n == null ? null : row.thrust_cmd_n - row.thrust_n;
+    for (const name in this.c) this.c[name].push((name === "thrust_error_n" ? error : row[name]) ?? null);
+    if (this.t.length > LIVE_POINTS) { this.t.splice(0, 2000); for (const name in this.c) this.c[name].splice(0, 2000); }
   }
+  // The part between two instants, its time from `zero_s` on.
+  cut(from_s, to_s, zero_s) {
+    const part = new Columns(), a = lowerBound(this.t, from_s), b = lowerBound(this.t, to_s);
+    part.t = this.t.slice(a, b).map((t) => t - zero_s);
+    for (const name in this.c) part.c[name] = this.c[name].slice(a, b);
+    return part;
+  }
+  // Root mean square of a column between two instants; null for less than a second of it.
+  rms(name, from_s = -Infinity, to_s = Infinity) {
+    let sum = 0, n = 0, first = null, last = null;
+    for (let i = lowerBound(this.t, from_s); i < this.t.length && this.t[i] <= to_s; i += 1) {
+      const v = this.c[name][i];
+      if (v === null) continue;
+      sum += v * v; n += 1; first ??= this.t[i]; last = this.t[i];
+    }
+    return n > 1 && last - first >= 1 ? Math.sqrt(sum / n) : null;
+  }
+}
+function lowerBound(list, value) {
+  let low = 0, high = list.length;
+  while (low < high) { const mid = (low + high) >> 1; if (list[mid] < value) low = mid + 1; else high = mid; }
+  return low;
+}
+// Values of another run at these instants, on straight lines; null outside it and beside its gaps.
+function at(times, from, values) {
+  let i = 0;
+  return times.map((t) => {
+    while (i + 1 < from.length && from[i + 1] <= t) i += 1;
+    if (!from.length || t < from[0] || t > from[from.length - 1] || values[i] === null) return null;
+    if (i + 1 >= from.length) return values[i];
+    if (values[i + 1] === null) return t === from[i] ? values[i] : null;
+    return values[i] + (values[i + 1] - values[i]) * (t - from[i]) / (from[i + 1] - from[i]);
+  });
+}
 
+class Chart {
+  constructor(unit) {
+    this.unit = unit; this.title = TITLES[unit];
+    this.signals = SIGNALS.filter((signal) => signal[1] === unit);
+    this.figure = document.createElement("figure");
+    this.box = Object.assign(document.createElement("div"), { id: IDS[unit] ?? `plot-${this.title}` });
+    this.box.setAttribute("role", "img"); this.box.setAttribute("aria-label", this.title);
+    this.figure.append(this.box);
+    new ResizeObserver(() => this.fit()).observe(this.figure);
+  }
+  fit() { const width = this.figure.clientWidth - 16; if (this.plot && width > 0 && width !== this.plot.width) this.plot.setSize({ width, height: 210 }); }
+  // Series: each signal of run A and of run B; what is compared is dashed.
+  build() {
+    const css = getComputedStyle(document.documentElement), color = (name) => css.getPropertyValue(name).trim();
+    const axis = { stroke: color("--quiet"), grid: { stroke: color("--grid"), width: 1 }, ticks: { show: false }, font: "12px system-ui, 'DejaVu Sans', sans-serif" };
+    const series = (second) => this.signals.map(([, , label, hue, dash]) => ({
+      label: second ? `${label}, B` : label, stroke: color(hue), width: 1.5, dash: second ? [2, 4] : dash, points: { show: false },
+      value: (_, v) => (v === null || v === undefined ? "–" : v.toFixed(2)),
+    }));
+    this.plot?.destroy();
+    this.plot = new uPlot({
+      width: Math.max(200, this.figure.clientWidth - 16), height: 210, title: `${this.title} [${this.unit}]`,
+      cursor: { sync: { key: "kort" }, drag: { x: true, y: false, setScale: false } },
+      scales: { x: { time: false }, y: { range: (u, low, high) => this.range(low, high) } },
+      axes: [{ ...axis, size: 28, values: (_, ticks) => ticks.map((t) => `${+t.toFixed(2)} s`) }, { ...axis, size: 52 }],
+      series: [{ label: "time", value: (_, t) => (t === null || t === undefined ? "–" : `${t.toFixed(2)} s`) }, ...series(false), ...series(true)],
+      hooks: { setSelect: [(u) => {
+        if (u.select.width < 4) return;
+        zoomTo(u.posToVal(u.select.left, "x"), u.posToVal(u.select.left + u.select.width, "x"));
+        u.setSelect({ left: 0, width: 0, top: 0, height: 0 }, false);
+      }] },
+    }, [[], ...this.signals.map(() => []), ...this.signals.map(() => [])], this.box);
+    this.plot.over.addEventListener("dblclick", () => zoomTo(null, null));
+    this.shown = null;
+  }
+  range(low, high) {
+    if (this.fixed) return this.fixed;
+    if (low === null || !Number.isFinite(low)) [low, high] = [0, 0];
+    const least = { N: 4, "rad/s": 4, A: 1, "m/s": 0.4 }[this.unit] ?? 0.1, pad = Math.max((high - low) * 0.1, (least - (high - low)) / 2, 1e-3);
+    return [low - pad, high + pad];
+  }
+  // Fixed limits of y, as they are now; null for automatic ones.
+  fix(on) { this.fixed = on && this.plot ? [this.plot.scales.y.min, this.plot.scales.y.max] : null; }
+  draw(source, from_s, to_s) {
+    const names = this.signals.map(([name]) => name).filter((name) => shownSignals.has(name));
+    this.figure.hidden = names.length === 0;
+    if (this.figure.hidden) return;
+    if (!this.plot) this.build();
+    const { a, b, difference } = source, both = Boolean(b);
+    const shown = `${names}|${both}|${difference}`;
+    if (this.shown !== shown) {
+      this.signals.forEach(([name], i) => {
+        const on = shownSignals.has(name);
+        this.plot.setSeries(i + 1, { show: on && !difference }, false);
+        this.plot.setSeries(i + 1 + this.signals.length, { show: on && both }, false);
+        // uPlot gives every series its row of the legend; those that are not asked for are no use there.
+        const rows = this.box.querySelectorAll(".u-series");
+        rows[i + 1].hidden = !on || difference; rows[i + 1 + this.signals.length].hidden = !on || !both;
+      });
+      this.shown = shown;
+    }
+    const first = Math.max(0, lowerBound(a.t, from_s) - 1), last = lowerBound(a.t, to_s) + 1;
+    const t = a.t.slice(first, last), mine = this.signals.map(([name]) => (shownSignals.has(name) ? a.c[name].slice(first, last) : []));
+    const theirs = this.signals.map(([name], i) => {
+      if (!both || !shownSignals.has(name)) return [];
+      const other = at(t, b.t, b.c[name]);
+      return difference ? other.map((v, k) => (v === null || mine[i][k] === null ? null : v - mine[i][k])) : other;
+    });
+    this.last = mine.map((values) => values[values.length - 1] ?? null);
+    const pad = (columns) => columns.map((values) => (values.length ? values : t.map(() => null)));
+    this.plot.batch(() => {
+      this.plot.setData([t, ...pad(mine), ...pad(theirs)], false);
+      this.plot.setScale("x", { min: from_s, max: to_s });
+    });
+    if (this.plot.cursor.idx === null || this.plot.cursor.left < 0) this.plot.setLegend({ idx: t.length - 1 }, false);
+  }
   // What the picture says, in words: for those who do not see it.
   describe() {
-    const says = this.curves.map((curve, i) => { const value = last(this.points[i]); return `${curve.name} ${value === null ? "not measured" : value.toFixed(1)}`; });
-    this.canvas.setAttribute("aria-label", `${this.title} in ${this.unit}: ${says.join(", ")}`);
+    if (this.figure.hidden || !this.last) return;
+    const says = this.signals.map(([name, , label], i) => [name, label, this.last[i]]).filter(([name]) => shownSignals.has(name));
+    this.box.setAttribute("aria-label", `${this.title} in ${this.unit}: ${says.map(([, label, v]) => `${label} ${v === null ? "not measured" : v.toFixed(1)}`).join(", ")}`);
   }
+}
+const charts = Object.keys(TITLES).sort((x, y) => SIGNALS.findIndex((s) => s[1] === x) - SIGNALS.findIndex((s) => s[1] === y)).map((unit) => new Chart(unit));
+const live = new Columns();
+let zoomed = null; // [from_s, to_s], or none: the usual window
+function zoomTo(from_s, to_s) {
+  zoomed = from_s === null ? null : [from_s, to_s];
+  document.getElementById("zoom-out").disabled = !zoomed;
+}
 
-  clear() { this.points.forEach((list) => { list.length = 0; }); }
-
-  draw(end_s, span_s) {
-    const { canvas } = this, scale = window.devicePixelRatio || 1;
-    const width = canvas.clientWidth, height = canvas.clientHeight;
-    if (canvas.width !== Math.round(width * scale)) canvas.width = Math.round(width * scale);
-    if (canvas.height !== Math.round(height * scale)) canvas.height = Math.round(height * scale);
-    const pen = canvas.getContext("2d"), css = getComputedStyle(document.documentElement);
-    const color = (name) => css.getPropertyValue(name).trim();
-    pen.setTransform(scale, 0, 0, scale, 0, 0);
-    pen.clearRect(0, 0, width, height);
-    pen.font = "12px system-ui, 'DejaVu Sans', sans-serif";
-
-    const legend = this.places(pen, width);
-    const box = { left: 52, right: width - 8, top: legend[legend.length - 1].top + 13, bottom: height - 20 };
-    const start_s = end_s - span_s;
-    const shown = this.points.map((list) => list.slice(firstAfter(list, start_s)));
-    const [low, high] = range(shown, this.curves[0].atLeast || 1);
-    const x = (t) => box.left + (t - start_s) / span_s * (box.right - box.left);
-    const y = (v) => box.bottom - (v - low) / (high - low) * (box.bottom - box.top);
-
-    pen.fillStyle = color("--ink"); pen.textAlign = "left";
-    pen.font = "600 12px system-ui, 'DejaVu Sans', sans-serif";
-    pen.fillText(`${this.title} [${this.unit}]`, 4, 14);
-    pen.font = "12px system-ui, 'DejaVu Sans', sans-serif";
-
-    pen.lineWidth = 1; pen.textAlign = "right";
-    const step = niceStep((high - low) / 4);
-    for (let v = Math.ceil(low / step) * step; v <= high + 1e-9 * step; v += step) {
-      pen.strokeStyle = color(Math.abs(v) < step / 1e6 ? "--line" : "--grid");
-      line(pen, box.left, y(v), box.right, y(v));
-      pen.fillStyle = color("--quiet");
-      pen.fillText(tick(v, step), box.left - 6, y(v) + 4);
+// What is shown, as a table and as a picture.
+function save(name, blob) {
+  const url = URL.createObjectURL(blob);
+  Object.assign(document.createElement("a"), { href: url, download: name }).click();
+  setTimeout(() => URL.revokeObjectURL(url), 1000);
+}
+function tableOf(source, from_s, to_s) {
+  const names = SIGNALS.map(([name]) => name).filter((name) => shownSignals.has(name)), { a, b } = source;
+  const others = b ? names.map((name) => at(a.t, b.t, b.c[name])) : [];
+  const rows = [["time_s", ...names, ...(b ? names.map((name) => `b_${name}`) : [])].join(",")];
+  for (let i = lowerBound(a.t, from_s); i < a.t.length && a.t[i] <= to_s; i += 1) {
+    rows.push([a.t[i], ...names.map((name) => a.c[name][i]), ...others.map((values) => values[i])].map((v) => v ?? "").join(","));
+  }
+  return `${rows.join("\n")}\n`;
+}
+function pictureOf() {
+  const drawn = charts.filter((chart) => !chart.figure.hidden && chart.plot), scale = window.devicePixelRatio || 1;
+  const width = Math.max(...drawn.map((chart) => chart.plot.ctx.canvas.width)), line = 24 * scale;
+  const sheet = Object.assign(document.createElement("canvas"), { width, height: drawn.reduce((sum, chart) => sum + chart.plot.ctx.canvas.height + line, 0) });
+  const pen = sheet.getContext("2d"), css = getComputedStyle(document.documentElement);
+  pen.fillStyle = css.getPropertyValue("--card"); pen.fillRect(0, 0, width, sheet.height);
+  let top = 0;
+  for (const chart of drawn) {
+    let left = 6 * scale;
+    pen.font = `${13 * scale}px system-ui, sans-serif`; pen.fillStyle = css.getPropertyValue("--ink");
+    pen.fillText(`${chart.title} [${chart.unit}]`, left, top + 16 * scale); left += pen.measureText(`${chart.title} [${chart.unit}]   `).width;
+    for (const [name, , label, hue] of chart.signals.filter((signal) => shownSignals.has(signal[0]))) {
+      pen.fillStyle = css.getPropertyValue(hue); pen.fillText(label, left, top + 16 * scale); left += pen.measureText(`${label}   `).width;
     }
-    pen.textAlign = "center";
-    const stepT = niceStep(span_s / 6);
-    for (let ago = 0; ago <= span_s + 1e-9; ago += stepT) {
-      pen.strokeStyle = color("--grid");
-      line(pen, x(end_s - ago), box.top, x(end_s - ago), box.bottom);
-      pen.fillStyle = color("--quiet");
-      pen.textAlign = ago === 0 ? "right" : "center";
-      pen.fillText(ago === 0 ? "now" : `-${ago} s`, x(end_s - ago) + (ago === 0 ? 4 : 0), height - 5);
-    }
-
-    pen.save(); pen.beginPath();
-    pen.rect(box.left, box.top - 2, box.right - box.left, box.bottom - box.top + 4); pen.clip();
-    this.curves.forEach((curve, i) => {
-      pen.strokeStyle = color(curve.color); pen.lineWidth = 1.6; pen.setLineDash(curve.dash || []);
-      pen.beginPath();
-      let down = false;
-      for (const [t, v] of shown[i]) {
-        if (v === null || v === undefined) { down = false; continue; }
-        if (down) pen.lineTo(x(t), y(v)); else pen.moveTo(x(t), y(v));
-        down = true;
-      }
-      pen.stroke(); pen.setLineDash([]);
-    });
-    pen.restore();
-
-    const at = this.hover !== null && this.hover >= box.left && this.hover <= box.right
-      ? start_s + (this.hover - box.left) / (box.right - box.left) * span_s : null;
-    if (at !== null) { pen.strokeStyle = color("--quiet"); line(pen, this.hover, box.top, this.hover, box.bottom); }
-    pen.textAlign = "left";
-    this.curves.forEach((curve, i) => {
-      const { left, top } = legend[i];
-      const value = at === null ? last(shown[i]) : near(shown[i], at);
-      const text = `${curve.name} ${value === null ? "–" : value.toFixed(2)}`;
-      pen.strokeStyle = color(curve.color); pen.lineWidth = 2; pen.setLineDash(curve.dash || []);
-      line(pen, left, top, left + 16, top); pen.setLineDash([]);
-      pen.fillStyle = color("--ink"); pen.fillText(text, left + 21, top + 4);
-    });
+    pen.drawImage(chart.plot.ctx.canvas, 0, top + line);
+    top += chart.plot.ctx.canvas.height + line;
   }
-
-  // Where each curve's entry of the legend stands: a new row where the last one is full.
-  places(pen, width) {
-    let left = 4, top = 27;
-    return this.curves.map((curve) => {
-      const wide = 21 + pen.measureText(`${curve.name} -000.00`).width;
-      if (left > 4 && left + wide > width) { left = 4; top += 16; }
-      const place = { left, top };
-      left += wide + 14;
-      return place;
-    });
-  }
+  return new Promise((done) => sheet.toBlob(done, "image/png"));
 }
-
-function line(pen, x0, y0, x1, y1) { pen.beginPath(); pen.moveTo(x0, y0); pen.lineTo(x1, y1); pen.stroke(); }
-function niceStep(raw) {
-  const power = 10 ** Math.floor(Math.log10(raw));
-  return [1, 2, 5, 10].find((m) => m * power >= raw) * power;
-}
-function tick(value, step) { return value.toFixed(Math.max(0, -Math.floor(Math.log10(step) + 1e-9))); }
-function firstAfter(list, time_s) {
-  let low = 0, high = list.length;
-  while (low < high) { const mid = (low + high) >> 1; if (list[mid][0] < time_s) low = mid + 1; else high = mid; }
-  return Math.max(0, low - 1);
-}
-function range(curves, atLeast) {
-  let low = Infinity, high = -Infinity;
-  for (const list of curves) for (const [, v] of list) if (v !== null && v !== undefined) { low = Math.min(low, v); high = Math.max(high, v); }
-  if (low > high) { low = 0; high = 0; }
-  const pad = Math.max((high - low) * 0.1, (atLeast - (high - low)) / 2, 1e-3);
-  return [low - pad, high + pad];
-}
-function last(list) { for (let i = list.length - 1; i >= 0; i--) if (list[i][1] !== null && list[i][1] !== undefined) return list[i][1]; return null; }
-function near(list, time_s) { const i = firstAfter(list, time_s); return list[i] && list[i][1] !== undefined ? list[i][1] : null; }

@@ -9,6 +9,7 @@ mod events;
 mod excitation;
 mod faults;
 mod health;
+mod history;
 mod lease;
 mod metrics;
 mod recordings;
@@ -59,6 +60,7 @@ pub fn router(app: Arc<App>) -> Router {
         .merge(rig::routes())
         .merge(diagnoses::routes())
         .merge(stream::routes())
+        .merge(history::routes())
         .merge(recordings::routes())
         .merge(faults::routes())
         .merge(metrics::routes())
