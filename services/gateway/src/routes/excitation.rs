@@ -52,6 +52,7 @@ pub struct ExcitationRequest {
     limit: Option<f64>,
     /// Seed of random segments; the scenario's, or 1.
     #[serde(default)]
+    #[schema(value_type = Option<i64>, minimum = 0, maximum = 4_294_967_295_u32)]
     seed: Option<u32>,
     /// Name of a recording made along with it.
     #[serde(default)]
