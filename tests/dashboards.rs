@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-use common::{KORT, Stack, wait};
+use common::{KORT, Site, Stack, wait};
 use serde_json::Value;
 
 fn repository() -> &'static Path {
@@ -90,6 +90,13 @@ fn ask(port: u16, query: &str) -> Value {
     wait("Prometheus", || serde_json::from_str(&get(&url)?).ok())
 }
 
+/// The one number that a query gives.
+fn number(port: u16, query: &str) -> f64 {
+    let found = ask(port, query);
+    let value = found["data"]["result"][0]["value"][1].as_str();
+    value.unwrap_or_else(|| panic!("{query}: {found}")).parse().unwrap()
+}
+
 fn dashboards() -> Vec<(PathBuf, Value)> {
     let folder = repository().join("docker/grafana/dashboards");
     let mut found: Vec<_> = std::fs::read_dir(folder)
@@ -161,13 +168,21 @@ fn configuration_and_alert_rules_hold() {
     promtool(&["test", "rules", "alerts_test.yml"]);
 }
 
+/// Two thrusters, one of them with dry friction that its rig description does not know.
+fn rubbing_beside_another() -> Stack {
+    let site = Site::new();
+    let effect = "id = \"coulomb_friction\", coulomb_torque_n_m = 1.2, stribeck_rise = 0.3, stribeck_speed_rad_s = 2.0";
+    site.add("limits = { full_drive_s = 0.005 }", &format!("simulation = {{ effects = [{{ {effect} }}] }}"));
+    Stack::start_at(site.with_t2())
+}
+
 #[test]
-fn the_operation_dashboard_is_answered_from_a_live_run() {
+fn every_dashboard_of_the_service_is_answered_from_a_live_run() {
     common::in_real_time(|| {
         if !have("prometheus") {
             return;
         }
-        let mut stack = Stack::start();
+        let mut stack = rubbing_beside_another();
         let folder = tempfile::tempdir().unwrap();
         let (_prometheus, port) = prometheus(folder.path(), stack.site.port, free_port());
         stack.thrust(60.0, 60_000);
@@ -200,16 +215,17 @@ fn the_operation_dashboard_is_answered_from_a_live_run() {
             }
         }
 
-        let (path, dashboard) =
-            dashboards().into_iter().find(|(path, _)| path.ends_with("operation.json")).unwrap();
-        assert_all_answered(port, &dashboard, &path.display().to_string());
-        let thrust = ask(port, r#"kort_thrust_newtons{thruster="t1"}"#);
-        let value: f64 = thrust["data"]["result"][0]["value"][1].as_str().unwrap().parse().unwrap();
+        for (path, dashboard) in dashboards().into_iter().filter(|(path, _)| !path.ends_with("soak.json")) {
+            assert_all_answered(port, &dashboard, &path.display().to_string());
+        }
+        let value = number(port, r#"kort_thrust_newtons{thruster="t1"}"#);
         assert!((value - 60.0).abs() < 12.0, "Prometheus shows the thrust that is there: {value}");
         assert_eq!(
             ask(port, "ALERTS{alertstate=\"firing\",severity=\"critical\"}")["data"]["result"],
             serde_json::json!([])
         );
+        assert_eq!(number(port, "count(kort_armed)"), 2.0, "the fleet has both thrusters");
+        assert_eq!(number(port, "sum(kort_armed)"), 1.0, "and one of them is armed");
     });
 }
 
@@ -248,7 +264,8 @@ fn the_soak_dashboard_is_answered_while_a_soak_runs() {
 #[test]
 fn dashboards_are_of_one_piece() {
     let all = dashboards();
-    assert_eq!(all.len(), 2, "one for operation, one that compares laws");
+    let names: Vec<_> = all.iter().map(|(path, _)| path.file_stem().unwrap().to_string_lossy()).collect();
+    assert_eq!(names, ["fleet", "loop-health", "mismatch", "operation", "soak"]);
     for (path, dashboard) in all {
         let name = path.display();
         let panels: Vec<&Value> = dashboard["panels"].as_array().unwrap().iter().collect();
