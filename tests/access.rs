@@ -255,34 +255,54 @@ fn slow_sockets_do_not_lock_out_the_stop() {
         let mut stack = Stack::start();
         stack.thrust(40.0, 60_000);
         let port = stack.site.port;
-        let rounds = std::env::var("KORT_SLOW_ROUNDS").ok().and_then(|n| n.parse().ok()).unwrap_or(1);
-        let (mut idle, mut beset, mut took) = (Lateness::default(), Lateness::default(), Vec::new());
-        // In turn, so that what others do to the machine falls on both alike.
+        let asked = |name: &str| std::env::var(name).ok().and_then(|n| n.parse::<u64>().ok());
+        let (rounds, window_s) =
+            (asked("KORT_SLOW_ROUNDS").unwrap_or(1), asked("KORT_SLOW_SECONDS").unwrap_or(2));
+        let (mut late, mut took) = (Vec::new(), Vec::new());
+        // In turn on one and the same process, beset between two idle windows of the same length: what others do to
+        // the machine falls on all alike, and idle beside idle says how much that is.
         for _ in 0..rounds {
             let mut watch = stack.watch();
-            idle.look(&mut watch);
+            let before_us = p99_late_us(&mut watch, window_s);
             let slow: Vec<TcpStream> = (0..2000).filter_map(|_| half_a_head(port)).collect();
             assert!(slow.len() > 1500, "{} sockets", slow.len());
             let held = Held::begin(port, slow);
-            beset.look(&mut watch);
+            let beset_us = p99_late_us(&mut watch, window_s);
             took.extend((0..10).map(|_| {
                 let began = Instant::now();
                 assert_eq!(ask(port, "POST", "/v1/stop", &[], "").0, 200);
                 began.elapsed()
             }));
             drop(held.end());
+            wait("those that wait to be ended", || {
+                let metrics = stack.text("/metrics")?;
+                let line = metrics.lines().find(|line| line.starts_with("kort_connections_open "))?;
+                (line.rsplit(' ').next()?.parse::<f64>().ok()? < 20.0).then_some(())
+            });
+            late.push([before_us, beset_us, p99_late_us(&mut watch, window_s)]);
         }
-        println!("wake-ups of the servo's loop: {idle} alone, {beset} beset");
+        println!(
+            "p99 of the servo's wake-ups, us late: idle, beset, idle again; a line a round of {window_s} s each"
+        );
+        for [before, beset, after] in &late {
+            println!("{before:8.1} {beset:8.1} {after:8.1}");
+        }
+        let median = |of: fn(&[f64; 3]) -> f64| {
+            let mut all: Vec<f64> = late.iter().map(of).collect();
+            all.sort_by(f64::total_cmp);
+            100.0 * (all[all.len() / 2] - 1.0)
+        };
+        println!(
+            "medians over the rounds: beset beside idle {:+.1} %, idle beside idle {:+.1} % ({:.1} % either way)",
+            median(|[before, beset, after]| 2.0 * beset / (before + after)),
+            median(|[before, _, after]| after / before),
+            median(|[before, _, after]| after.max(*before) / after.min(*before)),
+        );
         took.sort();
         let (median, worst) = (took[took.len() / 2], took[took.len() - 1]);
         println!("stop among 2000 slow sockets, {} times: median {median:?}, worst {worst:?}", took.len());
         // It waits for no tick of the controller. The worst is printed: what the machine does to it is not asserted.
         assert!(median < Duration::from_nanos(common::PERIOD_NS), "{took:?}");
-        wait("those that wait to be ended", || {
-            let metrics = stack.text("/metrics")?;
-            let line = metrics.lines().find(|line| line.starts_with("kort_connections_open "))?;
-            (line.rsplit(' ').next()?.parse::<f64>().ok()? < 20.0).then_some(())
-        });
     });
 }
 
@@ -352,38 +372,20 @@ impl Held {
     }
 }
 
-/// How late the servo's loop wakes. A figure to print: what the machine does to it is not asserted.
-#[derive(Default)]
-struct Lateness {
-    late_ns: Vec<u64>,
-}
-
-impl Lateness {
-    /// Looks on for some seconds.
-    fn look(&mut self, watch: &mut common::Watch) {
-        let from_ns = watch.next().time_ns;
-        let before = self.late_ns.len();
-        loop {
-            let t = watch.next();
-            // What was on its way before is not of this time.
-            if t.time_ns < from_ns + 100_000_000 {
-                continue;
-            }
-            self.late_ns.push(t.timing.lateness_ns);
-            if t.time_ns > from_ns + 4_000_000_000 {
-                break;
-            }
+/// How late the servo's loop wakes, p99 of a window, us. A figure to print: what the machine does to it is not asserted.
+fn p99_late_us(watch: &mut common::Watch, window_s: u64) -> f64 {
+    let from_ns = watch.next().time_ns;
+    let mut late_ns = Vec::new();
+    loop {
+        let t = watch.next();
+        // What was on its way before is not of this time.
+        if t.time_ns >= from_ns + 100_000_000 {
+            late_ns.push(t.timing.lateness_ns);
         }
-        assert!(self.late_ns.len() > before, "the servo ticks on");
+        if t.time_ns > from_ns + 100_000_000 + window_s * 1_000_000_000 {
+            break;
+        }
     }
-}
-
-impl std::fmt::Display for Lateness {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let mut late_ns = self.late_ns.clone();
-        late_ns.sort_unstable();
-        let share_us = |share: f64| late_ns[(share * (late_ns.len() - 1) as f64) as usize] as f64 * 1e-3;
-        let (p50, p99, p999) = (share_us(0.5), share_us(0.99), share_us(0.999));
-        write!(f, "median {p50:.1} us, p99 {p99:.1} us, p99.9 {p999:.1} us late")
-    }
+    late_ns.sort_unstable();
+    late_ns[late_ns.len() * 99 / 100] as f64 * 1e-3
 }

@@ -68,13 +68,9 @@ const LONG: &[(&str, usize)] = &[
     ("crates/thruster/tests/effects.rs", 500),
     ("proto/src/messages.rs", 560),
     ("proto/src/transport/deployment.rs", 420),
-    ("services/gateway/src/bus.rs", 420),
     ("services/gateway/src/record.rs", 480),
     ("services/controller/src/tick.rs", 560),
     ("services/gateway/src/lib.rs", 500),
-    ("services/gateway/src/thruster.rs", 480),
-    ("services/kort/up.rs", 440),
-    ("tests/gateway.rs", 640),
 ];
 
 fn root() -> &'static Path {

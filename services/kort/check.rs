@@ -36,6 +36,9 @@ struct Report<'a> {
     problems: &'a [Problem],
 }
 
+/// Said of a file without a single key: every service would take it for something else, or refuse it.
+const HOLDS_NOTHING: &str = "holds no key at all\nhint: a deployment needs [thrusters.ID] with `rig` and `amplifier` (config/kort.toml explains every key); a rig, a scenario, a column map and a controller each their own sections";
+
 /// Checks and prints; exit code 2 if anything is wrong.
 pub fn run(args: &Check) -> ExitCode {
     let mut problems = Vec::new();
@@ -71,6 +74,9 @@ fn one(file: &Path, text: &str, problems: &mut Vec<Problem>) {
         Ok(table) => table,
         Err(error) => return problems.push(problem(&name, &error.to_string())),
     };
+    if table.is_empty() {
+        return problems.push(problem(&name, HOLDS_NOTHING));
+    }
     if ["thrusters", "gateway", "transport"].iter().any(|key| table.contains_key(*key)) {
         deployment(Some(file), problems);
     } else if let Err(words) = kort_lab::check::Kind::of(&table).check(text, file) {
@@ -130,6 +136,20 @@ impl std::fmt::Display for Problem {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_file_that_holds_nothing_is_a_problem() {
+        for text in ["", "# only a word\n"] {
+            let mut problems = Vec::new();
+            one(Path::new("kort.toml"), text, &mut problems);
+            assert_eq!(problems.len(), 1, "{problems:?}");
+            assert!(problems[0].allowed.contains("no key at all"), "{problems:?}");
+            assert!(
+                problems[0].hint.as_ref().is_some_and(|hint| hint.contains("[thrusters.ID]")),
+                "{problems:?}"
+            );
+        }
+    }
 
     #[test]
     fn a_message_is_taken_apart() {

@@ -1,6 +1,7 @@
 //! `kort up`: owns the shared memory, runs servo, controller and gateway as child processes,
 //! replaces one that dies or hangs, and stops with thrust at zero first.
 
+mod error;
 mod role;
 mod scribe;
 mod watch;
@@ -11,13 +12,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use kort_proto::config::{Config, ConfigError};
+use kort_proto::config::Config;
 use kort_proto::events::{Before, Event, EventKind, EventLog};
 use kort_proto::messages::RequestKind;
-use kort_proto::transport::{Deployment, Owner, Restarts, TransportError, Watched};
-use thiserror::Error;
+use kort_proto::transport::{Deployment, Owner, Restarts, Watched};
 use tracing::{info, warn};
 
+pub use error::UpError;
 use role::Role;
 use scribe::Scribe;
 use watch::Watch;
@@ -37,46 +38,6 @@ const REST_WITHIN: Duration = Duration::from_millis(2500);
 const COAST_WITHIN: Duration = Duration::from_secs(3);
 /// How long a child may take to end.
 const STOP_WITHIN: Duration = Duration::from_secs(2);
-
-/// Why `up` cannot run.
-#[derive(Debug, Error)]
-pub enum UpError {
-    /// The configuration.
-    #[error(transparent)]
-    Config(#[from] ConfigError),
-    /// Shared memory.
-    #[error(transparent)]
-    Transport(#[from] TransportError),
-    /// The gateway could not start.
-    #[error(transparent)]
-    Gateway(#[from] kort_gateway::GatewayError),
-    /// A servo could not start.
-    #[error(transparent)]
-    Servo(#[from] kort_servo::ServoError),
-    /// A controller could not start.
-    #[error(transparent)]
-    Controller(#[from] kort_controller::ControllerError),
-    /// The system refuses.
-    #[error("{what}: {error}")]
-    System {
-        /// What was tried.
-        what: String,
-        /// The system's words.
-        error: std::io::Error,
-    },
-    /// A child cannot use the configuration.
-    #[error("{name} cannot use this deployment; its reason stands above")]
-    Refused {
-        /// The child.
-        name: String,
-    },
-    /// A child does not start.
-    #[error("{name} does not start\nhint: its reason stands above; `kort {name}` alone shows it again")]
-    DoesNotStart {
-        /// The child.
-        name: String,
-    },
-}
 
 /// Runs the deployment until SIGINT, SIGTERM or SIGHUP.
 ///

@@ -18,6 +18,24 @@ fn too_few_open_files_are_called_that() {
 }
 
 #[test]
+fn a_configuration_that_holds_nothing_is_no_sound_one() {
+    let site = Site::new();
+    std::fs::write(site.config(), "# nothing yet\n").unwrap();
+    let check = |more: &[&str]| {
+        run(std::process::Command::new(common::KORT).arg("check").args(more).arg(site.config()))
+    };
+    let out = check(&[]);
+    let words = String::from_utf8_lossy(&out.stdout);
+    assert_eq!(out.status.code(), Some(2), "{words}");
+    assert!(
+        words.contains("no key at all") && words.contains("hint:") && words.contains("[thrusters.ID]"),
+        "{words}"
+    );
+    let report: serde_json::Value = serde_json::from_slice(&check(&["--json"]).stdout).unwrap();
+    assert_eq!(report["problems"].as_array().map(Vec::len), Some(1), "{report}");
+}
+
+#[test]
 fn what_others_could_write_is_not_trusted() {
     use std::os::unix::fs::PermissionsExt;
     let site = Site::new();

@@ -1,0 +1,45 @@
+//! Why `up` cannot run.
+
+use kort_proto::config::ConfigError;
+use kort_proto::transport::TransportError;
+use thiserror::Error;
+
+/// Why `up` cannot run.
+#[derive(Debug, Error)]
+pub enum UpError {
+    /// The configuration.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// Shared memory.
+    #[error(transparent)]
+    Transport(#[from] TransportError),
+    /// The gateway could not start.
+    #[error(transparent)]
+    Gateway(#[from] kort_gateway::GatewayError),
+    /// A servo could not start.
+    #[error(transparent)]
+    Servo(#[from] kort_servo::ServoError),
+    /// A controller could not start.
+    #[error(transparent)]
+    Controller(#[from] kort_controller::ControllerError),
+    /// The system refuses.
+    #[error("{what}: {error}")]
+    System {
+        /// What was tried.
+        what: String,
+        /// The system's words.
+        error: std::io::Error,
+    },
+    /// A child cannot use the configuration.
+    #[error("{name} cannot use this deployment; its reason stands above")]
+    Refused {
+        /// The child.
+        name: String,
+    },
+    /// A child does not start.
+    #[error("{name} does not start\nhint: its reason stands above; `kort {name}` alone shows it again")]
+    DoesNotStart {
+        /// The child.
+        name: String,
+    },
+}

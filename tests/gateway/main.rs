@@ -1,0 +1,10 @@
+//! The interface of the built program from outside: routes, leases, bad input, stream, recordings.
+
+mod asking;
+mod commands;
+#[path = "../common/mod.rs"]
+mod common;
+mod errors;
+mod pages;
+mod recordings;
+mod stream;

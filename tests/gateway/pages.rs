@@ -1,0 +1,84 @@
+//! Every route, and what a gateway alone can show.
+
+use serde_json::{Value, json};
+
+use crate::asking::{assert_problem, send};
+use crate::common::{self, Site, Stack, kill, wait};
+
+#[test]
+fn a_gateway_alone_says_what_is_away_and_still_shows_its_console() {
+    let site = Site::new();
+    let mut gateway = site.spawn("gateway");
+    let ready = send(site.port, "GET", "/readyz", &[], b"");
+    assert_problem(&ready, 503, "not-ready", "without servo and controller");
+    assert_eq!(send(site.port, "GET", "/healthz", &[], b"").status, 200);
+    let state = send(site.port, "GET", "/v1/thrusters", &[], b"").json();
+    assert_eq!((&state[0]["armed"], &state[0]["measured"]["thrust_n"]), (&json!(false), &Value::Null));
+    assert_problem(
+        &send(site.port, "POST", "/v1/thrusters/t1/arm", &[], b""),
+        503,
+        "not-ready",
+        "arming nothing",
+    );
+    assert!(send(site.port, "GET", "/", &[], b"").text().contains("<title>kort console</title>"));
+    kill(gateway.id(), "TERM");
+    let status = wait("the gateway to end", || gateway.try_wait().unwrap());
+    assert_eq!(status.code(), Some(0), "{}", site.log());
+}
+
+#[test]
+fn the_openapi_document_names_every_route_and_each_answers() {
+    common::in_real_time(|| {
+        let stack = Stack::start();
+        let port = stack.site.port;
+        let document = send(port, "GET", "/openapi.json", &[], b"").json();
+        for route in [
+            "/",
+            "/metrics",
+            "/healthz",
+            "/readyz",
+            "/openapi.json",
+            "/v1/thrusters",
+            "/v1/thrusters/{id}",
+            "/v1/recordings",
+            "/v1/thrusters/{id}/lease",
+            "/v1/thrusters/{id}/arm",
+            "/v1/thrusters/{id}/disarm",
+            "/v1/recordings/{name}",
+            "/v1/thrusters/{id}/clear-faults",
+            "/v1/thrusters/{id}/setpoint",
+            "/v1/thrusters/{id}/controller",
+            "/v1/thrusters/{id}/excitation",
+            "/v1/thrusters/{id}/history",
+            "/v1/thrusters/{id}/stream",
+            "/v1/thrusters/{id}/rig",
+            "/v1/thrusters/{id}/rig/rollback",
+            "/v1/thrusters/{id}/rig/revisions",
+            "/v1/thrusters/{id}/rig/revisions/{number}",
+            "/v1/thrusters/{id}/diagnoses",
+            "/v1/thrusters/{id}/diagnoses/{diagnosis}",
+            "/v1/thrusters/{id}/diagnoses/{diagnosis}/report",
+        ] {
+            assert!(document["paths"][route].is_object(), "{route} is not documented");
+        }
+        for (path, methods) in document["paths"].as_object().unwrap() {
+            let real = path
+                .replace("{id}", "t1")
+                .replace("{name}", "none")
+                .replace("{code}", "4")
+                .replace("{number}", "1");
+            let real = real.replace("{diagnosis}", "none");
+            for method in methods.as_object().unwrap().keys() {
+                let answer = send(port, &method.to_uppercase(), &real, &[], b"");
+                let documented = &document["paths"][path][method]["responses"][answer.status.to_string()];
+                assert!(
+                    documented.is_object(),
+                    "{method} {path} answered {}, which is not documented",
+                    answer.status
+                );
+            }
+        }
+        assert_eq!(send(port, "GET", "/docs/", &[], b"").status, 200);
+        assert_eq!(send(port, "GET", "/docs/swagger-ui-bundle.js", &[], b"").status, 200);
+    });
+}

@@ -1,0 +1,140 @@
+//! Recordings: written, listed, fetched, and left by a killed gateway.
+
+use std::time::Duration;
+
+use serde_json::json;
+
+use crate::asking::{JSON, assert_problem, send};
+use crate::common::{self, Site, Stack, kill, wait};
+
+/// What a stranger and a later diagnosis need stands in the file, and several recordings run at once.
+#[test]
+fn a_recording_holds_its_context_and_is_deleted_by_name() {
+    common::in_real_time(|| {
+        let mut stack = Stack::start_at(Site::new().with_t2());
+        let port = stack.site.port;
+        for (thruster, name) in [("t1", "one"), ("t2", "two")] {
+            let body = json!({"thruster": thruster, "name": name, "rate_hz": 200}).to_string();
+            assert_eq!(send(port, "POST", "/v1/recordings", &[JSON], body.as_bytes()).status, 201);
+        }
+        assert_problem(&send(port, "DELETE", "/v1/recordings", &[], b""), 409, "refused", "two run");
+        stack.thrust(40.0, 60_000);
+        std::thread::sleep(Duration::from_millis(1500));
+        let metrics = stack.text("/metrics").unwrap();
+        assert!(metrics.contains("kort_recording_active{thruster=\"t2\"} 1"), "{metrics}");
+        for name in ["one", "two"] {
+            let done = send(port, "DELETE", &format!("/v1/recordings/{name}"), &[], b"");
+            assert_eq!((done.status, &done.json()["state"]), (200, &json!("complete")));
+        }
+        let file = send(port, "GET", "/v1/recordings/one", &[], b"").body;
+        let recording = kort_recording::Recording::decode("one", file.as_slice(), None).unwrap();
+        assert!(
+            recording.losses.is_empty() && recording.notes.iter().all(|n| !n.contains("left out")),
+            "{recording:?}"
+        );
+        let rig = std::fs::read_to_string(concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/config/thrusters/whitcomb-yoerger-1999.toml"
+        ));
+        assert_eq!(recording.about["rig"], rig.unwrap());
+        for key in ["kort_version", "rig_revision", "started", "thruster", "owner"] {
+            assert!(!recording.about[key].is_empty(), "{key}");
+        }
+        let text = String::from_utf8_lossy(&file);
+        assert!(text.contains("kort.state/1") && text.contains("kort.event/1"));
+        // Wall time: the log does not begin in 1970.
+        let path = stack.site.folder.path().join("one.mcap");
+        std::fs::write(&path, &file).unwrap();
+        let fit = common::run(std::process::Command::new(common::KORT).args(["fit", "--json"]).arg(&path));
+        assert!(fit.status.success(), "no --rig is needed: {}", String::from_utf8_lossy(&fit.stderr));
+        let torn = stack.site.folder.path().join("torn.mcap");
+        std::fs::write(&torn, &file[..file.len() * 2 / 3]).unwrap();
+        let fit = common::run(std::process::Command::new(common::KORT).args(["fit", "--json"]).arg(&torn));
+        assert_eq!(fit.status.code(), Some(3), "{}", String::from_utf8_lossy(&fit.stderr));
+        assert!(String::from_utf8_lossy(&fit.stderr).contains("cut off"), "the loss is named");
+        assert_eq!(send(port, "DELETE", "/v1/recordings/one", &[], b"").status, 204);
+        assert_problem(
+            &send(port, "GET", "/v1/recordings/one", &[], b""),
+            404,
+            "unknown-recording",
+            "deleted",
+        );
+    });
+}
+
+#[test]
+fn a_recording_is_written_listed_and_fetched_in_both_formats() {
+    common::in_real_time(|| {
+        let mut stack = Stack::start();
+        let port = stack.site.port;
+        let started = send(port, "POST", "/v1/recordings", &[JSON], br#"{"name": "step", "rate_hz": 100}"#);
+        assert_eq!(started.status, 201, "{}", started.text());
+        assert_problem(
+            &send(port, "POST", "/v1/recordings", &[], b""),
+            409,
+            "recording-active",
+            "a second recording",
+        );
+        stack.thrust(60.0, 60_000);
+        std::thread::sleep(Duration::from_millis(1000));
+        let stopped = send(port, "DELETE", "/v1/recordings", &[], b"").json();
+        assert_eq!((&stopped["name"], &stopped["state"]), (&json!("step"), &json!("complete")), "{stopped}");
+        let list = send(port, "GET", "/v1/recordings", &[], b"").json();
+        assert_eq!(list[0]["rows"], stopped["rows"], "{list}");
+
+        let csv = send(port, "GET", "/v1/recordings/step.csv", &[], b"");
+        assert!(csv.head.contains("content-type: text/csv"), "{}", csv.head);
+        assert_eq!(csv.body, send(port, "GET", "/v1/recordings/step?format=csv", &[], b"").body);
+        let mcap = send(port, "GET", "/v1/recordings/step.mcap", &[], b"");
+        assert!(
+            mcap.body.starts_with(b"\x89MCAP0\r\n") && mcap.body.ends_with(b"\x89MCAP0\r\n"),
+            "a whole MCAP"
+        );
+
+        let read = |name: &str, bytes: &[u8]| kort_recording::Recording::decode(name, bytes, None).unwrap();
+        let (csv, mcap) = (read("step.csv", &csv.body), read("step.mcap", &mcap.body));
+        assert_eq!(csv.rows() as u64, stopped["rows"].as_u64().unwrap());
+        assert!(csv.losses.is_empty() && mcap.losses.is_empty());
+        assert_eq!(csv.time_s, mcap.time_s);
+        for column in csv.columns.iter().filter(|column| column.samples() > 0) {
+            let other =
+                mcap.column(&column.name).unwrap_or_else(|| panic!("{} is not in the MCAP", column.name));
+            assert!(
+                column.values.iter().zip(other).all(|(a, b)| a == b || (a.is_nan() && b.is_nan())),
+                "{}",
+                column.name
+            );
+        }
+        assert!((csv.period_s() - 0.01).abs() < 0.002, "period {} s", csv.period_s());
+        let thrust = csv.column("thrust_n").unwrap();
+        assert!(thrust.iter().any(|n| (n - 60.0).abs() < 12.0), "the step is in the recording");
+        assert!(
+            csv.column("flow_m_s").unwrap().iter().any(|v| v.is_nan()),
+            "a slow sensor leaves empty cells"
+        );
+    });
+}
+
+#[test]
+fn a_killed_gateway_leaves_a_recording_that_reads_to_its_last_flush() {
+    common::in_real_time(|| {
+        let mut stack = Stack::start();
+        let port = stack.site.port;
+        assert_eq!(send(port, "POST", "/v1/recordings", &[JSON], br#"{"name": "torn"}"#).status, 201);
+        stack.thrust(40.0, 60_000);
+        std::thread::sleep(Duration::from_millis(1500));
+        let gateway = stack.process_of("gateway");
+        kill(gateway, "KILL");
+        wait("another gateway", || stack.process("gateway").filter(|pid| *pid != gateway));
+        let list = wait("the list", || {
+            let answer = std::panic::catch_unwind(|| send(port, "GET", "/v1/recordings", &[], b"")).ok()?;
+            (answer.status == 200).then(|| answer.json())
+        });
+        assert_eq!((&list[0]["name"], &list[0]["state"]), (&json!("torn"), &json!("torn")), "{list}");
+        for format in ["csv", "mcap"] {
+            let file = send(port, "GET", &format!("/v1/recordings/torn?format={format}"), &[], b"");
+            let recording = kort_recording::Recording::decode("torn", file.body.as_slice(), None).unwrap();
+            assert!(recording.rows() > 50, "{format}: {} rows of some 150", recording.rows());
+        }
+    });
+}
