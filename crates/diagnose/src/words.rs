@@ -10,7 +10,9 @@ use kort_thruster::effects::Descriptor;
 
 use crate::flexible;
 use crate::locate;
-use crate::report::{Baseline, EmpiricalTerm, Finding, Mismatch, NextExperiment, Remainder, Verdict};
+use crate::report::{
+    Alternative, Baseline, EmpiricalTerm, Finding, Mismatch, NextExperiment, Remainder, Verdict,
+};
 
 /// Standard deviations from what is stated beyond which a coefficient is spoken of.
 const STRAINED: f64 = 2.6;
@@ -169,15 +171,28 @@ pub struct Told<'a> {
     pub baseline: &'a Baseline,
     /// Why the recordings cannot tell, if so.
     pub thin: Option<&'a str>,
+    /// Names that were set aside.
+    pub alternatives: &'a [Alternative],
 }
+
+/// From this probability on a name that is not stated cannot be excluded either.
+const POSSIBLE: f64 = 0.2;
 
 /// One paragraph to act on.
 pub fn summary(told: &Told) -> String {
     let model = &told.baseline.model;
     let mut text = match told.verdict {
-        Verdict::NoMismatch => format!(
-            "{model}, re-fitted within the stated tolerances, explains the recording down to its noise: nothing is missing that this excitation can show."
-        ),
+        Verdict::NoMismatch => {
+            let missing = match possible(told.alternatives) {
+                Some(names) => {
+                    format!("this excitation shows nothing that is missing, and cannot exclude {names}")
+                }
+                None => "nothing is missing that this excitation can show".into(),
+            };
+            format!(
+                "{model}, re-fitted within the stated tolerances, explains the recording down to its noise: {missing}."
+            )
+        }
         Verdict::Explained => format!("{model} leaves out {}.{}", named(told.findings), shows(told)),
         Verdict::PartlyExplained => {
             let mut text = format!("{model} leaves out {}.{}", named(told.findings), shows(told));
@@ -209,8 +224,10 @@ pub fn summary(told: &Told) -> String {
             )
         }
         Verdict::Unexplained => {
+            let nearest =
+                possible(told.alternatives).map_or(String::new(), |names| format!("; nearest is {names}"));
             let mut text = format!(
-                "The mismatch is real ({} path, most in {}, {}), and no effect in the catalogue explains it.",
+                "The mismatch is real ({} path, most in {}, {}), and no effect in the catalogue explains it{nearest}.",
                 told.mismatch.first().map_or("?", |m| &m.path),
                 told.mismatch.first().map_or("?", |m| &m.channel),
                 told.mismatch.first().map_or("?", |m| &m.regime),
@@ -234,6 +251,16 @@ pub fn summary(told: &Told) -> String {
         text.push_str(&format!(" Run next: {}.", next.excitation));
     }
     text
+}
+
+/// Names that are not stated and cannot be excluded.
+fn possible(alternatives: &[Alternative]) -> Option<String> {
+    let names: Vec<String> = alternatives
+        .iter()
+        .filter(|a| a.probability >= POSSIBLE)
+        .map(|a| format!("{} (probability {:.2})", plain(&a.effect), a.probability))
+        .collect();
+    (!names.is_empty()).then(|| names.join(" or "))
 }
 
 fn named(findings: &[Finding]) -> String {

@@ -252,6 +252,7 @@ impl<'a, 'p> Writer<'a, 'p> {
             channels: scores::channels(problem, &self.held, &baseline_trained, &baseline_full, &self.floor),
         };
         let next_experiment = experiment::next(self.search, &decision, &self.best, self.rig);
+        let alternatives = self.alternatives(&decision, &circumstances.negligible, empty_cost);
         let summary = words::summary(&words::Told {
             verdict: decision.verdict,
             findings: &findings,
@@ -261,6 +262,7 @@ impl<'a, 'p> Writer<'a, 'p> {
             next: next_experiment.as_ref(),
             baseline: &baseline,
             thin: thin.as_deref(),
+            alternatives: &alternatives,
         });
         let report = Report {
             schema: "kort.diagnosis/2".into(),
@@ -276,7 +278,7 @@ impl<'a, 'p> Writer<'a, 'p> {
             findings,
             explanations: self.listed(),
             remainder,
-            alternatives: self.alternatives(&decision, &circumstances.negligible, empty_cost),
+            alternatives,
             empirical_term,
             next_experiment,
             notes,

@@ -3,12 +3,14 @@
 //! Data go one way: recording, data (checks, edges), hypothesis (free numbers, priors, effects), simulate,
 //! noise, fit.
 
+mod between;
 pub mod checks;
 pub mod data;
 pub mod edges;
 mod excerpt;
 pub mod fit;
 mod gaps;
+mod held;
 pub mod heldout;
 pub mod hypothesis;
 pub mod identifiable;

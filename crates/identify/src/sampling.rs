@@ -92,7 +92,7 @@ pub fn free(recordings: &[Prepared]) -> Vec<Free> {
 
 /// How far a logged command may lie from when it acted, s.
 fn command_grain_s(recording: &Prepared) -> f64 {
-    if matches!(recording.driving, Driving::Command(_)) { recording.tick_s } else { 0.0 }
+    if matches!(recording.driving, Driving::Command(_)) { recording.grain_s.command_s } else { 0.0 }
 }
 
 /// Whether a channel is slower than the log, and how far its samples may lie from their stamps, s.
@@ -101,7 +101,7 @@ fn grain(recording: &Prepared, response: Response) -> Option<(bool, f64)> {
     let times: Vec<f64> = channel.rows.iter().map(|row| recording.time_s[*row]).collect();
     let row_s = crate::spectrum::median_interval(&recording.time_s);
     let slow = crate::spectrum::is_slow(crate::spectrum::median_interval(&times), row_s);
-    Some((slow, if slow { row_s } else { recording.tick_s }))
+    Some((slow, if slow { row_s } else { recording.grain_s.sample_s }))
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ use kort_thruster::rig::Rig;
 use crate::checks;
 use crate::data::{DataError, Driving, Prepared, Response, Series, possible_drivers, spread};
 use crate::excerpt;
+use crate::held;
 use crate::hypothesis::{Hypothesis, Inputs, UNSTATED_TOL, nothing_stated};
 use crate::noise::Criterion;
 use crate::refuse;
@@ -78,7 +79,7 @@ impl<'a> Setup<'a> {
         model: ModelName,
         criterion: Criterion,
     ) -> Result<Self, DataError> {
-        let mut recordings: Vec<Prepared> = series
+        let recordings: Vec<Prepared> = series
             .iter()
             .map(|s| Prepared::new(s, rig, model == ModelName::Model3))
             .collect::<Result<_, _>>()?;
@@ -111,11 +112,22 @@ impl<'a> Setup<'a> {
         let current_seen =
             recordings.iter().any(|p| p.channels.iter().any(|c| c.response == Response::Current));
         let stated = Parameters::stated(rig);
-        recordings.iter_mut().for_each(|r| r.mark_smooth(model, rig, &stated));
-        let inputs = Arc::new(Inputs::late(&recordings));
-        let baseline =
-            Hypothesis::baseline(model, rig, prescribed, current_seen, inputs).with_sampling(&recordings);
-        let mut problem = Problem::new(model, rig, recordings, masked, criterion);
+        let compared = |mut recordings: Vec<Prepared>| {
+            recordings.iter_mut().for_each(|r| r.mark_smooth(model, rig, &stated));
+            let inputs = Arc::new(Inputs::late(&recordings));
+            let baseline =
+                Hypothesis::baseline(model, rig, prescribed, current_seen, inputs).with_sampling(&recordings);
+            (Problem::new(model, rig, recordings, masked.clone(), criterion), baseline)
+        };
+        let held = held::held(&recordings, rig);
+        let (mut problem, mut baseline) = compared(recordings);
+        if let Some(held) = held {
+            let (other, as_held) = compared(held);
+            if held::fits_better(&other, &as_held, &problem, &baseline) {
+                notes.push(held::words(&other.recordings));
+                (problem, baseline) = (other, as_held);
+            }
+        }
         if let Some(hidden) = problem.hidden_by_gaps(&baseline) {
             notes.extend(hidden.words(&problem.recordings));
             problem = problem.without(&hidden.rows);

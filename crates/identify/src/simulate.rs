@@ -7,13 +7,13 @@ use kort_thruster::dual::{Dual, LANES};
 use kort_thruster::effects::{Descriptor, Scale, Stretch};
 use kort_thruster::models::ModelName;
 use kort_thruster::parameters::Parameters;
-use kort_thruster::plant::{Plant, Sensed, Tick};
+use kort_thruster::plant::{Driven, Plant, Sensed, Tick};
 use kort_thruster::real::Real;
 use kort_thruster::rig::Rig;
 use nalgebra::DVector;
 use rayon::prelude::*;
 
-use crate::data::{Driving, Prepared, Response, rates};
+use crate::data::{Prepared, Response, rates};
 use crate::hypothesis::{Hypothesis, Member, Target};
 use crate::noise::{Criterion, Floor};
 use crate::sampling::{Delays, Instant};
@@ -64,21 +64,6 @@ impl<'a> Problem<'a> {
             problem.floor = problem.floor.with_doubt(&doubt);
         }
         problem
-    }
-
-    /// What the response owes to how a measured signal that drives runs between its samples, which nobody
-    /// recorded: mean square by band of the difference that straight and curved courses make.
-    fn doubt_of_drivers(&self) -> Option<Vec<f64>> {
-        if self.recordings.iter().all(|r| matches!(r.driving, Driving::Command(_))) {
-            return None;
-        }
-        let inputs = std::sync::Arc::new(crate::hypothesis::Inputs::late(&self.recordings));
-        let plain = Hypothesis { effects: Vec::new(), free: Vec::new(), start: Vec::new(), inputs };
-        let straight = self.residual_lines(&plain, &[]);
-        let mut other = self.clone();
-        other.recordings.iter_mut().for_each(Prepared::curve_drivers);
-        let powers = self.spectrum.powers(&(straight - other.residual_lines(&plain, &[])));
-        powers.iter().all(|p| p.is_finite()).then_some(powers)
     }
 
     /// The problem without some rows: its training part.
@@ -337,7 +322,11 @@ fn run<T: Real>(
         if shows {
             before = plant.sensed();
         }
-        plant.step(&Tick { command: *command, ..*tick });
+        let driven = match tick.driven {
+            Driven::Current(..) => Driven::Current(*command, *command),
+            other => other,
+        };
+        plant.step(&Tick { command: *command, driven, ..*tick });
         if !shows {
             continue;
         }

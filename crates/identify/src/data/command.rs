@@ -1,47 +1,18 @@
 //! The command on the control grid, and where it jumps.
 
 use super::{Driving, Prepared};
-use kort_thruster::plant::Driven;
 
 use super::fill::catmull_rom;
 
 impl Prepared {
-    /// Lets a measured signal that drives run on a curve between its samples instead of straight.
-    pub fn curve_drivers(&mut self) {
-        let time = self.time_s.clone();
-        let values = match self.driving {
-            Driving::Command(_) => return,
-            Driving::Current | Driving::Power => self.command.clone(),
-            Driving::Speed => self.speed_between.clone(),
-        };
-        let n = values.len();
-        let mut row = 0;
-        let tick_s = self.tick_s;
-        for tick in &mut self.stimulus.ticks {
-            while row + 2 < n && time[row + 1] <= tick.time_s + 0.02 * tick_s {
-                row += 1;
-            }
-            let at = |t: f64| {
-                let u = ((t - time[row]) / (time[row + 1] - time[row])).clamp(0.0, 1.0);
-                let (before, after) = (values[row.saturating_sub(1)], values[(row + 2).min(n - 1)]);
-                catmull_rom(before, values[row], values[row + 1], after, u)
-            };
-            let (a, b) = (at(tick.time_s), at(tick.time_s + tick_s));
-            tick.driven = match tick.driven {
-                Driven::Current(..) => Driven::Current(a, b),
-                Driven::Speed(..) => Driven::Speed(a, b),
-                Driven::Power(..) => Driven::Power(a, b),
-                Driven::Command => Driven::Command,
-            };
-        }
-    }
-
-    /// The command at every control tick, where its edges came so many ticks before their rows.
+    /// The command, or the measured current that drives in its place, at every control tick, where its edges came so many ticks before their rows.
     pub fn commands(&self, ticks_before: &[usize]) -> Vec<f64> {
         let ticks = self.stimulus.ticks.len();
-        if !self.commanded {
+        if matches!(self.driving, Driving::Speed | Driving::Power) {
             return vec![0.0; ticks];
         }
+        // A command acts from its tick on; of a measured signal a tick shows the mean.
+        let at_tick_s = if self.driving == Driving::Current { 0.5 * self.tick_s } else { 0.0 };
         let c = &self.command;
         let n = c.len();
         let mut edge_at: Vec<Option<usize>> = vec![None; n + 2];
@@ -59,11 +30,15 @@ impl Prepared {
                     let remaining = ((self.time_s[row + 1] - t) / self.tick_s).round() as usize;
                     if remaining <= before { b } else { a }
                 }
+                None if self.every_command && self.driving != Driving::Current => a,
                 None => {
-                    let u =
-                        ((t - self.time_s[row]) / (self.time_s[row + 1] - self.time_s[row])).clamp(0.0, 1.0);
-                    let smooth =
-                        row > 0 && row + 2 < n && edge_at[row].is_none() && edge_at[row + 2].is_none();
+                    let interval_s = self.time_s[row + 1] - self.time_s[row];
+                    let u = ((t + at_tick_s - self.time_s[row]) / interval_s).clamp(0.0, 1.0);
+                    let smooth = self.driving != Driving::Current
+                        && row > 0
+                        && row + 2 < n
+                        && edge_at[row].is_none()
+                        && edge_at[row + 2].is_none();
                     if smooth { catmull_rom(c[row - 1], a, b, c[row + 2], u) } else { a + (b - a) * u }
                 }
             });
@@ -91,31 +66,6 @@ pub(super) fn steps_of(current: &[f64]) -> Vec<f64> {
         k += 1;
     }
     out
-}
-
-/// Takes a measured command's noise out: a parabola through the neighbours at each row, never
-/// across an edge. Noise in the drive would pass for noise of the shaft.
-pub(super) fn smooth_between(command: &mut [f64], edges: &[usize]) {
-    const REACH: usize = 8;
-    let raw = command.to_vec();
-    let mut bounds: Vec<usize> = std::iter::once(0).chain(edges.iter().copied()).collect();
-    bounds.push(raw.len());
-    for segment in bounds.windows(2) {
-        for (k, smooth) in command.iter_mut().enumerate().take(segment[1]).skip(segment[0]) {
-            let (from, to) = (k.saturating_sub(REACH).max(segment[0]), (k + REACH + 1).min(segment[1]));
-            if to - from < 4 {
-                *smooth = raw[from..to].iter().sum::<f64>() / (to - from) as f64;
-                continue;
-            }
-            let rows = to - from;
-            let x = nalgebra::DMatrix::from_fn(rows, 3, |i, j| ((from + i) as f64 - k as f64).powi(j as i32));
-            let y = nalgebra::DVector::from_column_slice(&raw[from..to]);
-            let normal = x.tr_mul(&x);
-            if let Some(c) = normal.cholesky() {
-                *smooth = c.solve(&x.tr_mul(&y))[0];
-            }
-        }
-    }
 }
 
 /// Rows where the command jumps: it holds on at least one side, so the change is a step.

@@ -30,15 +30,17 @@ pub(super) fn choose_driving(series: &Series, rig: &Rig, speed_driven: bool) -> 
     {
         return Some(Driving::Current);
     }
-    if !varies("shaft_speed_rad_s") {
-        return None;
-    }
     // What a shaft that follows its record shows: the propeller's load on a stand.
     let answered = rig.propeller.is_some() && ["thrust_n", "torque_n_m", "flow_m_s"].into_iter().any(varies);
     let powered = rig.motor.winding_resistance_ohm.is_some() && electrical_power(series).is_some();
     // A command that is held all the while drives all the same where nothing else can be compared.
     let held =
         |name: &&&str| series.column(name).is_some_and(|c| c.iter().any(|v| v.is_finite() && *v != 0.0));
+    if !varies("shaft_speed_rad_s") {
+        // One steady speed is too little to tell anything, and is said to be; it is no broken log.
+        series.column("shaft_speed_rad_s")?;
+        return commands.iter().find(held).map(|command| Driving::Command(command));
+    }
     Some(match commands.iter().find(held) {
         _ if answered => Driving::Speed,
         _ if powered => Driving::Power,
@@ -111,5 +113,21 @@ mod tests {
         assert_eq!(driving(3.0, false), Some(Driving::Command("current_cmd_a")));
         assert_eq!(driving(3.0, true), Some(Driving::Speed));
         assert_eq!(driving(0.0, false), Some(Driving::Speed), "a drive that is off drives nothing");
+    }
+
+    #[test]
+    fn a_held_command_beside_a_speed_that_stands_drives() {
+        let rig =
+            Rig::from_toml(include_str!("../../../../config/thrusters/whitcomb-yoerger-1999.toml")).unwrap();
+        let of = |command: f64| {
+            let columns = vec![
+                ("current_cmd_a".into(), vec![command; 200]),
+                ("shaft_speed_rad_s".into(), vec![9.0; 200]),
+            ];
+            let time_s = (0..200).map(|k| 0.01 * k as f64).collect();
+            choose_driving(&Series { name: "log".into(), time_s, columns }, &rig, false)
+        };
+        assert_eq!(of(3.0), Some(Driving::Command("current_cmd_a")));
+        assert_eq!(of(0.0), None, "nothing drives and nothing moves");
     }
 }

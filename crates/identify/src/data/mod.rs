@@ -21,7 +21,7 @@ pub use error::DataError;
 pub use pauses::pause_s;
 pub use scale::{COLUMN, available, scale};
 
-use command::{find_edges, smooth_between, steps_of};
+use command::{find_edges, steps_of};
 use driving::{choose_driving, driving_power, instead};
 use fill::{filled, held, linear, median_step};
 use pauses::leap_to;
@@ -136,14 +136,16 @@ pub struct Prepared {
     pub channels: Vec<Channel>,
     /// Jumps of the command: the first row that shows each.
     pub edges: Vec<usize>,
-    /// Whether the command is laid on the control grid (it drives, or a measured current stands for it).
-    pub commanded: bool,
     /// Command at each row.
     pub command: Vec<f64>,
     /// Control ticks a log interval (nominal).
     pub ticks_per_row: usize,
-    /// Control period, s.
+    /// Whether the log has a row for every command: the drive's stated control is no faster than the log.
+    pub every_command: bool,
+    /// Step of the simulation, s.
     pub tick_s: f64,
+    /// How far a sample, and a command, may lie from its stamp, s.
+    pub grain_s: Grain,
     /// State at the first row: shaft speed, axial flow, current, angle.
     pub start: [f64; 4],
     /// The interval from row to row beyond which the log has paused, s.
@@ -156,6 +158,24 @@ pub struct Prepared {
     pub extra: Option<String>,
     /// Bandwidth with which the simulated shaft is kept with the recorded one, rad/s; 0 where it runs freely.
     pub observer_rad_s: f64,
+}
+
+/// How far an instant may lie from its stamp, s. Sensors, controller and logger take turns within a control period,
+/// and nobody writes down in which order.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Grain {
+    /// A sample: the stated control period, a step of the simulation where none is stated.
+    pub sample_s: f64,
+    /// A command: the same; where no control period is stated, commands that are held from row to row and those that
+    /// run straight lie half an interval apart, and what is between the two a quarter from either.
+    pub command_s: f64,
+}
+
+impl Grain {
+    fn new(rig: &Rig, row_s: f64, tick_s: f64) -> Self {
+        let stated_s = rig.sensors.control_rate_hz.map(|rate_hz| (1.0 / rate_hz).min(row_s));
+        Self { sample_s: stated_s.unwrap_or(tick_s), command_s: stated_s.unwrap_or(tick_s.max(0.25 * row_s)) }
+    }
 }
 
 /// Whether a rig shows a response. A dry shaft has no water to feel; its angle tells what a filtered speed
@@ -253,10 +273,11 @@ impl Prepared {
             driving,
             channels,
             edges: Vec::new(),
-            commanded: false,
             command: if driving == Driving::Current { steps_of(&recorded) } else { recorded },
             ticks_per_row: (row_s / tick_s).round() as usize,
+            every_command: rig.sensors.control_rate_hz.is_some_and(|rate_hz| rate_hz * row_s < 1.001),
             tick_s,
+            grain_s: Grain::new(rig, row_s, tick_s),
             start: [0.0; 4],
             pause_s: pause_s(&series.time_s),
             leaps: Vec::new(),
@@ -345,14 +366,8 @@ impl Prepared {
         }
         self.stimulus.ticks = ticks;
         self.speed_between = speed.unwrap_or_default();
-        let stepped = matches!(self.driving, Driving::Command(_))
-            || self.driving == Driving::Current && rig.amplifier.kind == AmplifierKind::Current;
-        if stepped {
+        if matches!(self.driving, Driving::Command(_) | Driving::Current) {
             self.edges = find_edges(&self.command);
-            if self.driving == Driving::Current {
-                smooth_between(&mut self.command, &self.edges);
-            }
-            self.commanded = true;
         }
     }
 

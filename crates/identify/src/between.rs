@@ -1,0 +1,146 @@
+//! What does that which drives do between its samples?
+//!
+//! A log that is slower than the drive's control tells what was commanded, or what flowed, at its rows only. Where
+//! this changes smoothly, or in steps that find their tick, nothing is lost; in a closed loop that answers its
+//! sensor's noise, or kicks at a change of its set-point between two rows, much is. No hypothesis is held to account
+//! for what that does: two courses are simulated that the samples allow alike, and the mean square of their
+//! difference is part of the noise floor.
+
+use std::sync::Arc;
+
+use kort_thruster::plant::Driven;
+
+use crate::data::{Driving, Prepared};
+use crate::hypothesis::{Hypothesis, Inputs};
+use crate::simulate::Problem;
+
+/// Draws that fill an interval evenly: multiples of the golden section, less the whole ones.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
+
+/// Share of the change from a sample to the next that the samples about it do not foretell: none where they lie on a
+/// parabola, all in noise and at a jump.
+fn unforetold(values: &[f64], row: usize) -> f64 {
+    // At the ends as in the interval beside.
+    let inner = row.clamp(1, values.len() - 3);
+    let (before, from, to, after) = (values[inner - 1], values[inner], values[inner + 1], values[inner + 2]);
+    let bent = after - 3.0 * to + 3.0 * from - before;
+    if bent == 0.0 { 0.0 } else { (bent / (to - from)).abs().min(1.0) }
+}
+
+impl Problem<'_> {
+    /// What the response owes to how that which drives runs between its samples, which nobody recorded: mean square
+    /// by band of the difference that another course makes which the samples allow as well.
+    pub(crate) fn doubt_of_drivers(&self) -> Option<Vec<f64>> {
+        let inputs = Inputs::late(&self.recordings);
+        let (mut other, mut jumping) = (self.clone(), inputs.clone());
+        for (recording, commands) in other.recordings.iter_mut().zip(&mut jumping.commands) {
+            recording.drive_otherwise(commands);
+        }
+        let plain = |inputs: Inputs| Hypothesis {
+            effects: Vec::new(),
+            free: Vec::new(),
+            start: Vec::new(),
+            inputs: Arc::new(inputs),
+        };
+        let straight = self.residual_lines(&plain(inputs), &[]);
+        let powers = self.spectrum.powers(&(straight - other.residual_lines(&plain(jumping), &[])));
+        powers.iter().all(|p| p.is_finite()).then_some(powers)
+    }
+}
+
+impl Prepared {
+    /// What drives, on another course that its samples allow as well: from sample to sample by a jump at an instant
+    /// drawn for each interval, as far as the samples about it do not foretell its course. `commands` are those of
+    /// the control grid; steps that have a tick of their own stay where they are, and a command that is logged
+    /// whenever it changes leaves nothing open.
+    fn drive_otherwise(&mut self, commands: &mut [f64]) {
+        let leaves_nothing = self.every_command || self.ticks_per_row < 2;
+        if leaves_nothing && matches!(self.driving, Driving::Command(_)) {
+            return;
+        }
+        let values = if self.driving == Driving::Speed { &self.speed_between } else { &self.command };
+        let n = values.len();
+        let mut row = 0;
+        for (tick, command) in self.stimulus.ticks.iter_mut().zip(commands) {
+            while row + 2 < n && self.time_s[row + 1] <= tick.time_s + 0.02 * self.tick_s {
+                row += 1;
+            }
+            if self.edges.binary_search(&(row + 1)).is_ok() {
+                continue;
+            }
+            let (from, to) = (values[row], values[row + 1]);
+            let (start_s, end_s) = (self.time_s[row], self.time_s[row + 1]);
+            let u = ((tick.time_s + 0.5 * self.tick_s - start_s) / (end_s - start_s)).clamp(0.0, 1.0);
+            let straight = from + (to - from) * u;
+            let jumped = if u < (row as f64 * GOLDEN).fract() { from } else { to };
+            let aside = unforetold(values, row) * (jumped - straight);
+            *command += aside;
+            let mean = |a: f64, b: f64| 0.5 * (a + b) + aside;
+            tick.driven = match tick.driven {
+                Driven::Speed(a, b) => Driven::Speed(mean(a, b), mean(a, b)),
+                Driven::Power(a, b) => Driven::Power(mean(a, b), mean(a, b)),
+                by_command => by_command,
+            };
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use kort_thruster::models::ModelName;
+    use kort_thruster::rig::Rig;
+
+    use super::unforetold;
+    use crate::data::Series;
+    use crate::noise::Criterion;
+    use crate::setup::Setup;
+
+    const RIG: &str = "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = 0.01\ntorque_constant_nm_a = 1.0\n\
+                       viscous_friction_nm_s = 0.1\n[amplifier]\nkind = \"current\"\n[sensors]\n";
+
+    #[test]
+    fn a_parabola_is_foretold_and_a_jump_is_not() {
+        let parabola: Vec<f64> = (0..8).map(|k| 1.0 + 0.5 * f64::from(k * k)).collect();
+        assert!((1..6).all(|row| unforetold(&parabola, row) < 1e-12));
+        assert_eq!(unforetold(&[1.0, 1.0, 1.0, 3.0, 3.0, 3.0], 2), 1.0);
+        assert_eq!(unforetold(&[1.0, 1.0, 1.0, 1.0], 1), 0.0, "what holds goes nowhere");
+    }
+
+    /// Doubt of the shaft's speed over its full scale, root mean square, of 20 s logged at 100 Hz.
+    fn doubt(column: &str, control_rate_hz: f64, of: impl Fn(usize) -> f64) -> f64 {
+        let rows = 2000;
+        let columns = vec![
+            (column.into(), (0..rows).map(&of).collect()),
+            ("shaft_speed_rad_s".into(), (0..rows).map(|k| 10.0 * (k as f64 * 0.01).sin()).collect()),
+        ];
+        let time_s = (0..rows).map(|k| 0.01 * k as f64).collect();
+        let rig = Rig::from_toml(&format!("{RIG}control_rate_hz = {control_rate_hz}\n")).unwrap();
+        let criterion =
+            Criterion { form_error: 0.01, own_form_error: 0.1, facts_a_band: 10.0, timing_s: 0.001 };
+        let series = [Series { name: "log".into(), time_s, columns }];
+        let problem = Setup::new(&series, &rig, ModelName::Model2, criterion).unwrap().problem;
+        let powers = problem.doubt_of_drivers().expect("the simulation holds");
+        powers.iter().sum::<f64>().sqrt()
+    }
+
+    fn rough(k: usize) -> f64 {
+        (k as f64 * 0.01).sin() + 0.5 * ((k * k * 7919) as f64 * 0.37).sin()
+    }
+
+    #[test]
+    fn a_rough_command_logged_slower_than_it_changes_is_in_doubt() {
+        assert!(doubt("current_cmd_a", 500.0, rough) > 1e-3);
+        assert!(doubt("current_a", 500.0, rough) > 1e-3, "and so is a current");
+    }
+
+    #[test]
+    fn a_smooth_one_a_stepped_one_and_one_logged_every_tick_are_not() {
+        let smooth = |k: usize| (k as f64 * 0.05).sin();
+        let stepped = |k: usize| f64::from((k / 150) as u8 % 3) - 1.0;
+        let (calm, wild) = (doubt("current_cmd_a", 500.0, smooth), doubt("current_cmd_a", 500.0, rough));
+        assert!(calm < 0.003 * wild, "{calm} beside {wild}");
+        assert_eq!(doubt("current_cmd_a", 500.0, stepped), 0.0);
+        assert_eq!(doubt("current_a", 500.0, stepped), 0.0, "a measured jump finds its tick as well");
+        assert_eq!(doubt("current_cmd_a", 100.0, rough), 0.0, "nothing is between the ticks");
+    }
+}
