@@ -1,5 +1,6 @@
 //! Processes killed and stopped at random instants, and messages of another version.
 
+use std::cell::Cell;
 use std::time::{Duration, Instant};
 
 use kort_proto::faults::Fault;
@@ -16,6 +17,9 @@ const CONTROLLER: Duration = Duration::from_nanos(5 * PERIOD_NS);
 /// The controller's part, at its ticks: the silence and the end of the ramp are each seen up to a period late, and the
 /// servo is stopped with the tick after.
 const GATEWAY: Duration = Duration::from_nanos(400_000_000 + 4 * PERIOD_NS);
+/// A controller whose ticks come late waits longer, twice: for the silence to be seen and for the ramp to end. Each time
+/// for 2.5 periods at most, or the servo's own time-out of 3.5 periods ends the thrust.
+const GATEWAY_LATE: Duration = Duration::from_nanos(400_000_000 + 9 * PERIOD_NS);
 /// At once, or after many quick ends 2 s later.
 const SUCCESSOR: Duration = Duration::from_millis(3000);
 /// A process is silent for 2 s, is ended, and its successor starts.
@@ -68,12 +72,29 @@ pub fn killed(table: &mut Table) {
         })
     });
     for ((role, what, bound), measured) in roles.into_iter().zip(measured) {
-        table.row(format!("{role} killed (-9)"), what, bound, &measured);
+        let took: Vec<Duration> = measured.iter().map(|kill| kill.took).collect();
+        if role != "gateway" {
+            table.row(format!("{role} killed (-9)"), what, bound, &took);
+            continue;
+        }
+        let in_time: Vec<Duration> =
+            measured.iter().map(|kill| kill.took.saturating_sub(kill.late)).collect();
+        table.row(format!("{role} killed (-9), the controller's ticks in time"), what, bound, &in_time);
+        table.row(format!("{role} killed (-9), however late its ticks"), what, GATEWAY_LATE, &took);
     }
 }
 
+/// What came of a kill.
+#[derive(Clone, Copy)]
+struct Killed {
+    /// Until the thruster was at zero.
+    took: Duration,
+    /// By so much did the controller's commands come late meanwhile, all together.
+    late: Duration,
+}
+
 /// What each of these kills of a process took, on a deployment of its own.
-fn killed_at(role: &str, numbers: &[usize]) -> Vec<Duration> {
+fn killed_at(role: &str, numbers: &[usize]) -> Vec<Killed> {
     let measured = std::cell::RefCell::new(Vec::new());
     in_real_time(|| {
         let mut stack = Stack::start();
@@ -83,17 +104,24 @@ fn killed_at(role: &str, numbers: &[usize]) -> Vec<Duration> {
 }
 
 /// Kills a process under way; how long it took until the thruster was at zero.
-fn kill_once(stack: &mut Stack, role: &str, n: usize) -> Duration {
+fn kill_once(stack: &mut Stack, role: &str, n: usize) -> Killed {
     stack.thrust(30.0, LEASE_MS);
     std::thread::sleep(Duration::from_micros(scatter(n, 60_000)));
     let mut watch = stack.watch();
-    let session = watch.next().header.session;
+    let first = watch.next();
+    let session = first.header.session;
     let victim = stack.process_of(role);
     let killed_ns = monotonic_ns();
     kill(victim, Signal::KILL);
+    let (command_ns, late_ns) = (Cell::new(first.command_stamp_ns), Cell::new(0));
     let zero = match role {
         "servo" => watch.until("a successor", |t| t.header.session != session),
-        _ => watch.until("zero", at_zero),
+        _ => watch.until("zero", |t| {
+            let before_ns = command_ns.replace(t.command_stamp_ns);
+            late_ns
+                .set(late_ns.get() + t.command_stamp_ns.saturating_sub(before_ns).saturating_sub(PERIOD_NS));
+            at_zero(t)
+        }),
     };
     assert!(at_zero(&zero), "{role}: {zero:?}");
     wait("the fault to be shown", || {
@@ -102,7 +130,10 @@ fn kill_once(stack: &mut Stack, role: &str, n: usize) -> Duration {
     });
     wait("a successor", || stack.process(role).filter(|pid| *pid != victim));
     stack.wait_until_up();
-    Duration::from_nanos(zero.time_ns.saturating_sub(killed_ns))
+    Killed {
+        took: Duration::from_nanos(zero.time_ns.saturating_sub(killed_ns)),
+        late: Duration::from_nanos(late_ns.get()),
+    }
 }
 
 /// A stopped process is ended and replaced; the thrust ends long before.
