@@ -66,10 +66,7 @@ const LINES: usize = 400;
 /// Files that are longer, with what they may have: to be split.
 const LONG: &[(&str, usize)] = &[
     ("crates/thruster/tests/effects.rs", 500),
-    ("proto/src/messages.rs", 560),
-    ("proto/src/transport/deployment.rs", 420),
     ("services/gateway/src/record.rs", 480),
-    ("services/controller/src/tick.rs", 560),
     ("services/gateway/src/lib.rs", 500),
 ];
 

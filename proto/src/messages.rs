@@ -7,15 +7,8 @@ use crate::text::Text;
 #[cfg(feature = "transport")]
 use iceoryx2::prelude::ZeroCopySend;
 
-/// Most parameters of a controller in one message.
-pub const LAW_PARAMETERS: usize = 48;
-/// Most estimated parameters, and most parameters changed by one request.
-pub const PARAMETERS: usize = 16;
 /// Most control laws in one message.
 pub const LAWS: usize = 16;
-/// Upper bounds of the buckets of a lateness histogram, ns; a last bucket has no bound.
-pub const LATENESS_BOUNDS_NS: [u64; 11] =
-    [5_000, 10_000, 20_000, 50_000, 100_000, 200_000, 500_000, 1_000_000, 2_000_000, 5_000_000, 10_000_000];
 
 macro_rules! message {
     ($type_name:literal, $(#[$doc:meta])* $name:ident { $($(#[$field_doc:meta])* $field:ident: $type:ty,)* }) => {
@@ -54,75 +47,14 @@ macro_rules! enumeration {
     };
 }
 
-enumeration! {
-    /// What a setpoint asks for.
-    SetpointKind {
-        /// Nothing: zero thrust.
-        Zero = 0 "zero",
-        /// Thrust, N.
-        Thrust = 1 "thrust_n",
-        /// Shaft speed, rad/s.
-        Speed = 2 "speed_rad_s",
-    }
-}
-
-enumeration! {
-    /// Unit of the drive in a [`Command`]; must be the one of the servo's amplifier.
-    DriveKind {
-        /// Motor current, A.
-        Current = 0 "current_cmd_a",
-        /// Motor voltage, V.
-        Voltage = 1 "voltage_cmd_v",
-        /// Duty, -1 to 1.
-        Duty = 2 "duty_cmd",
-        /// Shaft speed, rad/s.
-        Speed = 3 "speed_cmd_rad_s",
-    }
-}
-
-enumeration! {
-    /// What a [`Request`] wants.
-    RequestKind {
-        /// Arm the servo.
-        Arm = 1 "arm",
-        /// Disarm: zero at once.
-        Disarm = 2 "disarm",
-        /// Clear latched faults whose cause is gone; stays disarmed.
-        ClearFaults = 3 "clear-faults",
-        /// Switch the control law, or change its parameters.
-        SetController = 4 "set-controller",
-        /// Ramp the setpoint to zero and hold it there, whoever commands: the service is about to end.
-        Rest = 5 "rest",
-        /// Go on with the revision of the rig description that lies beside the shared memory.
-        SetRig = 6 "set-rig",
-    }
-}
-
-enumeration! {
-    /// Who answers.
-    Process {
-        /// The servo.
-        Servo = 1 "servo",
-        /// The controller.
-        Controller = 2 "controller",
-        /// The gateway.
-        Gateway = 3 "gateway",
-        /// The supervisor.
-        Supervisor = 4 "supervisor",
-    }
-}
-
-enumeration! {
-    /// The answer to a [`Request`].
-    Outcome {
-        /// Done.
-        Done = 1 "done",
-        /// Understood, but the present state forbids it.
-        Refused = 2 "refused",
-        /// Unknown name, value out of range.
-        Invalid = 3 "invalid",
-    }
-}
+mod freshness;
+mod kinds;
+mod parameters;
+mod timing;
+pub use freshness::{Fresh, Freshness};
+pub use kinds::{DriveKind, Outcome, Process, RequestKind, SetpointKind};
+pub use parameters::{LAW_PARAMETERS, PARAMETERS, Parameter, ParameterTable};
+pub use timing::{LATENESS_BOUNDS_NS, Timing};
 
 message! { "kort.Header",
     /// In front of every message.
@@ -133,92 +65,6 @@ message! { "kort.Header",
         stamp_ns: u64,
         /// The sending process's start on CLOCK_MONOTONIC, ns: changes when it restarts.
         session: u64,
-    }
-}
-
-message! { "kort.Timing",
-    /// A loop's timing since its process started.
-    Timing {
-        /// Period of the loop, ns.
-        period_ns: u64,
-        /// Ticks done.
-        ticks: u64,
-        /// Ticks skipped because the loop came too late.
-        overruns: u64,
-        /// Lateness of the last wake-up, ns.
-        lateness_ns: u64,
-        /// Largest lateness, ns.
-        lateness_max_ns: u64,
-        /// Sum of all latenesses, ns.
-        lateness_sum_ns: u64,
-        /// Work of the last tick, wake-up to send, ns.
-        busy_ns: u64,
-        /// Wake-ups by lateness, see [`LATENESS_BOUNDS_NS`]; not cumulative.
-        histogram: [u64; LATENESS_BOUNDS_NS.len() + 1],
-    }
-}
-
-impl Timing {
-    /// Counts one wake-up, `lateness_ns` after its deadline.
-    pub fn count(&mut self, lateness_ns: u64) {
-        self.ticks = self.ticks.wrapping_add(1);
-        self.lateness_ns = lateness_ns;
-        self.lateness_max_ns = self.lateness_max_ns.max(lateness_ns);
-        self.lateness_sum_ns = self.lateness_sum_ns.wrapping_add(lateness_ns);
-        let bucket =
-            LATENESS_BOUNDS_NS.iter().position(|b| lateness_ns <= *b).unwrap_or(LATENESS_BOUNDS_NS.len());
-        if let Some(n) = self.histogram.get_mut(bucket) {
-            *n += 1;
-        }
-    }
-}
-
-message! { "kort.Parameter",
-    /// A named number: parameter of a control law or of an estimator.
-    Parameter {
-        /// Name, unit last.
-        name: Text<32>,
-        /// Unit.
-        unit: Text<16>,
-        /// Value.
-        value: f64,
-        /// Standard error; NaN if it has none.
-        std_error: f64,
-        /// Smallest allowed value; NaN if not bounded.
-        low: f64,
-        /// Largest allowed value; NaN if not bounded.
-        high: f64,
-    }
-}
-
-message! { "kort.ParameterTable",
-    /// All parameters of a controller, in two halves because arrays beyond 32 have no default.
-    ParameterTable {
-        /// The first half.
-        first: [Parameter; LAW_PARAMETERS / 2],
-        /// The second half.
-        second: [Parameter; LAW_PARAMETERS / 2],
-    }
-}
-
-impl ParameterTable {
-    /// The parameter at a place; `None` beyond the end.
-    pub fn get(&self, index: usize) -> Option<&Parameter> {
-        self.first.get(index).or_else(|| self.second.get(index.checked_sub(LAW_PARAMETERS / 2)?))
-    }
-
-    /// As [`Self::get`], to write.
-    pub fn get_mut(&mut self, index: usize) -> Option<&mut Parameter> {
-        if index < LAW_PARAMETERS / 2 {
-            self.first.get_mut(index)
-        } else {
-            self.second.get_mut(index - LAW_PARAMETERS / 2)
-        }
-    }
-
-    /// The first `count` parameters.
-    pub fn iter(&self, count: u32) -> impl Iterator<Item = &Parameter> {
-        self.first.iter().chain(&self.second).take(count as usize)
     }
 }
 
@@ -466,95 +312,3 @@ macro_rules! messages {
 }
 
 messages!(Setpoint, Command, Telemetry, ControllerState, Request, Reply);
-
-/// Only *new* messages pass: of one sender's session, of a growing sequence, stamped within `life_ns` and not in the
-/// future. A new session passes if it is younger.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Freshness {
-    session: u64,
-    sequence: u64,
-}
-
-/// What [`Freshness::check`] says of a message.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fresh {
-    /// Next message of the known sender.
-    Yes,
-    /// First message of a younger sender.
-    NewSession,
-    /// Repeated, reordered, too old, from the future, or from a sender that was replaced.
-    No,
-}
-
-impl Freshness {
-    /// Judges a message and remembers it if it is new.
-    pub fn check(&mut self, header: &Header, now_ns: u64, life_ns: u64) -> Fresh {
-        // One clock on one machine: a stamp ahead of ours by more than a scheduling hiccup is wrong.
-        let in_time = header.stamp_ns <= now_ns.saturating_add(1_000_000)
-            && now_ns.saturating_sub(header.stamp_ns) <= life_ns;
-        if !in_time || header.session < self.session || header.session > header.stamp_ns {
-            return Fresh::No;
-        }
-        if header.session > self.session {
-            *self = Self { session: header.session, sequence: header.sequence };
-            return Fresh::NewSession;
-        }
-        if header.sequence <= self.sequence {
-            return Fresh::No;
-        }
-        self.sequence = header.sequence;
-        Fresh::Yes
-    }
-
-    /// Session of the sender in force; zero before the first message.
-    pub fn session(&self) -> u64 {
-        self.session
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    fn header(sequence: u64, stamp_ns: u64, session: u64) -> Header {
-        Header { sequence, stamp_ns, session }
-    }
-
-    #[test]
-    fn only_new_messages_pass() {
-        let mut f = Freshness::default();
-        assert_eq!(f.check(&header(1, 1_000, 500), 1_000, 100), Fresh::NewSession);
-        assert_eq!(f.check(&header(1, 1_000, 500), 1_010, 100), Fresh::No, "repeated");
-        assert_eq!(f.check(&header(2, 1_020, 500), 1_200, 100), Fresh::No, "too old");
-        assert_eq!(f.check(&header(2, 1_020, 500), 1_050, 100), Fresh::Yes);
-        assert_eq!(f.check(&header(3, 9_000_000, 500), 1_060, 100), Fresh::No, "from the future");
-        assert_eq!(f.check(&header(9, 1_060, 400), 1_060, 100), Fresh::No, "replaced sender");
-        assert_eq!(f.check(&header(1, 1_070, 600), 1_070, 100), Fresh::NewSession);
-        assert_eq!(f.check(&header(3, 1_080, 500), 1_080, 100), Fresh::No, "the old sender again");
-    }
-
-    proptest! {
-        #[test]
-        fn a_message_passes_at_most_once(headers in prop::collection::vec((0u64..5, 0u64..50, 1u64..4), 1..60)) {
-            let mut f = Freshness::default();
-            let mut passed = std::collections::HashSet::new();
-            for (sequence, stamp, session) in headers {
-                let h = header(sequence, stamp + session, session);
-                if f.check(&h, 50, 50) != Fresh::No {
-                    prop_assert!(passed.insert((h.session, h.sequence)));
-                }
-            }
-        }
-
-        #[test]
-        fn the_histogram_counts_every_wake_up(late in prop::collection::vec(0u64..30_000_000, 0..50)) {
-            let mut timing = Timing::default();
-            for l in &late {
-                timing.count(*l);
-            }
-            prop_assert_eq!(timing.histogram.iter().sum::<u64>(), late.len() as u64);
-            prop_assert_eq!(timing.lateness_max_ns, late.iter().copied().max().unwrap_or(0));
-        }
-    }
-}

@@ -1,4 +1,4 @@
-//! Processes killed and stopped at random instants, and messages of another version.
+//! Processes killed and stopped at random instants.
 
 use std::cell::Cell;
 use std::time::{Duration, Instant};
@@ -8,7 +8,7 @@ use kort_proto::transport::monotonic_ns;
 
 use rustix::process::{Pid, Signal, kill_process};
 
-use crate::common::{PERIOD_NS, Site, Stack, at_zero, in_real_time, run, wait};
+use crate::common::{PERIOD_NS, Stack, at_zero, in_real_time, wait};
 use crate::table::Table;
 
 const LEASE_MS: u64 = 60_000;
@@ -161,28 +161,4 @@ pub fn stopped(table: &mut Table) {
         stack.wait_until_up();
         std::thread::sleep(Duration::from_secs(6));
     }
-}
-
-/// A peer of another version finds no service of its name: it is refused, and nothing of the others changes.
-pub fn foreign_version(table: &mut Table) {
-    let mut stack = Stack::start();
-    stack.thrust(30.0, LEASE_MS);
-    let began = Instant::now();
-    let deployment = stack.site.deployment();
-    let generation = deployment.generation().expect("a generation");
-    let name = kort_proto::names::Stream::Command.service("t1", generation);
-    let version = kort_proto::names::MESSAGES_VERSION;
-    assert!(name.starts_with(&format!("kort/{version}/")), "the name carries the version: {name}");
-    // A second deployment cannot get in the way either: the lock is held.
-    let second = run(&mut stack.site.command("servo"));
-    assert_eq!(second.status.code(), Some(1));
-    let t = stack.watch().next();
-    assert!(t.armed == 1 && t.faults == 0, "{t:?}");
-    table.row(
-        "a rival servo, another message version",
-        "refused",
-        Duration::from_secs(15),
-        &[began.elapsed()],
-    );
-    drop(Site::new());
 }

@@ -14,6 +14,7 @@ mod network;
 mod sensors;
 mod shared_memory;
 mod table;
+mod version;
 
 use common::Stalls;
 use table::Table;
@@ -24,7 +25,7 @@ type Fault = fn(&mut Table);
 #[test]
 fn every_fault_ends_within_its_bound() {
     let groups: [(&str, &[Fault]); 5] = [
-        ("processes", &[kills::stopped, kills::foreign_version]),
+        ("processes", &[kills::stopped, version::foreign_peer, version::foreign_owner, version::rival]),
         ("network", &[network::rivals, network::slow_reader, network::half_open]),
         ("disk", &[disk::at_its_limit, disk::full, disk::slow, disk::log_full]),
         ("shared_memory", &[shared_memory::full_at_the_start, shared_memory::full_under_way]),

@@ -14,100 +14,15 @@ use std::time::Duration;
 
 use iceoryx2::prelude::*;
 use rustix::fs::{FlockOperation, flock};
-use thiserror::Error;
 
 use super::clock::monotonic_ns;
+use super::error::TransportError;
 use super::ports::{Services, create_services};
 use super::room;
+use crate::names::MESSAGES_VERSION;
 
 /// Longest root: the sockets by which iceoryx2 wakes a process lie under it, and a socket path has 107 bytes.
-const ROOT_BYTES_MAX: usize = 35;
-/// Why shared memory cannot be used.
-#[derive(Debug, Error)]
-pub enum TransportError {
-    /// Another process owns the deployment.
-    #[error(
-        "{}: another kort ({holder}) already runs here\nhint: stop it, or give this one a root of its own with --root DIR or transport.root in kort.toml",
-        root.display()
-    )]
-    Locked {
-        /// The root folder.
-        root: PathBuf,
-        /// What the lock file says of its holder.
-        holder: String,
-    },
-    /// A file of the deployment cannot be used.
-    #[error("{}: {error}\nhint: choose another folder with --root DIR or transport.root in kort.toml", path.display())]
-    File {
-        /// The file or folder.
-        path: PathBuf,
-        /// The system's words.
-        error: std::io::Error,
-    },
-    /// A path that shared memory cannot take.
-    #[error("{}: not usable as the root of shared memory\nhint: a path of at most {ROOT_BYTES_MAX} bytes without odd characters", root.display())]
-    Path {
-        /// The root folder.
-        root: PathBuf,
-    },
-    /// Nobody owns the deployment.
-    #[error("{}: nothing runs here\nhint: start `kort up` or `kort servo` first, with the same --root", root.display())]
-    NoGeneration {
-        /// The root folder.
-        root: PathBuf,
-    },
-    /// No room for the samples: writing them would end in SIGBUS.
-    #[error(
-        "/dev/shm: {free_kib} KiB and {free_files} files are free; {needed_kib} KiB and {needed_files} files are needed\nhint: delete what is left over there, or make it larger (a container: shm_size)"
-    )]
-    Room {
-        /// Free space, KiB.
-        free_kib: u64,
-        /// Files that may still be made.
-        free_files: u64,
-        /// Needed space, KiB.
-        needed_kib: u64,
-        /// Needed files.
-        needed_files: u64,
-    },
-    /// Too few files may be open.
-    #[error(
-        "open files: at most {limit} are allowed here; {needed} are needed\nhint: raise the limit (ulimit -n {needed}; in systemd LimitNOFILE={needed})"
-    )]
-    OpenFiles {
-        /// Files a process may have open.
-        limit: u64,
-        /// Files needed.
-        needed: u64,
-    },
-    /// A file or folder that somebody else could write.
-    #[error(
-        "{}: {why}\nhint: whoever can write it could hold or forge this deployment; remove it, or choose a folder of your own with --root DIR or transport.root in kort.toml",
-        path.display()
-    )]
-    Foreign {
-        /// The file or folder.
-        path: PathBuf,
-        /// What is wrong with it.
-        why: String,
-    },
-    /// iceoryx2 said no.
-    #[error(
-        "shared memory, {what}: {error}\nhint: see that /dev/shm has room and belongs to this user (df /dev/shm; ls -l /dev/shm)"
-    )]
-    Iceoryx {
-        /// What was tried.
-        what: String,
-        /// iceoryx2's word for it.
-        error: String,
-    },
-}
-
-impl TransportError {
-    pub(super) fn iceoryx(what: impl Into<String>, error: impl std::fmt::Debug) -> Self {
-        Self::Iceoryx { what: what.into(), error: format!("{error:?}") }
-    }
-}
+pub(super) const ROOT_BYTES_MAX: usize = 35;
 
 /// Where a deployment's shared memory lives.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -136,7 +51,25 @@ impl Deployment {
 
     /// Number of the present generation; `None` while nobody has created one.
     pub fn generation(&self) -> Option<u64> {
-        fs::read_to_string(self.generation_file()).ok()?.trim().parse().ok()
+        fs::read_to_string(self.generation_file()).ok()?.split_whitespace().next()?.parse().ok()
+    }
+
+    /// The present generation, where its owner speaks as this program does.
+    ///
+    /// # Errors
+    /// [`TransportError::NoGeneration`] if there is none, [`TransportError::Version`] if its messages are others.
+    pub(super) fn generation_of_our_version(&self) -> Result<u64, TransportError> {
+        let none = || TransportError::NoGeneration { root: self.root.clone() };
+        let text = fs::read_to_string(self.generation_file()).map_err(|_| none())?;
+        let mut words = text.split_whitespace();
+        let generation = words.next().and_then(|number| number.parse().ok()).ok_or_else(none)?;
+        match words.next() {
+            Some(version) if version == MESSAGES_VERSION.to_string() => Ok(generation),
+            other => {
+                let theirs = other.map_or_else(|| "4 or older".to_owned(), str::to_owned);
+                Err(TransportError::Version { root: self.root.clone(), theirs })
+            }
+        }
     }
 
     /// Waits for an owner to have created a generation.
@@ -210,7 +143,11 @@ impl Deployment {
             .map_err(|e| TransportError::iceoryx("creating a node", e))
     }
 
-    fn config(&self, generation: u64) -> Result<Config, TransportError> {
+    /// What iceoryx2 must know to find one generation of this deployment, for those who listen without our ports.
+    ///
+    /// # Errors
+    /// [`TransportError::Path`] if the root cannot be one.
+    pub fn config(&self, generation: u64) -> Result<Config, TransportError> {
         let path_error = || TransportError::Path { root: self.root.clone() };
         if self.root.as_os_str().len() > ROOT_BYTES_MAX {
             return Err(path_error());
@@ -302,7 +239,7 @@ impl Owner {
         let draft = self.deployment.beside("generation.new");
         ours_alone(&path)?;
         ours_alone(&draft)?;
-        fs::write(&draft, generation.to_string())
+        fs::write(&draft, format!("{generation} {MESSAGES_VERSION}"))
             .and_then(|()| fs::rename(&draft, &path))
             .map_err(|error| TransportError::File { path, error })?;
         Ok(generation)

@@ -3,13 +3,15 @@
 
 mod clock;
 mod deployment;
+mod error;
 mod ports;
 mod rig;
 mod room;
 mod watched;
 
 pub use clock::{Ticker, idle, monotonic_ns, ordinary, realtime};
-pub use deployment::{Deployment, Owner, TransportError};
+pub use deployment::{Deployment, Owner};
+pub use error::TransportError;
 pub use ports::{
     ControllerPorts, GatewayPorts, Inbox, Outbox, ServoPorts, SupervisorPorts, Ticks, Waker, create_services,
 };

@@ -4,10 +4,12 @@ use std::time::Duration;
 
 use iceoryx2::port::{listener::Listener, notifier::Notifier, publisher::Publisher, subscriber::Subscriber};
 use iceoryx2::prelude::*;
+use iceoryx2::service::builder::publish_subscribe::PublishSubscribeOpenError;
 use iceoryx2::service::port_factory::{event, publish_subscribe};
 
 use super::clock::monotonic_ns;
-use super::deployment::{Deployment, TransportError};
+use super::deployment::Deployment;
+use super::error::TransportError;
 use super::room;
 use crate::messages::{Command, ControllerState, Message, Reply, Request, Setpoint, Telemetry};
 use crate::names::Stream;
@@ -99,11 +101,13 @@ struct Opener<'a> {
 impl Opener<'_> {
     fn open<T: Message + ZeroCopySend>(&self, stream: Stream) -> Result<PubSub<T>, TransportError> {
         let name = service_name(stream, self.thruster, self.generation)?;
-        self.node
-            .service_builder(&name)
-            .publish_subscribe::<T>()
-            .open()
-            .map_err(|e| TransportError::iceoryx(format!("opening {name}"), e))
+        self.node.service_builder(&name).publish_subscribe::<T>().open().map_err(|e| match e {
+            // Type, size or alignment: a peer of the same version by name, of another by what it sends.
+            PublishSubscribeOpenError::IncompatibleTypes => {
+                TransportError::Layout { service: name.to_string() }
+            }
+            e => TransportError::iceoryx(format!("opening {name}"), e),
+        })
     }
 
     fn outbox<T: Message + ZeroCopySend>(&self, stream: Stream) -> Result<Outbox<T>, TransportError> {
@@ -243,12 +247,11 @@ macro_rules! ports {
             /// Opens the ports of a thruster in the deployment's present generation.
             ///
             /// # Errors
-            /// [`TransportError::NoGeneration`] if nobody owns the deployment,
+            /// [`TransportError::NoGeneration`] if nobody owns the deployment, [`TransportError::Version`] and
+            /// [`TransportError::Layout`] if it speaks otherwise,
             /// [`TransportError::Room`] if `/dev/shm` is full, [`TransportError::Iceoryx`] if a service is not there or full.
             pub fn open(deployment: &Deployment, thruster: &str) -> Result<Self, TransportError> {
-                let generation = deployment.generation().ok_or_else(|| TransportError::NoGeneration {
-                    root: deployment.root().to_path_buf(),
-                })?;
+                let generation = deployment.generation_of_our_version()?;
                 let node = deployment.node($node, generation)?;
                 let opener = Opener { deployment, node: &node, thruster, generation, session: monotonic_ns() };
                 $(let $field = { let $o = &opener; $make };)*

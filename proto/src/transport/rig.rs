@@ -4,7 +4,8 @@
 use std::fs;
 use std::path::PathBuf;
 
-use super::deployment::{Deployment, TransportError, ours_alone};
+use super::deployment::{Deployment, ours_alone};
+use super::error::TransportError;
 
 impl Deployment {
     /// Lays down the text for a thruster's controller, whole or not at all.

@@ -10,7 +10,7 @@ use std::path::Path;
 use rustix::fs::{FallocateFlags, fallocate, statvfs};
 use rustix::io::Errno;
 
-use super::deployment::TransportError;
+use super::error::TransportError;
 
 /// Where shared memory lies.
 const SHM: &str = "/dev/shm";

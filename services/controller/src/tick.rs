@@ -1,23 +1,18 @@
 //! The controller's pure step: which setpoint counts, what a loss leads to, and the law under it.
 
 use kort_control::limits::LimitSet;
-use kort_control::{
-    Controller, ControllerConfig, EstimatorKind, LawKind, Measurement, ModelError, ObserverKind, Output,
-    Reference, TUNABLES,
-};
+use kort_control::{Controller, ControllerConfig, Measurement, ModelError, Output, Reference};
 use kort_proto::faults::Fault;
 use kort_proto::limits::{FIRST_OF_CONTROL, Limit};
-use kort_proto::messages::{
-    Command, ControllerState, DriveKind, Fresh, Freshness, LAWS, Outcome, Parameter, Process,
-    REQUEST_LIFE_NS, Reply, Request, RequestKind, Setpoint, SetpointKind, Telemetry,
-};
-use kort_proto::signals::{Estimates, Signals};
-use kort_proto::text::Text;
+use kort_proto::messages::{Command, DriveKind, Fresh, Freshness, Setpoint, SetpointKind, Telemetry};
+use kort_proto::signals::Signals;
 use kort_thruster::rig::{AmplifierKind, Rig};
 
 use crate::slew::{Slew, rise_s};
 
+mod request;
 mod revision;
+mod state;
 pub use revision::Revision;
 
 /// After the lease's end the setpoint falls to zero in this time, then the servo is stopped: all
@@ -344,75 +339,6 @@ impl Tick {
         }
     }
 
-    /// Is a request meant for now, and for this controller?
-    pub fn is_for_now(&self, request: &Request, now_ns: u64) -> bool {
-        let sent = request.header.stamp_ns;
-        sent >= self.started_ns && now_ns.saturating_sub(sent) <= REQUEST_LIFE_NS
-    }
-
-    /// Acts on a request; `None` if it is not for the controller, or too old to be meant for now. Another revision of
-    /// the rig is designed beside the tick, and comes by [`Tick::adopt`].
-    pub fn request(&mut self, request: &Request, now_ns: u64) -> Option<Reply> {
-        if !self.is_for_now(request, now_ns) {
-            return None;
-        }
-        let answer = |outcome, words: std::fmt::Arguments| {
-            Some(Reply::to(request, Process::Controller, outcome, words))
-        };
-        match RequestKind::from_u32(request.kind)? {
-            RequestKind::Arm | RequestKind::SetRig => None,
-            RequestKind::Rest => {
-                let since_ns = self.ending.map_or(now_ns, |ending| ending.since_ns);
-                self.ending = Some(Ending { since_ns, cause: None, hold: true });
-                answer(Outcome::Done, format_args!("going to zero"))
-            }
-            RequestKind::Disarm => {
-                self.forget();
-                answer(Outcome::Done, format_args!("setpoint forgotten"))
-            }
-            RequestKind::ClearFaults => {
-                self.latched = 0;
-                self.forget();
-                answer(Outcome::Done, format_args!("no faults"))
-            }
-            RequestKind::SetController => match self.configure(request) {
-                Ok(()) => answer(Outcome::Done, format_args!("{} runs", self.config.law.name())),
-                Err(words) => answer(Outcome::Invalid, format_args!("{words}")),
-            },
-        }
-    }
-
-    /// Switches law, observer, estimator and parameters, all or nothing.
-    fn configure(&mut self, request: &Request) -> Result<(), String> {
-        let mut config = self.config;
-        let unknown = |what: &str, name: &str, known: &[&str]| {
-            format!("`{name}` is no {what}; hint: known are {}", known.join(", "))
-        };
-        if !request.law.is_empty() {
-            let name = request.law.as_str();
-            config.law = LawKind::from_name(name)
-                .ok_or_else(|| unknown("control law", name, &LawKind::ALL.map(LawKind::name)))?;
-        }
-        if !request.observer.is_empty() {
-            let name = request.observer.as_str();
-            config.observer = ObserverKind::from_name(name)
-                .ok_or_else(|| unknown("observer", name, &ObserverKind::ALL.map(ObserverKind::name)))?;
-        }
-        if !request.estimator.is_empty() {
-            let name = request.estimator.as_str();
-            config.estimator = EstimatorKind::from_name(name)
-                .ok_or_else(|| unknown("estimator", name, &EstimatorKind::ALL.map(EstimatorKind::name)))?;
-        }
-        for parameter in request.parameters.iter().take(request.parameter_count as usize) {
-            config
-                .set(parameter.name.as_str(), parameter.value)
-                .map_err(|e| e.to_string().replace('\n', "; "))?;
-        }
-        self.config = config;
-        self.controller.configure(&config);
-        Ok(())
-    }
-
     /// The law with its observer and estimator.
     pub fn controller(&self) -> &Controller {
         &self.controller
@@ -421,87 +347,6 @@ impl Tick {
     /// What the last tick gave.
     pub fn output(&self) -> &Output {
         &self.output
-    }
-
-    /// The state for the gateway, without header and timing.
-    pub fn state(&self) -> ControllerState {
-        let mut state = ControllerState {
-            law: Text::new(self.config.law.name()),
-            observer: Text::new(self.config.observer.name()),
-            estimator: Text::new(self.config.estimator.name()),
-            setpoint_kind: SetpointKind::Zero as u32,
-            setpoint_value: self.in_force,
-            estimates: Estimates {
-                thrust_n: self.output.estimate.thrust_n.value,
-                flow_m_s: self.output.estimate.flow_m_s.value,
-                ambient_m_s: self.output.estimate.ambient_m_s.value,
-            },
-            estimator_frozen: u32::from(
-                self.config.estimator != EstimatorKind::Off && self.controller.adapted().frozen.is_some(),
-            ),
-            faults: self.latched,
-            limits: self.limits,
-            thrust_max_n: self.controller.model().thrust_max_n,
-            speed_max_rad_s: self.controller.model().speed_max_rad_s,
-            setpoints_invalid: self.invalid,
-            rig_revision: self.rig_revision,
-            ..ControllerState::default()
-        };
-        let mismatch = self.controller.mismatch();
-        state.mismatch_level = if mismatch.learning { [f64::NAN; 5] } else { mismatch.level };
-        state.mismatch_path = mismatch.alarm.map_or(0, |path| path as u32 + 1);
-        state.mismatch_since_s = mismatch.since_s;
-        if let Some(setpoint) = self.setpoint {
-            state.setpoint_kind = setpoint.kind as u32;
-            state.setpoint_accepted = setpoint.value;
-            state.setpoint_session = setpoint.session;
-            state.setpoint_generation = setpoint.generation;
-        }
-        for (i, tunable) in TUNABLES.iter().enumerate() {
-            let Some(slot) = state.law_parameters.get_mut(i) else { break };
-            *slot = Parameter {
-                name: Text::new(tunable.name),
-                unit: Text::new(tunable.unit),
-                value: (tunable.get)(&self.config),
-                std_error: f64::NAN,
-                low: tunable.least,
-                high: tunable.most,
-            };
-            state.law_parameter_count += 1;
-        }
-        for (slot, law) in state.laws.iter_mut().zip(LawKind::ALL) {
-            *slot = Text::new(law.name());
-        }
-        state.law_count = LawKind::ALL.len().min(LAWS) as u32;
-        self.put_estimated(&mut state);
-        state
-    }
-
-    /// The adapted coefficients, and the load that the model does not explain.
-    fn put_estimated(&self, state: &mut ControllerState) {
-        let (adapted, nominal) = (self.controller.adapted(), self.controller.nominal());
-        let coefficients = kort_control::estimators::NAMES.iter().enumerate().map(|(i, name)| {
-            let (value, std_error) = adapted.coefficient(i, nominal);
-            (*name, "1", value, std_error)
-        });
-        let load = self.output.estimate.load_torque_n_m;
-        let swirl = self.output.estimate.swirl_m_s;
-        let rest = [
-            ("load_torque_n_m", "N m", load.value, load.std_error),
-            ("swirl_m_s", "m/s", swirl.value, swirl.std_error),
-        ];
-        for ((name, unit, value, std_error), slot) in coefficients.chain(rest).zip(&mut state.parameters) {
-            let std_error = if std_error.is_finite() { std_error } else { f64::NAN };
-            *slot = Parameter {
-                name: Text::new(name),
-                unit: Text::new(unit),
-                value,
-                std_error,
-                low: f64::NAN,
-                high: f64::NAN,
-            };
-            state.parameter_count += 1;
-        }
     }
 
     fn measurement(&self) -> Measurement {

@@ -1,6 +1,7 @@
 //! Metrics for Prometheus: base units, label `thruster`.
 
-use std::collections::BTreeMap;
+mod families;
+
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -9,10 +10,9 @@ use axum::http::header;
 use axum::response::IntoResponse;
 use kort_proto::faults::Fault;
 use kort_proto::limits::Limit;
-use kort_proto::messages::{LATENESS_BOUNDS_NS, PATHS, Timing};
+use kort_proto::messages::PATHS;
 use kort_proto::signals::Kind as SignalKind;
 use kort_proto::transport::Restarts;
-use prometheus::proto::{Bucket, Counter, Gauge, Histogram, LabelPair, Metric, MetricFamily, MetricType};
 use prometheus::{TEXT_FORMAT, TextEncoder};
 use utoipa_axum::{router::OpenApiRouter, routes};
 
@@ -22,6 +22,7 @@ use crate::problem::{Kind, Problem};
 use crate::process::Usage;
 use crate::tally::Tally;
 use crate::thruster::Thruster;
+use families::Families;
 
 pub fn routes() -> OpenApiRouter<Arc<App>> {
     OpenApiRouter::new().routes(routes!(metrics))
@@ -319,79 +320,5 @@ fn loops(families: &mut Families, thruster: &Thruster, tally: &Tally) {
             timing.overruns as f64,
         );
         families.lateness("loop_lateness_seconds", "How late the loop woke up.", &labels, &timing);
-    }
-}
-
-/// Metric families by name, in the order of names.
-#[derive(Default)]
-struct Families(BTreeMap<String, MetricFamily>);
-
-impl Families {
-    fn gauge(&mut self, name: &str, help: &str, labels: &[(&str, &str)], value: f64) {
-        if value.is_finite() {
-            let mut gauge = Gauge::default();
-            gauge.set_value(value);
-            self.add(name, help, MetricType::GAUGE, labels).set_gauge(gauge);
-        }
-    }
-
-    fn counter(&mut self, name: &str, help: &str, labels: &[(&str, &str)], value: f64) {
-        let mut counter = Counter::default();
-        counter.set_value(value);
-        self.add(name, help, MetricType::COUNTER, labels).set_counter(counter);
-    }
-
-    fn lateness(&mut self, name: &str, help: &str, labels: &[(&str, &str)], timing: &Timing) {
-        let buckets = LATENESS_BOUNDS_NS.iter().map(|bound| *bound as f64 * 1e-9).zip(timing.histogram);
-        let count = timing.histogram.iter().sum();
-        self.histogram(name, help, labels, buckets, count, timing.lateness_sum_ns as f64 * 1e-9);
-    }
-
-    /// `buckets` are upper bounds with their counts, not cumulative.
-    fn histogram(
-        &mut self,
-        name: &str,
-        help: &str,
-        labels: &[(&str, &str)],
-        buckets: impl Iterator<Item = (f64, u64)>,
-        count: u64,
-        sum: f64,
-    ) {
-        let mut below = 0;
-        let buckets = buckets.map(|(bound, count)| {
-            below += count;
-            let mut bucket = Bucket::default();
-            bucket.set_upper_bound(bound);
-            bucket.set_cumulative_count(below);
-            bucket
-        });
-        let mut histogram = Histogram::default();
-        histogram.set_bucket(buckets.collect());
-        histogram.set_sample_count(count);
-        histogram.set_sample_sum(sum);
-        self.add(name, help, MetricType::HISTOGRAM, labels).set_histogram(histogram);
-    }
-
-    fn add(&mut self, name: &str, help: &str, kind: MetricType, labels: &[(&str, &str)]) -> &mut Metric {
-        let family = self.0.entry(name.to_owned()).or_insert_with(|| {
-            let mut family = MetricFamily::default();
-            family.set_name(format!("kort_{name}"));
-            family.set_help(help.to_owned());
-            family.set_field_type(kind);
-            family
-        });
-        let pairs = labels.iter().map(|(name, value)| {
-            let mut pair = LabelPair::default();
-            pair.set_name((*name).to_owned());
-            pair.set_value((*value).to_owned());
-            pair
-        });
-        let metrics = family.mut_metric();
-        metrics.push(Metric::from_label(pairs.collect()));
-        metrics.last_mut().expect("just pushed")
-    }
-
-    fn into_families(self) -> Vec<MetricFamily> {
-        self.0.into_values().collect()
     }
 }
