@@ -109,3 +109,17 @@ fn a_control_law_is_switched_under_way_and_its_parameters_are_set() {
         assert!((400..500).contains(&status) && answer["detail"].is_string(), "{status} {answer}");
     });
 }
+
+/// However soon after the disarming: the controller's answer comes behind the command that asks for nothing.
+#[test]
+fn arming_right_after_disarming_is_not_refused() {
+    common::in_real_time(|| {
+        let mut stack = Stack::start();
+        for _ in 0..5 {
+            stack.thrust(40.0, 60_000);
+            stack.expect("POST", "/disarm", None);
+            stack.expect("POST", "/arm", None);
+            assert_eq!(stack.state().map(|state| state["armed"] == true), Some(true));
+        }
+    });
+}

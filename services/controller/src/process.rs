@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use kort_control::{ControllerConfig, LawKind, ModelError};
 use kort_proto::config::{Config, ConfigError, Thruster};
-use kort_proto::messages::{Command, RequestKind, Timing};
+use kort_proto::messages::{Command, Reply, RequestKind, Timing};
 use kort_proto::revision;
 use kort_proto::transport::{ControllerPorts, Deployment, TransportError, monotonic_ns, realtime};
 use kort_thruster::rig::Rig;
@@ -185,23 +185,23 @@ fn serve(
         if let Some(setpoint) = ports.setpoint.latest() {
             tick.take_setpoint(&setpoint, woke_ns);
         }
-        for _ in 0..REQUESTS {
+        let mut replies: [Option<Reply>; REQUESTS] = [const { None }; REQUESTS];
+        for reply in &mut replies {
             let Some(request) = ports.request.next() else { break };
-            let reply = match RequestKind::from_u32(request.kind) {
+            *reply = match RequestKind::from_u32(request.kind) {
                 Some(RequestKind::SetRig) if tick.is_for_now(&request, woke_ns) => workshop.order(request),
                 _ => tick.request(&request, woke_ns),
             };
-            if let Some(reply) = reply {
-                let _ = ports.reply.send(reply);
-            }
         }
-        if let Some(reply) = workshop.fit(&mut tick) {
-            let _ = ports.reply.send(reply);
-        }
+        let fitted = workshop.fit(&mut tick);
         let command = tick.tick(woke_ns);
         let command = if stopping { Command { drive: 0.0, stop: 1, ..command } } else { command };
         // What cannot be sent is missed by its reader, who watches for that.
         let _ = ports.command.send(command);
+        // Answers come behind the command that follows from what was asked: whoever has one may build on it.
+        for reply in replies.into_iter().flatten().chain(fitted) {
+            let _ = ports.reply.send(reply);
+        }
         let mut state = tick.state();
         state.timing = timing;
         let _ = ports.state.send(state);

@@ -29,9 +29,6 @@ use crate::view::{
 /// Servo and controller answer a request within this time, or are taken to be away.
 pub const ANSWER_WITHIN: Duration = Duration::from_millis(700);
 
-/// The servo has taken what the controller commands after its answer: some periods of the slowest servo.
-const COMMAND_TAKEN_WITHIN: Duration = Duration::from_millis(20);
-
 /// A request on its way to servo and controller.
 #[derive(Debug)]
 pub struct Ask {
@@ -166,9 +163,8 @@ impl Thruster {
         if !self.heard().armed(now) {
             self.desk().rest(now, "it was armed anew");
             // The servo arms only under a controller that asks for nothing: one that has not heard yet of a disarming
-            // a moment ago is told.
+            // a moment ago is told. Its answer comes behind the command that asks for nothing.
             self.ask(request(RequestKind::Disarm), &[Process::Controller], Kind::Refused).await?;
-            tokio::time::sleep(COMMAND_TAKEN_WITHIN).await;
         }
         self.ask(request(RequestKind::Arm), &[Process::Servo], Kind::Refused).await?;
         self.settle(|heard, now| heard.armed(now)).await;

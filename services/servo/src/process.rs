@@ -145,17 +145,15 @@ fn tick_until_stopped(
             servo.stop();
         }
         let shown = devices.show(At { now_ns: woke_ns, ticks: 1 + missed });
-        let command = ports.command.latest();
-        let inputs = Inputs {
-            now_ns: woke_ns,
-            ticks: 1 + missed,
-            command: command.as_ref(),
-            measured: &shown.signals,
-            devices: shown.faults,
-        };
-        for _ in 0..REQUESTS_PER_TICK {
-            let Some(request): Option<Request> = ports.request.next() else { break };
-            if let Some(reply) = servo.request(&request, woke_ns) {
+        // Requests are fetched first and acted upon last: by then every command is here that was sent before them.
+        let requests: [Option<Request>; REQUESTS_PER_TICK] = std::array::from_fn(|_| ports.request.next());
+        if let Some(command) = ports.command.latest() {
+            servo.take_command(&command, woke_ns);
+        }
+        let inputs =
+            Inputs { now_ns: woke_ns, ticks: 1 + missed, measured: &shown.signals, devices: shown.faults };
+        for request in requests.iter().flatten() {
+            if let Some(reply) = servo.request(request, woke_ns) {
                 let _ = ports.reply.send(reply);
             }
         }

@@ -31,6 +31,8 @@ pub struct Servo {
     drive: f64,
     invalid: u64,
     stale: u64,
+    /// Faults that commands raised since the last tick.
+    raised: u64,
 }
 
 /// What one tick sees.
@@ -40,8 +42,6 @@ pub struct Inputs<'a> {
     pub now_ns: u64,
     /// Periods since the last tick: one, and more after missed ones.
     pub ticks: u64,
-    /// Newest command received since the last tick.
-    pub command: Option<&'a Command>,
     /// What the sensors show.
     pub measured: &'a Signals,
     /// What drive and sensor sources report, bits of [`Fault`].
@@ -67,6 +67,7 @@ impl Servo {
             drive: 0.0,
             invalid: 0,
             stale: 0,
+            raised: 0,
         }
     }
 
@@ -91,9 +92,7 @@ impl Servo {
         let mut faults = self.guard.inspect(inputs.measured, self.drive, inputs.ticks);
         faults |= inputs.devices;
         self.devices = inputs.devices;
-        if let Some(command) = inputs.command {
-            faults |= self.take(command, inputs.now_ns);
-        }
+        faults |= std::mem::take(&mut self.raised);
         // The following are faults only while the drive is on.
         if self.armed {
             if inputs.ticks.saturating_mul(self.settings.period_ns) > self.settings.command_timeout_ns {
@@ -135,6 +134,12 @@ impl Servo {
     pub fn stop(&mut self) {
         self.armed = false;
         self.drive = 0.0;
+    }
+
+    /// The newest command received since the last tick; before the requests that came with it, for a controller that
+    /// has answered one has sent what follows from it.
+    pub fn take_command(&mut self, command: &Command, now_ns: u64) {
+        self.raised |= self.take(command, now_ns);
     }
 
     /// Takes a command if it is new and sound. Returns the faults it raises.

@@ -74,18 +74,15 @@ fn the_loop_allocates_nothing_after_start() {
         let now_ns = monotonic_ns();
         let shown = devices.show(At { now_ns, ticks: 1 });
         let measured = shown.signals;
-        let command = ports.command.latest();
-        let mut reply = None;
-        while let Some(request) = ports.request.next() {
-            reply = servo.request(&request, now_ns);
+        let requests: [_; 4] = std::array::from_fn(|_| ports.request.next());
+        if let Some(command) = ports.command.latest() {
+            servo.take_command(&command, now_ns);
         }
-        let inputs = Inputs {
-            now_ns,
-            ticks: 1,
-            command: command.as_ref(),
-            measured: &measured,
-            devices: shown.faults,
-        };
+        let mut reply = None;
+        for request in requests.iter().flatten() {
+            reply = servo.request(request, now_ns);
+        }
+        let inputs = Inputs { now_ns, ticks: 1, measured: &measured, devices: shown.faults };
         devices.drive(now_ns, servo.tick(&inputs));
         let telemetry = servo.telemetry(now_ns, &measured);
         let sending = COUNT.with(Cell::get);

@@ -96,13 +96,8 @@ impl Stand {
         self.plant.step(&Tick { time_s: at_s - tick_s, command: reaches, ..Tick::default() });
         self.way_rad += (self.plant.truth().shaft_angle_rad - before).abs();
         let shown = self.show(at_s);
-        let acting = self.servo.tick(&Inputs {
-            now_ns: self.now_ns,
-            ticks: 1,
-            command: Some(&self.command),
-            measured: &shown,
-            devices: 0,
-        });
+        self.servo.take_command(&self.command, self.now_ns);
+        let acting = self.servo.tick(&Inputs { now_ns: self.now_ns, ticks: 1, measured: &shown, devices: 0 });
         self.applied = acting.unwrap_or(0.0);
         let telemetry = self.servo.telemetry(self.now_ns, &shown);
         // What is asked now the servo hears with its next tick.

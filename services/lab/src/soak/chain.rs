@@ -89,13 +89,10 @@ impl Chain for ProductionChain {
         if self.rig.amplifier.kind == AmplifierKind::Speed && guarded.current_a.is_nan() {
             guarded.current_a = 0.0;
         }
-        let drive = self.servo.tick(&Inputs {
-            now_ns: now,
-            ticks: 1,
-            command: self.command.take().as_ref(),
-            measured: &guarded,
-            devices: 0,
-        });
+        if let Some(command) = self.command.take() {
+            self.servo.take_command(&command, now);
+        }
+        let drive = self.servo.tick(&Inputs { now_ns: now, ticks: 1, measured: &guarded, devices: 0 });
         self.operate(alive, thrust_n);
         if alive {
             let mut telemetry = self.servo.telemetry(now, measured);

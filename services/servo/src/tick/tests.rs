@@ -57,7 +57,10 @@ impl Bench {
     fn tick(&mut self, command: Option<&Command>) -> Option<f64> {
         self.now_ns += MS;
         let measured = Signals { current_a: 0.0, shaft_speed_rad_s: 0.0, ..Signals::UNKNOWN };
-        self.servo.tick(&Inputs { now_ns: self.now_ns, ticks: 1, command, measured: &measured, devices: 0 })
+        if let Some(command) = command {
+            self.servo.take_command(command, self.now_ns);
+        }
+        self.servo.tick(&Inputs { now_ns: self.now_ns, ticks: 1, measured: &measured, devices: 0 })
     }
 
     fn drive(&mut self, drive: f64) -> Option<f64> {
@@ -89,6 +92,21 @@ fn starts_disarmed_at_zero_and_needs_a_controller_at_zero_to_arm() {
     bench.drive(0.0);
     assert_eq!(bench.ask(RequestKind::Arm), Outcome::Done);
     assert_eq!(bench.drive(3.0), Some(3.0));
+}
+
+/// The controller answers a disarming after it has sent the command that follows from it: whoever then asks to arm is
+/// heard behind that command, in the same tick too.
+#[test]
+fn an_arming_counts_behind_the_command_it_came_with() {
+    let mut bench = Bench::armed();
+    bench.drive(3.0);
+    assert_eq!(bench.ask(RequestKind::Disarm), Outcome::Done);
+    let (still, rest) = (bench.command(3.0), bench.command(0.0));
+    bench.servo.take_command(&still, bench.now_ns);
+    assert_eq!(bench.ask(RequestKind::Arm), Outcome::Refused, "it still asks for something");
+    bench.servo.take_command(&rest, bench.now_ns);
+    assert_eq!(bench.ask(RequestKind::Arm), Outcome::Done);
+    assert_eq!(bench.tick(None), Some(0.0));
 }
 
 #[test]
@@ -136,18 +154,13 @@ fn a_stalled_loop_and_a_sick_drive_trip() {
     let measured = Signals { current_a: 0.0, shaft_speed_rad_s: 0.0, ..Signals::UNKNOWN };
     bench.now_ns += 30 * MS;
     let command = bench.command(3.0);
-    let inputs =
-        Inputs { now_ns: bench.now_ns, ticks: 30, command: Some(&command), measured: &measured, devices: 0 };
+    bench.servo.take_command(&command, bench.now_ns);
+    let inputs = Inputs { now_ns: bench.now_ns, ticks: 30, measured: &measured, devices: 0 };
     assert_eq!(bench.servo.tick(&inputs), None);
     assert_eq!(bench.servo.faults(), Fault::LoopStalled.bit());
     let mut bench = Bench::armed();
-    let inputs = Inputs {
-        now_ns: bench.now_ns,
-        ticks: 1,
-        command: None,
-        measured: &measured,
-        devices: Fault::AmplifierFault.bit(),
-    };
+    let inputs =
+        Inputs { now_ns: bench.now_ns, ticks: 1, measured: &measured, devices: Fault::AmplifierFault.bit() };
     assert_eq!(bench.servo.tick(&inputs), None);
     assert_eq!(bench.servo.faults(), Fault::AmplifierFault.bit());
     assert_eq!(bench.ask(RequestKind::ClearFaults), Outcome::Refused, "the drive still says so");
