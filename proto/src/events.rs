@@ -51,6 +51,8 @@ pub enum EventKind {
     RigChanged,
     /// The revision of the rig description before is in force again.
     RigRolledBack,
+    /// The thrust error is larger since the revision of the rig description in force than before it.
+    RigWorse,
     /// A diagnosis was begun.
     DiagnosisStarted,
     /// A diagnosis is done.

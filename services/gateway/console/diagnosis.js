@@ -104,23 +104,28 @@ click("use", async () => {
   if (!confirm(`Put this in force on ${thruster}, also while it drives?\n\n${lines(would.difference).join("\n")}`)) return;
   came(await call("POST", `${base()}/rig`, wanted));
 });
-click("back", async () => came(await call("POST", `${base()}/rig/rollback`)));
+const goBack = async () => came(await call("POST", `${base()}/rig/rollback`));
+click("back", goBack);
+click("worse-back", goBack);
 function came(answer) {
   revised = { time_s: state.time_s, number: answer.in_force.number };
   log(`revision ${answer.in_force.number} of the rig is in force: ${lines(answer.difference).join(", ")}`);
   loadDiagnosis().catch(() => {});
 }
 
-// Thrust error, root mean square, over the minute before a revision came and since; what settles is left out.
+// What the service finds of the thrust error before a revision and since, under like commands; the way back is offered
+// at the top of the page too.
 function showError() {
   $("overlay").disabled = !revised || revised.time_s > state.time_s;
-  if ($("overlay").disabled) { says("error-text", ""); return; }
-  const before = live.rms("thrust_error_n", revised.time_s - ERROR_SPAN_S, revised.time_s);
-  const since = live.rms("thrust_error_n", Math.max(revised.time_s + SETTLE_S, state.time_s - ERROR_SPAN_S), state.time_s);
+  const trial = state.revision_trial;
+  $("worse").hidden = !trial?.larger;
+  $("worse-back").disabled = !trial?.larger || trial.before === null || isStale();
+  if (!trial) { says("error-text", ""); return; }
   const told = (n) => (n === null ? "not known yet" : `${n.toFixed(2)} N rms`);
-  const worse = before !== null && since !== null && since > 1.2 * before + 0.05;
-  says("error-text", `Thrust error: ${told(before)} in the minute before revision ${revised.number}, ${told(since)} since${worse ? ": larger than before. Back undoes it." : "."}`);
-  $("error-text").className = worse ? "warn-text" : "quiet";
+  const errors = `${told(trial.before_rms_n)} before revision ${trial.revision}, ${told(trial.since_rms_n)} since`;
+  says("error-text", `Thrust error under like commands (${trial.compared_s} s of them): ${errors}.`);
+  if (trial.larger) says("worse-text", `The thrust error is larger since revision ${trial.revision} of the rig: ${errors}.`);
+  $("error-text").className = trial.larger ? "warn-text" : "quiet";
 }
 
 // What can be diagnosed: the last minutes, or a recording that is done.

@@ -282,6 +282,12 @@ impl Bridge {
             recorder.offer(&self.link.thruster.id, &telemetry, lost);
             self.link.ring.take(&telemetry);
             self.held.take(&telemetry);
+            // On a line of its own: the log is written without the trial's lock.
+            let worse = self.link.thruster.trial().take(&telemetry);
+            if let Some(worse) = worse {
+                let id = &self.link.thruster.id;
+                self.link.events.tell(EventKind::RigWorse, Some(id), "gateway", worse.words());
+            }
             if telemetry.armed != 0 {
                 let shown = self.held.fill(telemetry).signals;
                 self.before = Some(Before::of(shown.thrust_n, shown.shaft_speed_rad_s));

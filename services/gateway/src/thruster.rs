@@ -21,6 +21,7 @@ use crate::excitation::ExcitationStep;
 use crate::heard::Heard;
 use crate::lease::{Lease, Wanted};
 use crate::problem::{Kind, Problem};
+use crate::rig::Trial;
 use crate::view::{
     BeforeView, DiagnosisStep, Estimated, FaultView, LeaseView, LimitView, MismatchView, ParameterEstimate,
     Setpoint, SetpointRange, ThrusterState, Values,
@@ -57,6 +58,7 @@ pub struct Thruster {
     rendered: Mutex<(Rendered, Bytes)>,
     /// Name and step of the diagnosis that runs, and when it began.
     diagnosis: Mutex<Option<(String, String, Instant)>>,
+    trial: Mutex<Trial>,
 }
 
 /// What a rendered state was made of: sample, desk, and whether the servo was silent.
@@ -86,6 +88,7 @@ impl Thruster {
             bell,
             events,
             diagnosis: Mutex::default(),
+            trial: Mutex::new(Trial::new(range.thrust_n)),
             rendered: Mutex::new(((u64::MAX, u64::MAX, false), Bytes::new())),
         };
         (thruster, inbox)
@@ -104,6 +107,11 @@ impl Thruster {
     /// A diagnosis of it has come so far, or is over.
     pub fn set_diagnosis(&self, at: Option<(String, String, Instant)>) {
         *lock(&self.diagnosis) = at;
+    }
+
+    /// How the thrust fares under the revision of the rig in force.
+    pub fn trial(&self) -> MutexGuard<'_, Trial> {
+        lock(&self.trial)
     }
 
     /// The desk, for the bus and the metrics.
@@ -259,6 +267,7 @@ impl Thruster {
                 step: step.clone(),
                 elapsed_s: now.saturating_duration_since(*began).as_secs_f64(),
             }),
+            revision_trial: self.trial().view(),
             excitation: desk.playing().map(|playing| ExcitationStep {
                 name: playing.signal.name.clone(),
                 elapsed_s: playing.elapsed_s(now),

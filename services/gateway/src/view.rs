@@ -10,6 +10,7 @@ use utoipa::{PartialSchema, ToSchema};
 
 use crate::excitation::ExcitationStep;
 use crate::extract::Object;
+use crate::rig::TrialView;
 
 /// Everything known of one thruster at one instant.
 #[derive(Clone, Debug, Serialize, ToSchema)]
@@ -48,6 +49,8 @@ pub struct ThrusterState {
     pub mismatch: Option<MismatchView>,
     /// The diagnosis of it that runs; null if none does.
     pub diagnosis: Option<DiagnosisStep>,
+    /// How the thrust fares since another revision of the rig came into force; null if none did since the gateway started.
+    pub revision_trial: Option<TrialView>,
     /// The test signal that plays; null if none does.
     pub excitation: Option<ExcitationStep>,
     /// Latched faults.

@@ -3,6 +3,7 @@
 
 mod book;
 mod difference;
+mod trial;
 
 use std::io;
 use std::path::Path;
@@ -28,6 +29,7 @@ use crate::view::SetpointRange;
 
 pub use book::{Book, Entry, Making, Revision, write_whole};
 pub use difference::{Change, differ};
+pub use trial::{Trial, TrialView};
 
 /// A controller has read, designed and taken over a revision within this time, or is taken to be away.
 const TAKEN_WITHIN: Duration = Duration::from_secs(6);
@@ -179,6 +181,7 @@ impl RigDesk {
             }
         };
         self.follow(&checked);
+        self.thruster.trial().revised(in_force.number, in_force.before);
         let Entry { number, revision, source, .. } = &in_force;
         let difference = difference::between(&text_before, text);
         let differs = difference::words(&difference);

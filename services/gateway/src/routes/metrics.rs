@@ -54,6 +54,7 @@ fn gather(app: &App) -> Families {
         energy(&mut families, thruster, tally);
         state(&mut families, thruster, tally);
         loops(&mut families, thruster, tally);
+        trial(&mut families, thruster);
         recordings(&mut families, &thruster.id, app);
     }
     service(&mut families, app);
@@ -298,6 +299,27 @@ fn state(families: &mut Families, thruster: &Thruster, tally: &Tally) {
                 parameter.std_error,
             );
         }
+    }
+}
+
+/// How the thrust fares since another revision of the rig came into force.
+fn trial(families: &mut Families, thruster: &Thruster) {
+    let Some(trial) = thruster.trial().view() else { return };
+    let label = [("thruster", thruster.id.as_str())];
+    families.gauge(
+        "rig_revision_worse",
+        "Is the thrust error larger under the rig's revision in force than under the one before?",
+        &label,
+        f64::from(trial.larger),
+    );
+    let errors = [("before", trial.before_rms_n), ("since", trial.since_rms_n)];
+    for (when, rms_n) in errors {
+        families.gauge(
+            "rig_revision_thrust_error_newtons",
+            "Root mean square of the thrust error before the rig's revision in force and since, under like commands.",
+            &[("thruster", thruster.id.as_str()), ("when", when)],
+            rms_n.unwrap_or(f64::NAN),
+        );
     }
 }
 
