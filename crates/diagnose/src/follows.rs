@@ -23,6 +23,8 @@ const POINTS: usize = 7;
 const COARSE: usize = 4;
 /// Time constants of the slow parts that an input is compared with, s: a transient of the rotor, one of the water.
 const MEMORIES_S: [f64; 2] = [0.3, 1.5];
+/// Draws that fill an interval evenly: multiples of the golden section, less the whole ones.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
 /// Penalties of a weight's square, as shares of what an even spread of all samples over the points would give.
 const RIDGES: [f64; 3] = [1e-3, 1e-2, 1e-1];
 
@@ -39,8 +41,7 @@ pub fn follows(problem: &Problem, fit: &Fit, residual: &Stack) -> Vec<Vec<f64>> 
             // A sensor slower than the log keeps all its samples.
             let few = channel.rows.len() * every < recording.time_s.len() * 2;
             let every = if few { 1 } else { every };
-            let picks =
-                (0..channel.rows.len()).step_by(every).filter(|k| !problem.masked[r][channel.rows[*k]]);
+            let picks = spread(channel.rows.len(), every).filter(|k| !problem.masked[r][channel.rows[*k]]);
             let picks: Vec<usize> = picks.collect();
             let rows: Vec<(usize, usize)> = picks.iter().map(|k| (r, channel.rows[*k])).collect();
             let errors: Vec<f64> = picks.iter().map(|k| residual[r][c][*k]).collect();
@@ -61,6 +62,13 @@ pub fn follows(problem: &Problem, fit: &Fit, residual: &Stack) -> Vec<Vec<f64>> 
         group.sizes(&features).into_iter().for_each(|(c, size)| out[*r][c] = size);
     }
     out
+}
+
+/// One of every so many samples, at no fixed stride: a log beats with the sensor behind it, and a stride that keeps
+/// time with the beat would take its error for one of the machine.
+fn spread(samples: usize, every: usize) -> impl Iterator<Item = usize> {
+    let at = move |j: usize| j * every + ((j as f64 * GOLDEN).fract() * every as f64) as usize;
+    (0..samples.div_ceil(every)).map(at).filter(move |k| *k < samples)
 }
 
 /// Errors of channels that are sampled on the same rows.
@@ -198,7 +206,7 @@ fn hats(points: usize, at: f64) -> impl Iterator<Item = f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::follows;
+    use super::{follows, spread};
     use crate::stand;
 
     fn of(error: impl Fn(f64, f64, f64) -> f64) -> f64 {
@@ -209,6 +217,15 @@ mod tests {
     fn an_error_that_is_a_function_of_the_speed_follows_under_noise_as_large() {
         let size = of(|speed, _, noise| (2.0 * speed).sin() + noise);
         assert!((0.55..0.85).contains(&size), "{size} of {}", 0.5_f64.sqrt());
+    }
+
+    #[test]
+    fn samples_are_picked_in_order_at_no_fixed_stride() {
+        assert!(spread(7, 1).eq(0..7));
+        let picks: Vec<usize> = spread(4000, 2).collect();
+        assert!(picks.windows(2).all(|w| w[1] > w[0]) && picks.len() == 2000);
+        let odd = picks.iter().filter(|k| *k % 2 == 1).count();
+        assert!((900..1100).contains(&odd), "{odd} of 2000");
     }
 
     #[test]
