@@ -112,19 +112,29 @@ pub fn decide(explanations: &[Explanation], circumstances: &Circumstances) -> De
     Decision { verdict, named, term }
 }
 
-/// Effects that stand in a member's place in sets that are else the same and likely enough to be stated.
+/// Effects that stand in a member's place, alone or two together, in sets that are else the same and likely enough
+/// to be stated.
 fn rivals(explanations: &[Explanation], best: &Set, member: &str) -> Vec<&'static str> {
     let rest: Vec<&str> = best.iter().copied().filter(|id| *id != member).collect();
+    let likely = explanations.first().map_or(0.0, |e| e.probability);
     let mut out = Vec::new();
-    for other in explanations.iter().filter(|e| e.set.len() == best.len()) {
+    for other in explanations {
         let new: Vec<&'static str> = other.set.iter().copied().filter(|id| !best.contains(id)).collect();
-        if let [new] = new[..]
+        let near = match new[..] {
+            [new] => presence(explanations, new, 1.0) >= NEAR * presence(explanations, member, 1.0),
+            [_, _] => other.probability >= NEAR * likely,
+            _ => false,
+        };
+        if near
+            && other.set.len() == rest.len() + new.len()
             && rest.iter().all(|id| other.set.contains(id))
-            && !is_term(new)
-            && presence(explanations, new, 1.0) >= NEAR * presence(explanations, member, 1.0)
-            && !out.contains(&new)
+            && !new.iter().any(|id| is_term(id))
         {
-            out.push(new);
+            new.into_iter().for_each(|id| {
+                if !out.contains(&id) {
+                    out.push(id);
+                }
+            });
         }
     }
     out
@@ -190,6 +200,20 @@ mod tests {
         let (once, twice) = (decided(with_term, &usual), decided(with_term, &much));
         assert!((once.named[0].probability - twice.named[0].probability).abs() < 1e-12);
         assert_eq!(beside.verdict, Verdict::PartlyExplained);
+    }
+
+    #[test]
+    fn two_effects_in_the_place_of_one_are_its_rivals() {
+        let usual = Circumstances { beside_unknown: 0.75, ..Circumstances::default() };
+        let with = |cost: f64| {
+            let pair: &[&'static str] = &["coulomb_friction", "torque_channel_bias"];
+            decided(&[(&["direction_dependent_friction"], 0.0), (pair, cost), (&[], 90.0)], &usual)
+        };
+        let (near, far) = (with(6.0), with(30.0));
+        assert_eq!(near.verdict, Verdict::Ambiguous);
+        assert_eq!(near.named[0].rivals, ["coulomb_friction", "torque_channel_bias"]);
+        assert_eq!(far.verdict, Verdict::Explained);
+        assert_eq!(far.named.len(), 1);
     }
 
     #[test]

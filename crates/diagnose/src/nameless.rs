@@ -10,6 +10,7 @@ macro_rules! nameless {
             commonness: 0.2,
             shifts_time: false,
             nonparametric: true,
+            same_as: &[],
             forms: &[],
             $($field: $value,)*
         }

@@ -158,6 +158,9 @@ impl<'a, 'p> Search<'a, 'p> {
                 near.iter().for_each(|set| self.reshape(set));
                 next = self.better(best.clone(), near);
                 if self.cost(&next) >= before - 1e-9 {
+                    next = self.stand_in(&best);
+                }
+                if self.cost(&next) >= before - 1e-9 {
                     return best;
                 }
             }
@@ -191,6 +194,32 @@ impl<'a, 'p> Search<'a, 'p> {
             }
             return best;
         }
+    }
+
+    /// Fits what does the same as a member in its place: the data part them no further than their prior odds. The
+    /// best set.
+    fn stand_in(&mut self, set: &Set) -> Set {
+        let mut tried = Vec::new();
+        for member in set {
+            let same = self.descriptor(member).map_or(&[][..], |effect| effect.same_as);
+            let offered: Vec<_> = self.effects.iter().copied().filter(|e| same.contains(&e.id)).collect();
+            if same.is_empty() || offered.len() < same.len() || same.iter().any(|id| set.contains(id)) {
+                continue;
+            }
+            let mut place: Set = set.iter().copied().filter(|m| m != member).collect();
+            self.ensure(&place, set);
+            for effect in offered {
+                let Some(parent) = self.fits.get(&place).cloned() else { break };
+                let new = Member::new(effect, &self.problem.scale);
+                let hypothesis = parent.hypothesis.with(&parent.values, new, &self.problem.scale);
+                place.push(effect.id);
+                place.sort_unstable();
+                self.fit_set(place.clone(), &hypothesis, &parent.columns, &parent.actions);
+            }
+            self.reshape(&place);
+            tried.push(place);
+        }
+        self.better(set.clone(), tried)
     }
 
     /// Leaves members out as long as that helps.

@@ -176,10 +176,15 @@ impl<'a, 'p> Writer<'a, 'p> {
                     let heldout = self.score(&smaller_trained, &last_trained);
                     self.finding(named, self.last, heldout, Some(&located))
                 } else {
-                    let mut swapped: Set = self.best.iter().copied().filter(|id| *id != member).collect();
-                    swapped.push(named.effect);
-                    swapped.sort_unstable();
-                    let Some(fit) = self.search.fits.get(&swapped) else { continue };
+                    // In the likeliest set that has it in the member's place, alone or beside another.
+                    let rest = self.best.iter().filter(|id| **id != member);
+                    let stands_in = |e: &&Explanation| {
+                        e.set.contains(&named.effect)
+                            && !e.set.contains(&member)
+                            && rest.clone().all(|id| e.set.contains(id))
+                    };
+                    let swapped = self.explanations.iter().find(stands_in);
+                    let Some(fit) = swapped.and_then(|e| self.search.fits.get(&e.set)) else { continue };
                     let heldout = self.score(&smaller_trained, &self.trained(fit));
                     self.finding(named, fit, heldout, None)
                 };

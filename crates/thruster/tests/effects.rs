@@ -481,3 +481,12 @@ fn axial_flow_dynamics_makes_model_2_of_the_static_models() {
         assert!(bench.difference(&run(model, &[]), &wanted) > 1e-3, "{model}");
     }
 }
+
+#[test]
+fn what_does_the_same_together_is_in_the_catalogue() {
+    for effect in ALL {
+        assert_ne!(effect.same_as.len(), 1, "{}: two names of one effect", effect.id);
+        let known = |id: &&str| *id != effect.id && effects::find(id).is_some();
+        assert!(effect.same_as.iter().all(known), "{}: {:?}", effect.id, effect.same_as);
+    }
+}

@@ -21,6 +21,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     commonness: 0.2,
     shifts_time: false,
     nonparametric: true,
+    same_as: &[],
     forms: &[],
     parameters,
     starts: one_start,

@@ -18,6 +18,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     commonness: 0.3,
     shifts_time: false,
     nonparametric: true,
+    same_as: &[],
     forms: &[],
     parameters,
     starts: one_start,

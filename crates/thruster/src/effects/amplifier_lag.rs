@@ -20,6 +20,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     commonness: 3.0,
     shifts_time: false,
     nonparametric: false,
+    same_as: &[],
     forms: &[&[0], &[1]],
     parameters,
     starts: |scale| {

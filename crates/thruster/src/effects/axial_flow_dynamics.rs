@@ -22,6 +22,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     commonness: 3.0,
     shifts_time: false,
     nonparametric: false,
+    same_as: &[],
     forms: &[],
     parameters,
     starts: |_| vec![vec![1.0, 1.0, 1.0, 2.5, 1.0]],

@@ -22,6 +22,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     commonness: 0.3,
     shifts_time: false,
     nonparametric: false,
+    same_as: &[],
     forms: &[],
     parameters,
     starts: |_| vec![vec![0.1, 0.17, 1.0], vec![0.1, 0.28, 1.0], vec![0.1, 0.35, 1.0], vec![0.1, 0.28, 4.0]],

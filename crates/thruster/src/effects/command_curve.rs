@@ -25,6 +25,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     commonness: 1.5,
     shifts_time: false,
     nonparametric: false,
+    same_as: &[],
     forms: &[&[0], &[0, 1], &[3, 4, 5, 6]],
     parameters,
     starts: |scale| {

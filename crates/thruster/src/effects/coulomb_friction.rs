@@ -26,6 +26,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     commonness: 4.0,
     shifts_time: false,
     nonparametric: false,
+    same_as: &[],
     forms: &[&[0], &[0, 1, 2]],
     parameters,
     starts: |scale| {

@@ -19,6 +19,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     commonness: 0.7,
     shifts_time: false,
     nonparametric: false,
+    same_as: &[],
     forms: &[],
     parameters,
     starts: |_| [0.05, 0.25, 0.4, 0.6].iter().map(|cut| vec![*cut]).collect(),

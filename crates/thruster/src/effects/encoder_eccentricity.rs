@@ -21,6 +21,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     commonness: 0.7,
     shifts_time: false,
     nonparametric: false,
+    same_as: &[],
     forms: &[&[0, 1], &[2, 3], &[0, 1, 2, 3]],
     parameters,
     starts: one_start,

@@ -28,6 +28,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     commonness: 2.0,
     shifts_time: false,
     nonparametric: false,
+    same_as: &[],
     forms: &[&[0], &[1], &[0, 1], &[1, 2]],
     parameters,
     starts: |_| vec![vec![0.03, 0.03, 0.0], vec![0.1, 0.1, 0.0]],

@@ -20,6 +20,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     commonness: 1.0,
     shifts_time: false,
     nonparametric: false,
+    same_as: &[],
     forms: &[],
     parameters,
     starts: one_start,

@@ -23,6 +23,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     commonness: 1.5,
     shifts_time: false,
     nonparametric: false,
+    same_as: &[],
     forms: &[&[2], &[3], &[2, 3], &[0, 4], &[1, 4], &[0, 1, 4], &[0, 1, 2, 3, 4]],
     parameters,
     starts: |scale| {

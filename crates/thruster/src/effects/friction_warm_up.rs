@@ -24,6 +24,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     commonness: 1.0,
     shifts_time: false,
     nonparametric: false,
+    same_as: &[],
     forms: &[&[0, 2], &[1, 2], &[0, 1, 2]],
     parameters,
     starts: |scale| {

@@ -22,6 +22,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     commonness: 0.7,
     shifts_time: false,
     nonparametric: false,
+    same_as: &[],
     forms: &[],
     parameters,
     starts: |_| [0.003, 0.02, 0.3, 0.9].iter().map(|play| vec![*play, 0.4]).collect(),

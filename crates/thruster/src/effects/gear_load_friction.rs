@@ -24,6 +24,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     commonness: 1.0,
     shifts_time: false,
     nonparametric: false,
+    same_as: &[],
     forms: &[],
     parameters,
     starts: |_| vec![vec![0.1], vec![0.25]],

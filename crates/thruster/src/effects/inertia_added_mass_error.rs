@@ -23,6 +23,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     commonness: 1.0,
     shifts_time: false,
     nonparametric: false,
+    same_as: &[],
     forms: &[],
     parameters,
     starts: |_| vec![vec![-0.3], vec![1.0]],

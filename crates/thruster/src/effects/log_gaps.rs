@@ -18,6 +18,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     commonness: 1.0,
     shifts_time: false,
     nonparametric: false,
+    same_as: &[],
     forms: &[],
     parameters: |_| Vec::new(),
     starts: one_start,

@@ -131,6 +131,8 @@ pub struct Descriptor {
     pub shifts_time: bool,
     /// It changes freely with time (knots), and so can stand in for almost anything.
     pub nonparametric: bool,
+    /// Effects that do together exactly what this one does, under any excitation: no recording parts them.
+    pub same_as: &'static [&'static str],
     /// Which of its parameters make sense without the others, by their places; none listed: all together.
     /// Those left out of a form stay at their prior means. See [`Descriptor::forms`].
     pub forms: &'static [&'static [usize]],

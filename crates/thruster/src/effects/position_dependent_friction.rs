@@ -19,6 +19,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     commonness: 0.5,
     shifts_time: false,
     nonparametric: false,
+    same_as: &[],
     forms: &[&[0, 1, 2], &[0, 3, 4], &[0, 1, 2, 3, 4]],
     parameters,
     starts: |scale| {

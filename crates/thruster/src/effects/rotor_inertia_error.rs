@@ -23,6 +23,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     commonness: 2.0,
     shifts_time: false,
     nonparametric: false,
+    same_as: &[],
     forms: &[],
     parameters,
     starts: one_start,

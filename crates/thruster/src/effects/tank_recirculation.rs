@@ -18,6 +18,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     commonness: 0.7,
     shifts_time: false,
     nonparametric: false,
+    same_as: &[],
     forms: &[],
     parameters,
     starts: |_| vec![vec![0.05, 2.0], vec![0.05, 4.0], vec![0.05, 20.0], vec![0.05, 50.0]],

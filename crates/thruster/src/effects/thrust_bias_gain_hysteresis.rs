@@ -18,6 +18,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     commonness: 3.0,
     shifts_time: false,
     nonparametric: false,
+    same_as: &[],
     forms: &[&[1], &[0], &[0, 1], &[2, 3], &[0, 1, 2, 3]],
     parameters,
     starts: one_start,

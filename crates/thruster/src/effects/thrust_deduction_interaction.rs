@@ -23,6 +23,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     commonness: 0.5,
     shifts_time: false,
     nonparametric: false,
+    same_as: &[],
     forms: &[&[0], &[1], &[0, 1]],
     parameters,
     starts: one_start,

@@ -36,6 +36,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     commonness: 1.5,
     shifts_time: false,
     nonparametric: false,
+    same_as: &[],
     forms: FORMS,
     parameters,
     starts,

@@ -18,6 +18,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     commonness: 3.0,
     shifts_time: true,
     nonparametric: false,
+    same_as: &[],
     forms: &[],
     parameters,
     starts: |_| [0.02, 0.05, 0.1].map(|delay| vec![delay]).to_vec(),

@@ -19,6 +19,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     commonness: 0.5,
     shifts_time: false,
     nonparametric: false,
+    same_as: &[],
     forms: &[],
     parameters: |_: &Scale| vec![Spec::switch("unsigned")],
     starts: one_start,

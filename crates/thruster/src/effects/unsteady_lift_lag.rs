@@ -22,6 +22,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     commonness: 0.5,
     shifts_time: false,
     nonparametric: false,
+    same_as: &[],
     forms: &[&[0], &[0, 1]],
     parameters,
     starts: |_| vec![vec![0.5, 0.2], vec![0.5, 1.5]],

@@ -19,6 +19,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     commonness: 1.0,
     shifts_time: false,
     nonparametric: false,
+    same_as: &[],
     forms: &[&[0], &[0, 1]],
     parameters,
     starts,

@@ -18,6 +18,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     commonness: 0.7,
     shifts_time: false,
     nonparametric: false,
+    same_as: &[],
     forms: &[],
     parameters,
     starts: one_start,
