@@ -9,6 +9,7 @@
 //! Additive Models), its weights held small (ridge) by what does best on stretches left out (Stone 1974, J. R. Stat.
 //! Soc. B 36:111).
 
+use kort_identify::between::evenly;
 use kort_identify::fit::Fit;
 use kort_identify::simulate::{Problem, Stack};
 use kort_thruster::plant::Sensed;
@@ -23,8 +24,6 @@ const POINTS: usize = 7;
 const COARSE: usize = 4;
 /// Time constants of the slow parts that an input is compared with, s: a transient of the rotor, one of the water.
 const MEMORIES_S: [f64; 2] = [0.3, 1.5];
-/// Draws that fill an interval evenly: multiples of the golden section, less the whole ones.
-const GOLDEN: f64 = 0.618_033_988_749_894_9;
 /// Penalties of a weight's square, as shares of what an even spread of all samples over the points would give.
 const RIDGES: [f64; 3] = [1e-3, 1e-2, 1e-1];
 
@@ -67,7 +66,7 @@ pub fn follows(problem: &Problem, fit: &Fit, residual: &Stack) -> Vec<Vec<f64>> 
 /// One of every so many samples, at no fixed stride: a log beats with the sensor behind it, and a stride that keeps
 /// time with the beat would take its error for one of the machine.
 fn spread(samples: usize, every: usize) -> impl Iterator<Item = usize> {
-    let at = move |j: usize| j * every + ((j as f64 * GOLDEN).fract() * every as f64) as usize;
+    let at = move |j: usize| j * every + (evenly(j) * every as f64) as usize;
     (0..samples.div_ceil(every)).map(at).filter(move |k| *k < samples)
 }
 

@@ -14,8 +14,11 @@ use crate::data::{Driving, Prepared};
 use crate::hypothesis::{Hypothesis, Inputs};
 use crate::simulate::Problem;
 
-/// Draws that fill an interval evenly: multiples of the golden section, less the whole ones.
-const GOLDEN: f64 = 0.618_033_988_749_894_9;
+/// Draws from 0 to 1 that fill it evenly and beat with nothing: multiples of the golden section, less the whole ones.
+pub fn evenly(k: usize) -> f64 {
+    const GOLDEN: f64 = 0.618_033_988_749_894_9;
+    (k as f64 * GOLDEN).fract()
+}
 
 /// Share of the change from a sample to the next that the samples about it do not foretell: none where they lie on a
 /// parabola, all in noise and at a jump.
@@ -72,7 +75,7 @@ impl Prepared {
             let (start_s, end_s) = (self.time_s[row], self.time_s[row + 1]);
             let u = ((tick.time_s + 0.5 * self.tick_s - start_s) / (end_s - start_s)).clamp(0.0, 1.0);
             let straight = from + (to - from) * u;
-            let jumped = if u < (row as f64 * GOLDEN).fract() { from } else { to };
+            let jumped = if u < evenly(row) { from } else { to };
             let aside = unforetold(values, row) * (jumped - straight);
             *command += aside;
             let mean = |a: f64, b: f64| 0.5 * (a + b) + aside;

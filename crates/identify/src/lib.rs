@@ -3,7 +3,7 @@
 //! Data go one way: recording, data (checks, edges), hypothesis (free numbers, priors, effects), simulate,
 //! noise, fit.
 
-mod between;
+pub mod between;
 pub mod checks;
 pub mod data;
 pub mod edges;

@@ -5,7 +5,8 @@ use super::{Driving, Prepared};
 use super::fill::catmull_rom;
 
 impl Prepared {
-    /// The command, or the measured current that drives in its place, at every control tick, where its edges came so many ticks before their rows.
+    /// The command, or the measured current that drives in its place, at every control tick, where its edges came so
+    /// many ticks before their rows.
     pub fn commands(&self, ticks_before: &[usize]) -> Vec<f64> {
         let ticks = self.stimulus.ticks.len();
         if matches!(self.driving, Driving::Speed | Driving::Power) {
