@@ -256,8 +256,10 @@ impl Stack {
         loop {
             self.command(newton, ttl_ms);
             let there = |t: &Telemetry| (t.signals.thrust_n - newton).abs() < 0.2 * newton.abs();
-            let t = self.watch().until("the thrust to be there, or a trip", |t| there(t) || t.faults != 0);
-            if there(&t) {
+            // A trip of the controller shows as disarmed, without a fault of the servo's own.
+            let tripped = |t: &Telemetry| t.faults != 0 || t.armed == 0;
+            let t = self.watch().until("the thrust to be there, or a trip", |t| there(t) || tripped(t));
+            if !tripped(&t) {
                 return;
             }
             assert!(Instant::now() < end, "it trips again and again: {t:?}");
@@ -349,23 +351,18 @@ impl Drop for Stack {
     }
 }
 
-/// Children of a process with their role, the first argument.
+/// Children of a process with their role, the first argument; no zombies.
 pub fn children(parent: u32) -> Vec<(u32, String)> {
-    let mut found = Vec::new();
-    for entry in std::fs::read_dir("/proc").unwrap().flatten() {
-        let Some(pid) = entry.file_name().to_str().and_then(|n| n.parse::<u32>().ok()) else { continue };
-        let Ok(stat) = std::fs::read_to_string(entry.path().join("stat")) else { continue };
-        let Some((_, rest)) = stat.rsplit_once(')') else { continue };
-        let mut fields = rest.split_whitespace();
-        let (state, ppid) = (fields.next(), fields.next());
-        if state == Some("Z") || ppid != Some(parent.to_string().as_str()) {
-            continue;
-        }
-        let line = std::fs::read(entry.path().join("cmdline")).unwrap_or_default();
-        let role = line.split(|b| *b == 0).nth(1).map(|r| String::from_utf8_lossy(r).into_owned());
-        found.push((pid, role.unwrap_or_default()));
-    }
-    found
+    let threads = std::fs::read_dir(format!("/proc/{parent}/task")).into_iter().flatten().flatten();
+    let lists = threads.filter_map(|thread| std::fs::read_to_string(thread.path().join("children")).ok());
+    let pids: Vec<u32> = lists
+        .flat_map(|list| list.split(' ').filter_map(|pid| pid.parse().ok()).collect::<Vec<_>>())
+        .collect();
+    let role = |pid: &u32| {
+        let line = std::fs::read(format!("/proc/{pid}/cmdline")).unwrap_or_default();
+        line.split(|b| *b == 0).nth(1).map(|role| String::from_utf8_lossy(role).into_owned())
+    };
+    pids.into_iter().filter_map(|pid| Some((pid, role(&pid).filter(|_| alive(pid))?))).collect()
 }
 
 /// Is a process there (and no zombie)?

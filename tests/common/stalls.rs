@@ -4,6 +4,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
+use kort_proto::transport::realtime;
+
 /// How late a thread that only sleeps wakes: what the machine holds up, it holds up every process with.
 #[derive(Clone, Default)]
 pub struct Stalls(Arc<AtomicU64>);
@@ -11,9 +13,20 @@ pub struct Stalls(Arc<AtomicU64>);
 impl Stalls {
     /// Begins to look.
     pub fn watch() -> Self {
+        Self::watch_by(|| ())
+    }
+
+    /// The same by a real-time thread, between servo and controller, where that is permitted: what holds it up too, is
+    /// the host.
+    pub fn watch_in_real_time() -> Self {
+        Self::watch_by(|| drop(realtime(75, false)))
+    }
+
+    fn watch_by(prepare: impl FnOnce() + Send + 'static) -> Self {
         let stalls = Self::default();
         let weak = Arc::downgrade(&stalls.0);
         std::thread::spawn(move || {
+            prepare();
             const NAP: Duration = Duration::from_millis(5);
             loop {
                 let asleep = Instant::now();

@@ -131,20 +131,26 @@ pub fn full(table: &mut Table) {
     drop(disk);
 }
 
-/// A tracer that holds up every write of a recording, as a slow disk does.
+/// A tracer that holds up every write of a recording, as a slow disk does: it follows the recording's thread alone, for
+/// what it follows stands still at every call of the system.
 struct SlowDisk(Child);
 
 impl SlowDisk {
     fn under(process: u32, files: &[&Path], write_takes: Duration) -> Option<SlowDisk> {
+        let thread = wait("the recording's thread", || {
+            let threads = std::fs::read_dir(format!("/proc/{process}/task")).ok()?;
+            let name = |thread: &Path| std::fs::read_to_string(thread.join("comm")).unwrap_or_default();
+            threads.flatten().map(|thread| thread.path()).find(|thread| name(thread).trim() == "record")
+        });
         let mut command = Command::new("strace");
-        command.args(["-f", "-q", "-o", "/dev/null", "-p", &process.to_string(), "-e", "trace=write"]);
+        command.args(["-q", "-o", "/dev/null", "-e", "trace=write", "-p"]).arg(thread.file_name()?);
         command.args(["-e", &format!("inject=write:delay_enter={}", write_takes.as_micros())]);
         for file in files {
             command.arg("-P").arg(file);
         }
         let mut tracer = SlowDisk(command.stdin(Stdio::null()).stderr(Stdio::null()).spawn().ok()?);
         let traced = wait("the tracer", || {
-            let status = std::fs::read_to_string(format!("/proc/{process}/status")).ok()?;
+            let status = std::fs::read_to_string(thread.join("status")).ok()?;
             let by = status.lines().find_map(|line| line.strip_prefix("TracerPid:"))?.trim();
             let ended = tracer.0.try_wait().is_ok_and(|status| status.is_some());
             (by != "0" || ended).then_some(!ended)

@@ -1,6 +1,7 @@
 //! Processes killed and stopped at random instants.
 
 use std::cell::Cell;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use kort_proto::faults::Fault;
@@ -8,7 +9,7 @@ use kort_proto::transport::monotonic_ns;
 
 use rustix::process::{Pid, Signal, kill_process};
 
-use crate::common::{PERIOD_NS, Stack, at_zero, in_real_time, wait};
+use crate::common::{PERIOD_NS, Stack, Stalls, at_zero, in_real_time, wait};
 use crate::table::Table;
 
 const LEASE_MS: u64 = 60_000;
@@ -36,52 +37,78 @@ fn asked(name: &str) -> Option<usize> {
     std::env::var(name).ok().and_then(|n| n.parse().ok())
 }
 
-/// Kills between two fresh deployments: some at once after another, and some that the supervisor answers later and later.
-const BATCH: usize = 10;
+/// Kills between two fresh deployments: some at once after another, and one that the supervisor answers later. More of
+/// those at every so many batches, and it answers later and later.
+const SHORT: usize = 6;
+const LONG: usize = 12;
+const LONG_EVERY: usize = 5;
 
 /// A number that looks random and is the same in every run.
 fn scatter(n: usize, below: u64) -> u64 {
     (n as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(31) % below
 }
 
-/// Kill -9 under way, at instants spread over a controller period and more. Each process has lanes of its own, side by
-/// side; a batch in which the machine stood still is gone through again.
+/// So many kills in batches, each for a deployment of its own.
+fn batches(kills: usize) -> impl Iterator<Item = Vec<usize>> {
+    let mut numbers = 0..kills;
+    (1..).map_while(move |batch: usize| {
+        let size = if batch.is_multiple_of(LONG_EVERY) { LONG } else { SHORT };
+        Some(numbers.by_ref().take(size).collect()).filter(|batch: &Vec<usize>| !batch.is_empty())
+    })
+}
+
+/// Kill -9 under way, at instants spread over a controller period and more. Lanes take batch after batch, each on a
+/// deployment of its own, side by side; a batch in which the machine stood still is gone through again.
 pub fn killed(table: &mut Table) {
-    let (kills, lanes) = (asked("KORT_FAULT_KILLS").unwrap_or(12), asked("KORT_FAULT_LANES").unwrap_or(1));
+    let (kills, lanes) = (asked("KORT_FAULT_KILLS").unwrap_or(200), asked("KORT_FAULT_LANES").unwrap_or(12));
     let end = asked("KORT_FAULT_MINUTES").map(|m| Instant::now() + Duration::from_secs(60 * m as u64));
     let roles = [
         ("servo", "successor at zero, fault latched", SUCCESSOR),
         ("controller", "zero torque, fault latched", CONTROLLER),
         ("gateway", "ramped to zero, fault latched", GATEWAY),
     ];
-    let measured = std::thread::scope(|scope| {
-        let lane = |role, at: usize| {
-            let numbers: Vec<usize> = (0..kills).skip(at).step_by(lanes.max(1)).collect();
-            scope.spawn(move || {
-                let in_time = |_: &&[usize]| end.is_none_or(|end| Instant::now() < end);
-                let batches = numbers.chunks(BATCH).take_while(in_time);
-                batches.flat_map(|batch| killed_at(role, batch)).collect::<Vec<_>>()
-            })
-        };
-        let lanes = roles.map(|(role, ..)| (0..lanes.max(1)).map(|at| lane(role, at)).collect::<Vec<_>>());
-        lanes.map(|lanes| {
-            let ended = lanes.into_iter().map(|lane| lane.join());
-            ended
-                .flat_map(|lane| lane.unwrap_or_else(|why| std::panic::resume_unwind(why)))
-                .collect::<Vec<_>>()
-        })
+    // The three in turn, so that whatever the machine does falls on all alike.
+    let mut waiting = roles.each_ref().map(|(role, ..)| batches(kills).map(move |batch| (*role, batch)));
+    let waiting = std::iter::from_fn(move || {
+        let turn: Vec<_> = waiting.iter_mut().filter_map(Iterator::next).collect();
+        (!turn.is_empty()).then_some(turn)
     });
-    for ((role, what, bound), measured) in roles.into_iter().zip(measured) {
-        let took: Vec<Duration> = measured.iter().map(|kill| kill.took).collect();
+    let (waiting, measured) = (Mutex::new(waiting.flatten()), Mutex::new(Vec::new()));
+    std::thread::scope(|scope| {
+        for _ in 0..lanes.max(1) {
+            scope.spawn(|| {
+                while end.is_none_or(|end| Instant::now() < end) {
+                    let Some((role, batch)) = lock(&waiting).next() else { return };
+                    let killed = killed_at(role, &batch);
+                    lock(&measured).extend(killed.into_iter().map(|killed| (role, killed)));
+                }
+            });
+        }
+    });
+    let measured = lock(&measured);
+    for (role, what, bound) in roles {
+        let of_role = || measured.iter().filter(|(of, _)| *of == role).map(|(_, killed)| killed);
+        let took: Vec<Duration> = of_role().map(|kill| kill.took).collect();
         if role != "gateway" {
             table.row(format!("{role} killed (-9)"), what, bound, &took);
             continue;
         }
-        let in_time: Vec<Duration> =
-            measured.iter().map(|kill| kill.took.saturating_sub(kill.late)).collect();
+        let in_time: Vec<Duration> = of_role().map(|kill| kill.took.saturating_sub(kill.late)).collect();
         table.row(format!("{role} killed (-9), the controller's ticks in time"), what, bound, &in_time);
         table.row(format!("{role} killed (-9), however late its ticks"), what, GATEWAY_LATE, &took);
+        let mut latest: Vec<&Killed> = of_role().collect();
+        latest.sort_by_key(|kill| std::cmp::Reverse(kill.late));
+        for Killed { took, late, stood_ms } in latest.into_iter().take(3) {
+            println!(
+                "gateway killed, at zero after {took:.0?}: commands late by {late:.0?}, a sleeping real-time thread by {stood_ms} ms"
+            );
+        }
     }
+}
+
+/// What a lane that failed held stays usable for the others: the scope tells the failure.
+fn lock<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
+    of.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// What came of a kill.
@@ -91,26 +118,29 @@ struct Killed {
     took: Duration,
     /// By so much did the controller's commands come late meanwhile, all together.
     late: Duration,
+    /// So long was a real-time thread that only sleeps held up at once, ms.
+    stood_ms: f64,
 }
 
 /// What each of these kills of a process took, on a deployment of its own.
 fn killed_at(role: &str, numbers: &[usize]) -> Vec<Killed> {
     let measured = std::cell::RefCell::new(Vec::new());
     in_real_time(|| {
-        let mut stack = Stack::start();
-        *measured.borrow_mut() = numbers.iter().map(|n| kill_once(&mut stack, role, *n)).collect();
+        let (mut stack, stalls) = (Stack::start(), Stalls::watch_in_real_time());
+        *measured.borrow_mut() = numbers.iter().map(|n| kill_once(&mut stack, &stalls, role, *n)).collect();
     });
     measured.into_inner()
 }
 
 /// Kills a process under way; how long it took until the thruster was at zero.
-fn kill_once(stack: &mut Stack, role: &str, n: usize) -> Killed {
+fn kill_once(stack: &mut Stack, stalls: &Stalls, role: &str, n: usize) -> Killed {
     stack.thrust(30.0, LEASE_MS);
     std::thread::sleep(Duration::from_micros(scatter(n, 60_000)));
     let mut watch = stack.watch();
     let first = watch.next();
     let session = first.header.session;
     let victim = stack.process_of(role);
+    stalls.take_ms();
     let killed_ns = monotonic_ns();
     kill(victim, Signal::KILL);
     let (command_ns, late_ns) = (Cell::new(first.command_stamp_ns), Cell::new(0));
@@ -123,6 +153,7 @@ fn kill_once(stack: &mut Stack, role: &str, n: usize) -> Killed {
             at_zero(t)
         }),
     };
+    let stood_ms = stalls.take_ms();
     assert!(at_zero(&zero), "{role}: {zero:?}");
     wait("the fault to be shown", || {
         let faults = stack.state()?["faults"].as_array()?.len();
@@ -133,6 +164,7 @@ fn kill_once(stack: &mut Stack, role: &str, n: usize) -> Killed {
     Killed {
         took: Duration::from_nanos(zero.time_ns.saturating_sub(killed_ns)),
         late: Duration::from_nanos(late_ns.get()),
+        stood_ms,
     }
 }
 

@@ -20,14 +20,14 @@ struct Row {
 }
 
 impl Table {
-    /// Rows of another table behind this one's; while they were measured the machine stood still for up to so long.
-    pub fn append(&mut self, other: Self, stalled_ms: f64) {
-        self.0.extend(other.0.into_iter().map(|mut row| {
-            if row.unit == "ms" {
-                row.slack += stalled_ms;
-            }
-            row
-        }));
+    /// Rows of another table behind this one's.
+    pub fn append(&mut self, other: Self) {
+        self.0.extend(other.0);
+    }
+
+    /// While these rows were measured the machine stood still for up to so long.
+    pub fn stalled(&mut self, ms: f64) {
+        self.0.iter_mut().filter(|row| row.unit == "ms").for_each(|row| row.slack += ms);
     }
 
     /// Notes the times measured of one fault.
