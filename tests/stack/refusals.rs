@@ -117,6 +117,11 @@ fn a_wrong_configuration_is_refused_with_the_nearest_key() {
             vec!["thrusters.t1.checks.frozen_s", "hint:"],
         ),
         (
+            text.replace("whitcomb-yoerger-1999", "rosa-rotor")
+                .replace("limits = {", "checks = { inflow_m_s = 2 }\nlimits = {"),
+            vec!["thrusters.t1.checks.inflow_m_s", "no propeller", "hint:"],
+        ),
+        (
             text.replace("full_drive_s = 0.005", "temperature_c = nan"),
             vec!["thrusters.t1.limits.temperature_c", "NaN", "hint:"],
         ),

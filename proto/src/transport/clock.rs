@@ -65,6 +65,16 @@ fn sleep_until(at_ns: u64) {
 /// Returns what was not permitted, in words fit for a warning.
 pub fn realtime(priority: i32, lock_memory: bool) -> Vec<String> {
     let mut missing = Vec::new();
+    // First, as the ordinary thread it still is: fetching every page takes milliseconds, for which nothing else would
+    // run on this core.
+    if lock_memory {
+        use rustix::mm::{MlockAllFlags, mlockall};
+        if let Err(e) = mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE) {
+            missing.push(format!(
+                "memory cannot be locked ({e}): a page fault may delay a tick\nhint: grant CAP_IPC_LOCK or raise the memlock limit"
+            ));
+        }
+    }
     // SAFETY: sched_setscheduler only reads the parameter; 0 is the calling thread.
     let done = unsafe {
         let parameter = libc::sched_param { sched_priority: priority };
@@ -75,14 +85,6 @@ pub fn realtime(priority: i32, lock_memory: bool) -> Vec<String> {
             "SCHED_FIFO is not permitted ({}): expect wake-ups late by milliseconds under load\nhint: run as root, or grant CAP_SYS_NICE or an rtprio limit",
             std::io::Error::last_os_error()
         ));
-    }
-    if lock_memory {
-        use rustix::mm::{MlockAllFlags, mlockall};
-        if let Err(e) = mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE) {
-            missing.push(format!(
-                "memory cannot be locked ({e}): a page fault may delay a tick\nhint: grant CAP_IPC_LOCK or raise the memlock limit"
-            ));
-        }
     }
     if let Err(e) = rustix::thread::set_current_timer_slack(std::num::NonZeroU64::new(1)) {
         missing.push(format!("timer slack cannot be set ({e}): wake-ups come about 50 us later"));

@@ -190,6 +190,11 @@ impl Settings {
                 )));
             }
         }
+        if let Some(inflow) = checks.inflow_m_s.filter(|_| rig.propeller.is_none()) {
+            return Err(config.error(format!(
+                "`thrusters.{id}.checks.inflow_m_s` = {inflow}, and the rig has no propeller that a stream could turn\nhint: leave the key out: on a dry shaft only what hangs on it gives back"
+            )));
+        }
         let need = |key: &str, value: f64, instead: &str| {
             Some(value)
                 .filter(|v| v.is_finite())
