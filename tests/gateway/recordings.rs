@@ -75,6 +75,12 @@ fn a_recording_is_written_listed_and_fetched_in_both_formats() {
             "recording-active",
             "a second recording",
         );
+        // With an ending it would stand for a file of another: nobody could tell `step.mcap` from the file of `step`.
+        for name in ["step.mcap", "other.csv"] {
+            let body = json!({ "name": name }).to_string();
+            let refused = send(port, "POST", "/v1/recordings", &[JSON], body.as_bytes());
+            assert_problem(&refused, 422, "out-of-range", name);
+        }
         stack.thrust(60.0, 60_000);
         std::thread::sleep(Duration::from_millis(1000));
         let stopped = send(port, "DELETE", "/v1/recordings", &[], b"").json();
@@ -137,4 +143,35 @@ fn a_killed_gateway_leaves_a_recording_that_reads_to_its_last_flush() {
             assert!(recording.rows() > 50, "{format}: {} rows of some 150", recording.rows());
         }
     });
+}
+
+/// A recording that nobody stops ends at its time, and none begins that would leave too little space to others; the
+/// thrust goes on.
+#[test]
+fn a_recording_ends_at_its_time_and_leaves_space_to_others() {
+    common::in_real_time(|| {
+        let site = Site::new();
+        site.add("[gateway]", "recording = { time_max_s = 1.0, free_bytes_min = 0 }");
+        let mut stack = Stack::start_at(site);
+        let port = stack.site.port;
+        stack.thrust(30.0, 60_000);
+        assert_eq!(send(port, "POST", "/v1/recordings", &[JSON], br#"{"name": "short"}"#).status, 201);
+        let ended = wait("the recording to end", || {
+            let list = send(port, "GET", "/v1/recordings", &[], b"").json();
+            Some(list[0].clone()).filter(|info| info["state"] != "recording")
+        });
+        assert_eq!(ended["state"], "complete", "{ended}");
+        assert!(ended["cause"].as_str().unwrap().contains("time_max_s = 1"), "{ended}");
+        assert!((1.0..1.2).contains(&ended["duration_s"].as_f64().unwrap()), "{ended}");
+        let t = stack.watch().next();
+        assert!(t.armed == 1 && t.faults == 0, "the thrust is untouched: {t:?}");
+    });
+    let site = Site::new();
+    site.add("[gateway]", "recording = { free_bytes_min = 1000000000000000 }");
+    let stack = Stack::start_at(site);
+    let port = stack.site.port;
+    let refused = send(port, "POST", "/v1/recordings", &[JSON], br#"{"name": "none"}"#);
+    assert_problem(&refused, 507, "recording-failed", "too little space");
+    assert!(refused.text().contains("free_bytes_min"), "{}", refused.text());
+    assert_eq!(send(port, "GET", "/v1/recordings", &[], b"").json(), json!([]), "nothing is left of it");
 }

@@ -111,7 +111,7 @@ impl Kind {
             Kind::ForeignHost => {
                 (S::MISDIRECTED_REQUEST, "foreign-host", "This gateway is not known by that name")
             }
-            Kind::Overloaded => (S::SERVICE_UNAVAILABLE, "overloaded", "Every connection is taken"),
+            Kind::Overloaded => (S::SERVICE_UNAVAILABLE, "overloaded", "No more of this at once"),
             Kind::LeaseRequired => (S::FORBIDDEN, "lease-required", "This needs the lease"),
             Kind::ForeignOrigin => (S::FORBIDDEN, "foreign-origin", "A page of another site may not command"),
             Kind::UnknownRoute => (S::NOT_FOUND, "unknown-route", "No such route"),

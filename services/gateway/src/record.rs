@@ -446,6 +446,19 @@ pub fn is_name(name: &str) -> bool {
         && name.bytes().all(|b| b.is_ascii_alphanumeric() || b"._-".contains(&b))
 }
 
+/// May a new recording be called so? With the ending of a file it would stand for a file of another recording.
+pub fn check_new_name(field: &str, name: &str) -> Result<(), Problem> {
+    let refused =
+        |hint| Err(Problem::new(Kind::OutOfRange, format!("{field} = {name:?} is not allowed")).hint(hint));
+    if !is_name(name) {
+        return refused("1 to 64 letters, digits, dots, underscores or hyphens; the first a letter or digit");
+    }
+    if [".csv", ".mcap"].iter().any(|ending| name.ends_with(ending)) {
+        return refused("without the ending: a recording NAME is fetched as NAME.mcap and as NAME.csv");
+    }
+    Ok(())
+}
+
 /// Writes `NAME.json` at once or not at all.
 fn write_info(folder: &Path, info: &RecordingInfo) -> io::Result<()> {
     let (draft, file) =

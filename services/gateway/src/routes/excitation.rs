@@ -16,7 +16,7 @@ use crate::diagnosis::Options;
 use crate::excitation::{After, Commanded, ExcitationView, Prepared, Wanted, follow, from_scenario};
 use crate::extract::{Json, LeaseId, Path, Query};
 use crate::problem::{Kind, Problem};
-use crate::record::is_name;
+use crate::record::check_new_name;
 use crate::token::Identity;
 
 /// Rate of the rows recorded along, Hz.
@@ -116,9 +116,8 @@ async fn start(
     Json(request): Json<ExcitationRequest>,
 ) -> Result<(StatusCode, axum::Json<ExcitationView>), Problem> {
     let thruster = Arc::clone(app.thruster(&id)?);
-    if let Some(name) = request.record.as_ref().filter(|name| !is_name(name)) {
-        return Err(Problem::new(Kind::OutOfRange, format!("record = {name:?} is not allowed"))
-            .hint("1 to 64 letters, digits, dots, underscores or hyphens; the first a letter or digit"));
+    if let Some(name) = &request.record {
+        check_new_name("record", name)?;
     }
     let (diagnosis, record) = (request.diagnosis.clone(), request.record.clone());
     let diagnose = request.diagnose.unwrap_or(diagnosis.is_some());

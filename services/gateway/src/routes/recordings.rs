@@ -7,14 +7,17 @@ use axum::extract::{Extension, State};
 use axum::http::{StatusCode, header};
 use axum::response::IntoResponse;
 use serde::Deserialize;
+use tokio::io::AsyncReadExt;
 use tokio_util::io::ReaderStream;
 use utoipa::{IntoParams, ToSchema};
 use utoipa_axum::{router::OpenApiRouter, routes};
 
+mod text;
+
 use crate::App;
 use crate::extract::{OptionalJson, Path, Query};
 use crate::problem::{Kind, Problem};
-use crate::record::{ENDING, RecordingInfo, is_name};
+use crate::record::{ENDING, RecordingInfo, check_new_name};
 use crate::token::Identity;
 
 /// Rows a second when the request names no rate.
@@ -87,9 +90,8 @@ async fn start(
     OptionalJson(request): OptionalJson<RecordingRequest>,
 ) -> Result<(StatusCode, axum::Json<RecordingInfo>), Problem> {
     let request = request.unwrap_or_default();
-    if let Some(name) = request.name.as_ref().filter(|name| !is_name(name)) {
-        return Err(Problem::new(Kind::OutOfRange, format!("name = {name:?} is not allowed"))
-            .hint("1 to 64 letters, digits, dots, underscores or hyphens; the first a letter or digit"));
+    if let Some(name) = &request.name {
+        check_new_name("name", name)?;
     }
     let rate_hz = request.rate_hz.unwrap_or(RATE_DEFAULT_HZ);
     if !(0.1..=RATE_MAX_HZ).contains(&rate_hz) {
@@ -168,7 +170,8 @@ async fn remove(
         (status = 200, description = "The file", headers(("content-disposition" = String, description = "Name to save it under")),
             content((Vec<u8> = "application/octet-stream"), (String = "text/csv"))),
         (status = 400, description = "`malformed-path`, `malformed-query`", body = Problem, content_type = "application/problem+json"),
-        (status = 404, description = "`unknown-recording`: there is none of this name, or nothing of it can be read yet", body = Problem, content_type = "application/problem+json")))]
+        (status = 404, description = "`unknown-recording`: there is none of this name, or nothing of it can be read yet", body = Problem, content_type = "application/problem+json"),
+        (status = 503, description = "`overloaded`: CSV is made and sent to one reader at a time", body = Problem, content_type = "application/problem+json")))]
 async fn fetch(
     State(app): State<Arc<App>>,
     Path(name): Path<String>,
@@ -191,28 +194,20 @@ async fn fetch(
     let (kind, ending) =
         if csv { ("text/csv; charset=utf-8", "csv") } else { ("application/octet-stream", ENDING) };
     let save_as = format!("attachment; filename=\"{stem}.{ending}\"");
-    let body =
-        if csv { Body::from(blocking(move || as_csv(&path)).await??) } else { as_it_is(&path).await? };
-    Ok(([(header::CONTENT_TYPE, kind.to_owned()), (header::CONTENT_DISPOSITION, save_as)], body))
+    let (length, body) = if csv { text::csv(path).await? } else { as_it_is(&path).await? };
+    let headers = [
+        (header::CONTENT_TYPE, kind.to_owned()),
+        (header::CONTENT_DISPOSITION, save_as),
+        (header::CONTENT_LENGTH, length.to_string()),
+    ];
+    Ok((headers, body))
 }
 
-async fn as_it_is(path: &std::path::Path) -> Result<Body, Problem> {
+/// The file as far as it is written now; a running recording grows meanwhile.
+async fn as_it_is(path: &std::path::Path) -> Result<(usize, Body), Problem> {
     let file = tokio::fs::File::open(path).await.map_err(|error| unreadable(path, error))?;
-    Ok(Body::from_stream(ReaderStream::new(file)))
-}
-
-/// Recordings are kept as MCAP; CSV is made of it when it is asked for.
-fn as_csv(path: &std::path::Path) -> Result<Vec<u8>, Problem> {
-    let recording = kort_recording::Recording::read(path, None).map_err(nothing_yet)?;
-    let mut text = std::io::Cursor::new(Vec::new());
-    recording.write(kort_recording::Format::Csv, &mut text).map_err(|error| unreadable(path, error))?;
-    Ok(text.into_inner())
-}
-
-/// A recording that has just begun has no complete chunk, and one that a killed process left may have none at all.
-fn nothing_yet(error: impl std::fmt::Display) -> Problem {
-    Problem::new(Kind::UnknownRecording, format!("nothing of it can be read: {error}"))
-        .hint("a running recording is written within a second; as `.mcap` the file is sent as it is")
+    let length = file.metadata().await.map_err(|error| unreadable(path, error))?.len();
+    Ok((length as usize, Body::from_stream(ReaderStream::new(file.take(length)))))
 }
 
 fn unreadable(path: &std::path::Path, error: impl std::fmt::Display) -> Problem {
