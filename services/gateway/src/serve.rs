@@ -130,10 +130,17 @@ where
 {
     let theirs = Arc::clone(slot);
     let service = hyper::service::service_fn(move |request: hyper::Request<Incoming>| {
-        theirs.busy();
+        // A request is at work once it is here as a whole: until then it waits for its peer like any other, and makes
+        // room where there is none.
+        if http_body::Body::is_end_stream(request.body()) {
+            theirs.busy()
+        } else {
+            theirs.idle()
+        }
         let (router, slot) = (router.clone(), Arc::clone(&theirs));
         async move {
-            let mut request = request.map(Body::new);
+            let arriving = Arc::clone(&slot);
+            let mut request = request.map(|body| Body::new(Arriving { body, slot: arriving }));
             if slot.reserved {
                 request.extensions_mut().insert(Reserved);
             }
@@ -164,6 +171,36 @@ where
     };
     if let Err(error) = ended {
         tracing::debug!(%error, "a connection ended");
+    }
+}
+
+/// A request's body; the connection counts as at work once the whole of it is here.
+struct Arriving {
+    body: Incoming,
+    slot: Arc<Slot>,
+}
+
+impl http_body::Body for Arriving {
+    type Data = Bytes;
+    type Error = hyper::Error;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Bytes>, hyper::Error>>> {
+        let frame = std::task::ready!(Pin::new(&mut self.body).poll_frame(cx));
+        if frame.is_none() || self.body.is_end_stream() {
+            self.slot.busy();
+        }
+        Poll::Ready(frame)
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.body.is_end_stream()
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        self.body.size_hint()
     }
 }
 

@@ -16,8 +16,8 @@ use crate::problem::{Kind, Problem};
 /// It is made in memory, of a file of 256 MiB about a gigabyte: one is made and sent at a time, or a reader with many
 /// requests would end the gateway, and the thrust with it.
 static TURN: Semaphore = Semaphore::const_new(1);
-/// How long a request waits for its turn.
-const TURN_WITHIN: Duration = Duration::from_secs(20);
+/// How long a request waits for its turn; no request takes longer than 10 s in all.
+const TURN_WITHIN: Duration = Duration::from_secs(5);
 /// A reader that takes nothing for so long loses the rest, and its turn.
 const READER_PATIENCE: Duration = Duration::from_secs(10);
 /// What is handed to the connection at once, bytes.
