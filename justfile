@@ -37,6 +37,10 @@ fuzz TARGET SECONDS="60":
     mkdir -p fuzz/corpus/{{TARGET}}
     cargo +nightly fuzz run {{TARGET}} fuzz/corpus/{{TARGET}} $(fuzz/seeds.sh {{TARGET}}) -- -max_total_time={{SECONDS}} -rss_limit_mb=4096
 
+# the Python package: abi3 wheel, types, stubs, tests, notebooks, in an environment below target
+python:
+    python/tests/run.sh
+
 # undefined behaviour in what shared memory carries: messages, texts, freshness (nightly, miri)
 miri:
     cargo +nightly miri test -p kort-proto --test payloads

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Every test of kort. On a bare machine (Rust, a C compiler, root on Debian) it fetches what is missing:
-#   prometheus (real scrapes, promtool), chromium (the console), schemathesis (the API against its own OpenAPI).
+#   prometheus (real scrapes, promtool), chromium (the console), schemathesis (the API against its own OpenAPI),
+#   maturin, mypy, pytest, pandas, polars, matplotlib and nbclient (the Python package).
 # Without root nothing is installed; what is absent is then left out, and the last lines say so.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -29,6 +30,7 @@ need promtool prometheus
 need chromium chromium fonts-dejavu-core
 need python3 python3 python3-venv
 
+mkdir -p "$tools"
 schemathesis="$tools/schemathesis/bin/schemathesis"
 if command -v python3 >/dev/null && [ ! -x "$schemathesis" ]; then
   say "installing schemathesis into $tools"
@@ -43,8 +45,23 @@ python="$tools/schemathesis/bin/python"
 if [ -x "$python" ]; then "$python" -c 'import mcap' 2>/dev/null || "$tools/schemathesis/bin/pip" install -q 'mcap>=1.2,<2' || true; fi
 if [ -x "$python" ] && "$python" -c 'import mcap' 2>/dev/null; then export KORT_PYTHON="$python"; else skipped+=("Python's mcap is not installed"); fi
 
+# What the Python package's tests need, fetched while the others are built.
+notebook="$tools/python/bin/python"
+if command -v python3 >/dev/null; then
+  { [ -x "$notebook" ] || python3 -m venv "$tools/python"; "$notebook" -m pip install -q -r python/tests/requirements.txt; } \
+    >"$tools/python.log" 2>&1 &
+  fetching=$!
+fi
+
 say "cargo test --workspace"
 cargo test --workspace --no-fail-fast
+
+if [ -n "${fetching:-}" ] && wait "$fetching"; then
+  say "the Python package: wheel, types, tests, notebooks"
+  python/tests/run.sh "$notebook"
+else
+  skipped+=("the Python package: its environment is not there ($tools/python.log)")
+fi
 
 # Fuzzing where its tools are; elsewhere tests/any_input.rs stands in for it.
 if cargo +nightly fuzz --version >/dev/null 2>&1; then

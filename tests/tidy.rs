@@ -44,6 +44,7 @@ const DIRECTION: &[(&str, &[&str])] = &[
             "kort-controller",
         ],
     ),
+    ("python", &["kort-lab", "kort-recording", "kort-thruster"]),
     (".", &["kort-servo", "kort-controller", "kort-gateway", "kort-lab", "kort-proto"]),
 ];
 
@@ -98,7 +99,7 @@ fn sources(folder: &str) -> Vec<PathBuf> {
 }
 
 fn every_source() -> Vec<PathBuf> {
-    ["crates", "services", "proto", "tests", "benches"].iter().flat_map(|f| sources(f)).collect()
+    ["crates", "services", "proto", "python", "tests", "benches"].iter().flat_map(|f| sources(f)).collect()
 }
 
 /// A file's code: comments, and what only tests see, left out.
@@ -222,7 +223,7 @@ fn the_truth_simulation_serves_the_proof_alone() {
 /// Files that no `mod` line names are not compiled: they are dead.
 #[test]
 fn every_file_is_part_of_its_crate() {
-    let all = ["crates", "services", "proto"].iter().flat_map(|f| sources(f));
+    let all = ["crates", "services", "proto", "python"].iter().flat_map(|f| sources(f));
     for path in
         all.filter(|p| p.components().any(|c| c.as_os_str() == "src") || p.starts_with("services/kort"))
     {

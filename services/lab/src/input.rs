@@ -1,6 +1,6 @@
 //! What `fit` and `diagnose` read: recordings of one rig, its description, the model to compare.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use kort_identify::checks;
@@ -79,6 +79,11 @@ impl Input {
     /// # Errors
     /// Names file, field, value found and what is allowed.
     pub fn load(&self) -> Result<Loaded, Failure> {
+        self.take(self.read()?)
+    }
+
+    /// The recordings' files.
+    fn read(&self) -> Result<Vec<Recording>, Failure> {
         let map = self.columns.as_deref().map(ColumnMap::find).transpose().map_err(Failure::input)?;
         let mut recordings = Vec::new();
         for (i, path) in self.recordings.iter().enumerate() {
@@ -87,6 +92,14 @@ impl Input {
             }
             recordings.push(Recording::read(path, map.as_ref()).map_err(Failure::input)?);
         }
+        Ok(recordings)
+    }
+
+    /// What was read, or never was in a file, with the rig that it belongs to.
+    ///
+    /// # Errors
+    /// As [`Input::load`].
+    pub fn take(&self, recordings: Vec<Recording>) -> Result<Loaded, Failure> {
         let (rig_text, rig) = self.rig(&recordings)?;
         let mut out = Loaded { rig_text, rig, series: Vec::new(), notes: Vec::new(), lossy: false };
         for recording in recordings {
@@ -121,8 +134,9 @@ impl Input {
             let rig = Rig::from_toml(&text).map_err(|e| Failure::in_file(path, e))?;
             return Ok((text, rig));
         }
-        let mut held: Option<(&String, &PathBuf)> = None;
-        for (recording, path) in recordings.iter().zip(&self.recordings) {
+        let mut held: Option<(&String, &Path)> = None;
+        for recording in recordings {
+            let path = Path::new(&recording.name);
             let Some(text) = recording.about.get("rig") else {
                 return Err(Failure::in_file(path, "holds no rig description\nhint: name it with --rig RIG"));
             };

@@ -3,13 +3,13 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use kort_diagnose::diagnose::{Options, diagnose};
-
+use kort_diagnose::diagnose::{Diagnosis, Options, diagnose};
+use kort_diagnose::report::Report;
 use kort_thruster::rig::Rig;
 
 use crate::believed::believed;
 use crate::failure::{Failure, Outcome, print, print_json, write_text};
-use crate::input::Input;
+use crate::input::{Input, Loaded};
 use crate::{progress, render};
 
 const EXAMPLE: &str = "\
@@ -41,6 +41,28 @@ pub struct Diagnose {
     job: Option<u32>,
 }
 
+/// Diagnoses what was read.
+///
+/// # Errors
+/// A recording cannot be compared with the model at all.
+pub fn diagnosis(input: &Input, loaded: &Loaded, told: &(dyn Fn(&str) + Sync)) -> Result<Diagnosis, Failure> {
+    let options = Options { model: input.model, seed: input.seed, with: input.known_effects()? };
+    let diagnosis = input.on_threads(|| diagnose(&loaded.series, &loaded.rig, &options, told))?;
+    let mut diagnosis = diagnosis.map_err(Failure::input)?;
+    diagnosis.report.notes.splice(0..0, loaded.notes.iter().cloned());
+    Ok(diagnosis)
+}
+
+/// The rig description with what is believed of a diagnosis as its `[[effects]]`, and their names.
+///
+/// # Errors
+/// The text is no rig description (it was one when it was read).
+pub fn adopted(rig_text: &str, report: &Report) -> Result<(String, Vec<String>), Failure> {
+    let found = believed(report);
+    let text = Rig::with_effects_toml(rig_text, &found).map_err(Failure::failed)?;
+    Ok((text, found.iter().map(|f| f.effect.to_string()).collect()))
+}
+
 impl Diagnose {
     /// The service's process that this is a job of.
     pub fn job_of(&self) -> Option<u32> {
@@ -53,26 +75,20 @@ impl Diagnose {
     /// Unreadable input, or an output file that cannot be written.
     pub fn run(self) -> Result<Outcome, Failure> {
         let loaded = self.input.load()?;
-        let options =
-            Options { model: self.input.model, seed: self.input.seed, with: self.input.known_effects()? };
         let spinner = self.job.is_none().then(progress::spinner);
         let told = |text: &str| match &spinner {
             Some(spinner) => spinner.set_message(text.to_string()),
             None => eprintln!("step: {text}"),
         };
-        let diagnosis = self.input.on_threads(|| diagnose(&loaded.series, &loaded.rig, &options, &told))?;
+        let diagnosis = diagnosis(&self.input, &loaded, &told)?;
         drop(spinner);
-        let mut diagnosis = diagnosis.map_err(Failure::input)?;
-        diagnosis.report.notes.splice(0..0, loaded.notes);
         if let Some(path) = &self.html {
             write_text(path, &render::diagnosis::page(&diagnosis, &loaded.rig))?;
             eprintln!("wrote {}", path.display());
         }
         if let Some(path) = &self.output {
-            let found = believed(&diagnosis.report);
-            let text = Rig::with_effects_toml(&loaded.rig_text, &found).map_err(Failure::failed)?;
+            let (text, names) = adopted(&loaded.rig_text, &diagnosis.report)?;
             write_text(path, &text)?;
-            let names: Vec<&str> = found.iter().map(|f| f.effect).collect();
             let names = if names.is_empty() { "nothing".to_string() } else { names.join(", ") };
             eprintln!("wrote {} with {names}", path.display());
         }

@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 use kort_diagnose::constants::Constants;
-use kort_identify::identify::{Options, identify};
+use kort_identify::identify::{FitReport, Options, identify};
 
 use crate::failure::{Failure, Outcome, print, print_json, write_text};
 use crate::fitted_rig::with_fitted;
-use crate::input::Input;
+use crate::input::{Input, Loaded};
 use crate::{progress, render};
 
 const EXAMPLE: &str = "\
@@ -38,6 +38,31 @@ pub struct Fit {
     json: bool,
 }
 
+/// Fits what was read.
+///
+/// # Errors
+/// A recording cannot be compared with the model at all.
+pub fn fit(
+    input: &Input,
+    loaded: &Loaded,
+    starts: usize,
+    free_friction: bool,
+    told: &(dyn Fn(&str) + Sync),
+) -> Result<FitReport, Failure> {
+    let options = Options {
+        model: input.model,
+        seed: input.seed,
+        starts,
+        open_friction: free_friction,
+        with: input.known_effects()?,
+        criterion: Constants::built_in().criterion,
+    };
+    let report = input.on_threads(|| identify(&loaded.series, &loaded.rig, &options, told))?;
+    let mut report = report.map_err(Failure::input)?;
+    report.notes.splice(0..0, loaded.notes.iter().cloned());
+    Ok(report)
+}
+
 impl Fit {
     /// Does it.
     ///
@@ -45,20 +70,10 @@ impl Fit {
     /// Unreadable input, or an output file that cannot be written.
     pub fn run(self) -> Result<Outcome, Failure> {
         let loaded = self.input.load()?;
-        let options = Options {
-            model: self.input.model,
-            seed: self.input.seed,
-            starts: usize::from(self.starts),
-            open_friction: self.free_friction,
-            with: self.input.known_effects()?,
-            criterion: Constants::built_in().criterion,
-        };
         let spinner = progress::spinner();
         let told = |text: &str| spinner.set_message(text.to_string());
-        let report = self.input.on_threads(|| identify(&loaded.series, &loaded.rig, &options, &told))?;
+        let report = fit(&self.input, &loaded, usize::from(self.starts), self.free_friction, &told)?;
         drop(spinner);
-        let mut report = report.map_err(Failure::input)?;
-        report.notes.splice(0..0, loaded.notes);
         if let Some(path) = &self.output {
             let (text, left_out) =
                 with_fitted(&loaded.rig_text, &report.parameters).map_err(Failure::failed)?;

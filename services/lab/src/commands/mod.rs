@@ -2,14 +2,14 @@
 
 mod calibrate;
 mod columns;
-mod diagnose;
+pub mod diagnose;
 mod explain;
-mod fit;
+pub mod fit;
 mod fit_table;
 mod prove;
 mod reproduce;
-mod simulate;
-mod soak;
+pub mod simulate;
+pub mod soak;
 
 use clap::Subcommand;
 

@@ -5,7 +5,7 @@ use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
 use clap::Args as ClapArgs;
-use kort_recording::{Format, Writer};
+use kort_recording::{Column, Format, Recording, Writer};
 use kort_scenario::{Replayed, Replays, Run, Scenario};
 use kort_thruster::rig::Rig;
 use serde::Serialize;
@@ -92,6 +92,38 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     Ok(Outcome::with_loss(files.lost))
 }
 
+/// The same in memory: a recording as `kort simulate` writes it, of a scenario's text in TOML or JSON.
+///
+/// # Errors
+/// [`Failure`] names the file, the key and what is allowed.
+pub fn recording(
+    rig: &Path,
+    scenario: &Path,
+    text: &str,
+    seed: Option<u64>,
+    noise: Option<f64>,
+) -> Result<Recording, Failure> {
+    let rig = files::read_rig(rig)?;
+    let mut wanted = scenario_of(scenario, text)?;
+    wanted.seed = seed.unwrap_or(wanted.seed);
+    wanted.noise = noise.unwrap_or(wanted.noise);
+    let mut files = Files { beside: scenario.parent().map(Path::to_path_buf), lost: false };
+    let mut run = Run::new(&wanted, &rig, &mut files).map_err(|e| Failure::in_file(scenario, e))?;
+    let names = run.columns().to_vec();
+    let mut columns: Vec<Vec<f64>> = vec![Vec::new(); names.len()];
+    let (mut time_s, mut values) = (Vec::new(), Vec::new());
+    while let Some(now_s) = run.next_row(&mut values) {
+        time_s.push(now_s);
+        for (column, value) in columns.iter_mut().zip(&values) {
+            column.push(*value);
+        }
+    }
+    drop(run);
+    let columns = names.into_iter().zip(columns).map(|(name, values)| Column::new(name, values)).collect();
+    let losses = files.lost.then(|| "the replayed recording had losses".to_string()).into_iter().collect();
+    Ok(Recording { name: wanted.name, time_s, columns, losses, ..Recording::default() })
+}
+
 /// Writes the rows; nothing half-written stays behind when that fails.
 fn write(run: &mut Run, format: Format, path: &Path, rig: &Rig) -> Result<f64, Failure> {
     let bar = progress::bar(run.rows(), "simulating");
@@ -117,12 +149,16 @@ fn write(run: &mut Run, format: Format, path: &Path, rig: &Rig) -> Result<f64, F
 
 /// A scenario in TOML or JSON, or the next experiment of a diagnosis report.
 fn read_scenario(wanted: &Path) -> Result<Scenario, Failure> {
-    let text = files::scenario_text(wanted)?;
+    scenario_of(wanted, &files::scenario_text(wanted)?)
+}
+
+/// The scenario that a text holds; `wanted` stands in errors.
+fn scenario_of(wanted: &Path, text: &str) -> Result<Scenario, Failure> {
     let fail = |e: &dyn std::fmt::Display| Failure::in_file(wanted, e);
     if !text.trim_start().starts_with('{') {
-        return Scenario::from_toml(&text).map_err(|e| fail(&e));
+        return Scenario::from_toml(text).map_err(|e| fail(&e));
     }
-    let mut json: serde_json::Value = serde_json::from_str(&text).map_err(|e| fail(&e))?;
+    let mut json: serde_json::Value = serde_json::from_str(text).map_err(|e| fail(&e))?;
     if let Some(next) = json.get_mut("next_experiment") {
         json = next.get_mut("scenario").map(serde_json::Value::take).ok_or_else(|| {
             fail(&"`next_experiment` is null: this report asks for no further run\nhint: choose a scenario yourself")

@@ -69,7 +69,14 @@ pub struct Args {
 /// # Errors
 /// [`Failure`] names the file, the key and what is allowed.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
-    let loaded = load(args).map_err(Failure::input)?;
+    let table = ["velocity_servo", soak::DEFAULT, kort_soak::limits::NAME].map(str::to_owned);
+    let controllers = match (&args.controllers, &args.markdown) {
+        (Some(controllers), _) => Some(controllers.as_slice()),
+        (None, Some(_)) if !args.adopt => Some(table.as_slice()),
+        (None, _) => None,
+    };
+    let wanted = Wanted { scenarios: &args.scenarios, rigs: &args.rig, controllers, seeds: args.seeds };
+    let loaded = load(&wanted).map_err(Failure::input)?;
     for file in args.html.iter().chain(&args.markdown) {
         check_writable(file)?;
     }
@@ -97,26 +104,36 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     Ok(Outcome::Done)
 }
 
+/// What a comparison is made of.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Wanted<'a> {
+    /// Scenarios: files, or names of shipped ones; `all` for every one of less than an hour.
+    pub scenarios: &'a [PathBuf],
+    /// Rigs instead of the scenario's; `all` for every one with a propeller.
+    pub rigs: &'a [PathBuf],
+    /// Controllers instead of the scenario's.
+    pub controllers: Option<&'a [String]>,
+    /// How many seeds instead of the scenario's.
+    pub seeds: Option<u32>,
+}
+
 /// Every scenario on its own rig, or on every rig asked for.
-fn load(args: &Args) -> Result<Vec<Loaded>, SoakError> {
+///
+/// # Errors
+/// [`SoakError`] names the file, the key and what is allowed.
+pub fn load(wanted: &Wanted) -> Result<Vec<Loaded>, SoakError> {
     let is_all = |list: &[PathBuf]| list.len() == 1 && list[0].as_os_str() == "all";
-    let every_scenario = is_all(&args.scenarios);
+    let every_scenario = is_all(wanted.scenarios);
     let scenarios: Vec<PathBuf> = if every_scenario {
         files::soak_scenarios().into_iter().map(PathBuf::from).collect()
     } else {
-        args.scenarios.clone()
+        wanted.scenarios.to_vec()
     };
-    let every_rig = is_all(&args.rig);
-    let rigs: Vec<Option<PathBuf>> = match (every_rig, args.rig.is_empty()) {
+    let every_rig = is_all(wanted.rigs);
+    let rigs: Vec<Option<PathBuf>> = match (every_rig, wanted.rigs.is_empty()) {
         (true, _) => files::rigs().into_iter().map(|name| Some(PathBuf::from(name))).collect(),
         (false, true) => vec![None],
-        (false, false) => args.rig.iter().cloned().map(Some).collect(),
-    };
-    let table = ["velocity_servo", soak::DEFAULT, kort_soak::limits::NAME].map(str::to_owned);
-    let controllers = match (&args.controllers, &args.markdown) {
-        (Some(controllers), _) => Some(controllers.as_slice()),
-        (None, Some(_)) if !args.adopt => Some(table.as_slice()),
-        (None, _) => None,
+        (false, false) => wanted.rigs.iter().cloned().map(Some).collect(),
     };
     let mut loaded = Vec::new();
     for scenario in &scenarios {
@@ -127,7 +144,8 @@ fn load(args: &Args) -> Result<Vec<Loaded>, SoakError> {
             {
                 continue;
             }
-            let instead = Instead { rig: rig.as_deref(), controllers, seeds: args.seeds };
+            let instead =
+                Instead { rig: rig.as_deref(), controllers: wanted.controllers, seeds: wanted.seeds };
             loaded.push(soak::load(scenario, &instead)?);
         }
     }
