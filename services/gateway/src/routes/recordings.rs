@@ -176,7 +176,7 @@ async fn fetch(
     State(app): State<Arc<App>>,
     Path(name): Path<String>,
     Query(FormatQuery { format }): Query<FormatQuery>,
-) -> Result<impl IntoResponse, Problem> {
+) -> Result<axum::response::Response, Problem> {
     let (stem, ending) = ["csv", ENDING]
         .into_iter()
         .find_map(|ending| Some((name.strip_suffix(&format!(".{ending}"))?, Some(ending))))
@@ -195,19 +195,20 @@ async fn fetch(
         if csv { ("text/csv; charset=utf-8", "csv") } else { ("application/octet-stream", ENDING) };
     let save_as = format!("attachment; filename=\"{stem}.{ending}\"");
     let (length, body) = if csv { text::csv(path).await? } else { as_it_is(&path).await? };
-    let headers = [
-        (header::CONTENT_TYPE, kind.to_owned()),
-        (header::CONTENT_DISPOSITION, save_as),
-        (header::CONTENT_LENGTH, length.to_string()),
-    ];
-    Ok((headers, body))
+    let mut answer =
+        ([(header::CONTENT_TYPE, kind.to_owned()), (header::CONTENT_DISPOSITION, save_as)], body)
+            .into_response();
+    if let Some(length) = length {
+        answer.headers_mut().insert(header::CONTENT_LENGTH, length.into());
+    }
+    Ok(answer)
 }
 
 /// The file as far as it is written now; a running recording grows meanwhile.
-async fn as_it_is(path: &std::path::Path) -> Result<(usize, Body), Problem> {
+async fn as_it_is(path: &std::path::Path) -> Result<(Option<usize>, Body), Problem> {
     let file = tokio::fs::File::open(path).await.map_err(|error| unreadable(path, error))?;
     let length = file.metadata().await.map_err(|error| unreadable(path, error))?.len();
-    Ok((length as usize, Body::from_stream(ReaderStream::new(file.take(length)))))
+    Ok((Some(length as usize), Body::from_stream(ReaderStream::new(file.take(length)))))
 }
 
 fn unreadable(path: &std::path::Path, error: impl std::fmt::Display) -> Problem {
