@@ -4,7 +4,7 @@ mod common;
 
 use std::time::Duration;
 
-use common::{Site, Stack, children, kill, wait};
+use common::{Site, Stack, children, kill, pages, wait};
 use serde_json::{Value, json};
 
 /// How long a diagnosis may take that runs behind everything else on a machine full of tests.
@@ -321,4 +321,33 @@ fn what_cannot_be_diagnosed_is_refused_with_the_reason() {
     kill(gateway.id(), "TERM");
     let _ = gateway.wait();
     assert_eq!(answer["type"], "urn:kort:problem:no-recording", "{answer}");
+}
+
+/// The first hour as a stranger has it: a secret in the stand, found, used, and thrust that comes nearer to what is asked.
+#[test]
+fn the_tutorial_goes_as_it_says() {
+    common::in_real_time(|| {
+        let said = pages::follow("docs/tutorial.md", Site::new().port);
+        let error = |when: &str| pages::number_after(&said, &format!("thrust error {when}:"));
+        let (before, after) = (error("before"), error("after"));
+        // Most of it are the steps of the signal, which no thrust follows at once.
+        assert!(after < 0.95 * before, "{after} N after, {before} N before");
+    });
+}
+
+#[test]
+fn the_readmes_commands_work() {
+    common::in_real_time(|| {
+        let stack = Stack::start();
+        let said = pages::follow("README.md", stack.site.port);
+        for shown in [
+            "\"expires_in_ms\"",
+            "kort_armed{thruster=\"t1\"} 1",
+            "NO MISMATCH",
+            "lift_max",
+            "coulomb_friction",
+        ] {
+            assert!(said.contains(shown), "nothing shows {shown}:\n{said}");
+        }
+    });
 }

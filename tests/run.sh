@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Every test of kort. On a bare machine (Rust, a C compiler, root on Debian) it fetches what is missing:
-#   prometheus (real scrapes, promtool), chromium (the console), schemathesis (the API against its own OpenAPI),
-#   maturin, mypy, pytest, pandas, polars, matplotlib and nbclient (the Python package).
+#   curl (pages of docs are followed), prometheus (real scrapes, promtool), chromium (the console),
+#   schemathesis (the API against its own OpenAPI), maturin, mypy, pytest, pandas, polars, matplotlib and nbclient (the Python package).
 # Without root nothing is installed; what is absent is then left out, and the last lines say so.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -28,6 +28,7 @@ need() {
 need cc build-essential
 need promtool prometheus
 need chromium chromium fonts-dejavu-core
+need curl curl
 need python3 python3 python3-venv
 
 mkdir -p "$tools"
