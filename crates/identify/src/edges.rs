@@ -24,14 +24,14 @@ impl Problem<'_> {
         let movable =
             |r: &Prepared| r.driving != Driving::Speed && r.edges.iter().any(|row| r.ticks_before(*row) > 1);
         let places = self.recordings.iter().filter(|r| movable(r)).map(Prepared::places).max()?;
-        let level = self.levels(fit);
+        let noises = self.noises(fit);
         // Cost of every edge for every tick it may lie on, all edges moved together.
         let costs: Vec<Vec<Vec<f64>>> = (0..places)
             .map(|place| {
                 let edges = self.recordings.iter().map(|r| r.edges_at(place));
                 let inputs = Arc::new(Inputs::new(&self.recordings, edges.collect()));
                 let residual = self.residual(&Hypothesis { inputs, ..fit.hypothesis.clone() }, &fit.values);
-                let of = |(r, one): (usize, &Prepared)| edge_costs(one, &residual[r], &level[r]);
+                let of = |(r, one): (usize, &Prepared)| edge_costs(one, &residual[r], &noises[r]);
                 self.recordings.iter().enumerate().map(of).collect()
             })
             .collect();
@@ -46,22 +46,42 @@ impl Problem<'_> {
         (edges != fit.hypothesis.inputs.edges).then(|| Inputs::new(&self.recordings, edges))
     }
 
-    /// Noise of each channel from one sample to the next, in its own unit: its usual size, which the few samples
-    /// about a misplaced step do not raise.
-    fn levels(&self, fit: &Fit) -> Vec<Vec<f64>> {
+    /// Noise of each channel.
+    fn noises(&self, fit: &Fit) -> Vec<Vec<Persistent>> {
         let residual = self.residual(&fit.hypothesis, &fit.values);
-        let usual = |(channel, left): (&Channel, &Vec<f64>)| {
-            let mut steps: Vec<f64> = left.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
-            steps.sort_by(f64::total_cmp);
-            // Of normal noise the median step is 0.95 standard deviations.
-            let median = steps.get(steps.len() / 2).copied().unwrap_or(0.0) / 0.95;
-            median.max(LEAST * channel.full_scale)
-        };
         self.recordings
             .iter()
             .zip(&residual)
-            .map(|(recording, left)| recording.channels.iter().zip(left).map(usual).collect())
+            .map(|(r, left)| r.channels.iter().zip(left).map(|(c, left)| Persistent::of(c, left)).collect())
             .collect()
+    }
+}
+
+/// Noise that keeps a share of itself from one sample to the next: what a set without the right physics leaves lasts,
+/// and must not pass for a step that came early or late.
+struct Persistent {
+    /// Share of a sample's error that the next one repeats.
+    kept: f64,
+    /// Usual size of what is new, in the channel's unit.
+    new: f64,
+}
+
+impl Persistent {
+    fn of(channel: &Channel, left: &[f64]) -> Self {
+        let power: f64 = left.iter().map(|e| e * e).sum();
+        let product: f64 = left.windows(2).map(|w| w[0] * w[1]).sum();
+        let kept = if power > 0.0 { (product / power).clamp(0.0, 1.0) } else { 0.0 };
+        let mut new: Vec<f64> = left.windows(2).map(|w| (w[1] - kept * w[0]).abs()).collect();
+        new.sort_by(f64::total_cmp);
+        // Of normal noise the median is 0.67 standard deviations; few samples about a misplaced step do not raise it.
+        let median = new.get(new.len() / 2).copied().unwrap_or(0.0) / 0.67;
+        Self { kept, new: median.max(LEAST * channel.full_scale) }
+    }
+
+    /// Squared error that is new at a sample, in noise.
+    fn cost(&self, left: &[f64], k: usize) -> f64 {
+        let before = if k == 0 { 0.0 } else { left[k - 1] };
+        ((left[k] - self.kept * before) / self.new).powi(2)
     }
 }
 
@@ -93,7 +113,7 @@ impl Prepared {
     }
 }
 
-fn edge_costs(recording: &Prepared, residual: &[Vec<f64>], level: &[f64]) -> Vec<f64> {
+fn edge_costs(recording: &Prepared, residual: &[Vec<f64>], noises: &[Persistent]) -> Vec<f64> {
     let mut costs = vec![0.0; recording.edges.len()];
     for (c, channel) in recording.channels.iter().enumerate() {
         for (e, row) in recording.edges.iter().enumerate() {
@@ -101,7 +121,7 @@ fn edge_costs(recording: &Prepared, residual: &[Vec<f64>], level: &[f64]) -> Vec
             let end = (row + WINDOW_ROWS).min(next);
             let from = channel.rows.partition_point(|r| r < row);
             let to = channel.rows.partition_point(|r| *r < end);
-            costs[e] += (from..to).map(|k| (residual[c][k] / level[c]).powi(2)).sum::<f64>();
+            costs[e] += (from..to).map(|k| noises[c].cost(&residual[c], k)).sum::<f64>();
         }
     }
     costs
@@ -111,7 +131,9 @@ fn edge_costs(recording: &Prepared, residual: &[Vec<f64>], level: &[f64]) -> Vec
 mod tests {
     use kort_thruster::rig::Rig;
 
+    use super::edge_costs;
     use crate::data::{Prepared, Series};
+    use crate::edges::Persistent;
 
     /// Steps of a command logged at 100 Hz, the second of them just after half a second without rows.
     fn prepared() -> Prepared {
@@ -139,5 +161,26 @@ mod tests {
         assert_eq!((first.iter().max(), in_gap[0]), (Some(&(ticks - 1)), 0));
         assert_eq!(in_gap.last(), Some(&(recording.ticks_before(150) - 1)), "{in_gap:?}");
         assert!(in_gap.windows(2).all(|w| w[1] > w[0]) && in_gap.len() <= 24);
+    }
+
+    /// What lasts is the set's error: a step in its place costs least although all about it is off by ten times its
+    /// own mark.
+    #[test]
+    fn an_error_that_lasts_does_not_move_a_step() {
+        let recording = prepared();
+        let noise = |k: usize| 0.01 * (12.9898 * k as f64).sin();
+        let residual = |moved: f64| -> Vec<f64> {
+            let answer = |k: usize| if k < 50 { 0.0 } else { moved * (-0.2 * (k as f64 - 50.0)).exp() };
+            (0..recording.channels[0].rows.len()).map(|k| 1.0 - answer(k) + noise(k)).collect()
+        };
+        let noise = Persistent::of(&recording.channels[0], &residual(0.0));
+        assert!(noise.kept > 0.95 && noise.new < 0.05, "{} {}", noise.kept, noise.new);
+        let cost = |moved| edge_costs(&recording, &[residual(moved)], std::slice::from_ref(&noise))[0];
+        assert!(cost(0.0) < cost(0.1) && cost(0.0) < cost(-0.1));
+        let lasting = (50..62).map(|k| residual(0.1)[k].powi(2)).sum::<f64>();
+        assert!(
+            lasting < (50..62).map(|k| residual(0.0)[k].powi(2)).sum(),
+            "a mean square would take the step away"
+        );
     }
 }
