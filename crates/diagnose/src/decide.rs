@@ -87,8 +87,11 @@ pub fn decide(explanations: &[Explanation], circumstances: &Circumstances) -> De
     let believed = |n: &Named| among_names(n.effect) >= BELIEVED && n.rivals.is_empty();
     let changes = |n: &Named| !circumstances.steady.contains(&n.effect);
     let verdict = if circumstances.broke_down
-        // Steady data cannot part physics from parameters; that something changed in mid-run they show.
-        || circumstances.thin && term.is_none() && !named.iter().any(|n| believed(n) && changes(n))
+        // Steady data cannot part physics from parameters; that something changed in mid-run they show, and which
+        // physics it could be.
+        || circumstances.thin
+            && term.is_none()
+            && !named.iter().any(|n| believed(n) && changes(n) || !n.rivals.is_empty())
     {
         Verdict::InsufficientData
     } else if named.is_empty() {
@@ -181,6 +184,7 @@ mod tests {
             (&[(&[], 0.0)], thin, Verdict::InsufficientData),
             (&[(&["windage_drag"], 0.0), (&[], 80.0)], thin, Verdict::Explained),
             (&[(&["windage_drag"], 0.0), (&[], 80.0)], one_point, Verdict::InsufficientData),
+            (&[(&["windage_drag"], 0.0), (&["duct_loss"], 2.0), (&[], 80.0)], one_point, Verdict::Ambiguous),
             (&[], broke_down, Verdict::InsufficientData),
         ];
         for (costs, circumstances, verdict) in table {

@@ -20,6 +20,13 @@ pub struct Probe {
     sizes: Vec<(usize, DVector<f64>)>,
     /// What it does where it has no sizes.
     always: Option<DVector<f64>>,
+    /// Larger than the catalogue's start, where what it does is not in proportion.
+    bends: bool,
+}
+
+/// Whether what an effect does is not in proportion to its size: a screen then says little of it.
+pub fn bends(probes: &[Probe]) -> bool {
+    probes.iter().any(|probe| probe.bends)
 }
 
 impl Probe {
@@ -95,7 +102,7 @@ pub fn probe(problem: &Problem, baseline: &Fit, effect: &'static Descriptor) -> 
             (*j, c.1 * if size == 0.0 { 1.0 } else { size })
         });
         let sizes: Vec<(usize, DVector<f64>)> = sizes.collect();
-        return vec![Probe { member: whole, sizes, always: None }];
+        return vec![Probe { member: whole, sizes, always: None, bends: false }];
     }
     let strengths: Vec<usize> = (0..specs.len()).filter(|j| !specs[*j].shape && !specs[*j].held).collect();
     let action = |values: Vec<f64>| {
@@ -116,10 +123,10 @@ pub fn probe(problem: &Problem, baseline: &Fit, effect: &'static Descriptor) -> 
             let member = whole.clone().at(start.clone());
             if strengths.is_empty() {
                 // Without a size it is there or not.
-                return Some(Probe { member, sizes: Vec::new(), always: Some(action(start)?) });
+                return Some(Probe { member, sizes: Vec::new(), always: Some(action(start)?), bends: false });
             }
             let sizes: Vec<_> = strengths.iter().filter_map(|j| Some((*j, alone(&start, *j)?))).collect();
-            (!sizes.is_empty()).then_some(Probe { member, sizes, always: None })
+            (!sizes.is_empty()).then_some(Probe { member, sizes, always: None, bends: false })
         })
         .collect();
     let Some(first) = probes.first().filter(|p| p.always.is_none()) else { return probes };
@@ -135,7 +142,12 @@ pub fn probe(problem: &Problem, baseline: &Fit, effect: &'static Descriptor) -> 
             if in_proportion {
                 break;
             }
-            more.push(Probe { member: whole.clone().at(start), sizes: vec![(*j, action)], always: None });
+            more.push(Probe {
+                member: whole.clone().at(start),
+                sizes: vec![(*j, action)],
+                always: None,
+                bends: true,
+            });
         }
         more
     };

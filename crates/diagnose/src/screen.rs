@@ -30,9 +30,11 @@ pub struct Screened {
     pub action: Vec<f64>,
 }
 
+/// Starts of one effect that are fitted on top of one set.
+const STARTS_OF_ONE: usize = 2;
 /// What a closer look may gain beyond a probe's promise.
 const HOPE: f64 = 10.0;
-/// Promises looked at closely on top of one set.
+/// Promises looked at closely on top of one set, and effects of which one is.
 const CLOSELY: usize = 14;
 
 /// Screens effects on top of a fit, cheapest first. Effects that break the simulation down are left out.
@@ -43,7 +45,16 @@ pub fn screen(problem: &Problem, parent: &Fit, probes: &[&[Probe]]) -> Vec<Scree
         probes.par_iter().flat_map_iter(|probes| promises(problem, parent, known, probes)).collect();
     promised.retain(|p| p.cost < parent.cost() + HOPE);
     promised.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-    promised.truncate(CLOSELY);
+    let mut effects = Vec::new();
+    let promised = promised.into_iter().enumerate().filter(|(place, p)| {
+        let first = !effects.contains(&p.member.effect.id);
+        if first {
+            effects.push(p.member.effect.id);
+        }
+        // Other starts of a few effects must not crowd out the rest.
+        *place < CLOSELY || first && effects.len() <= CLOSELY
+    });
+    let promised: Vec<Promise> = promised.map(|p| p.1).collect();
     let best_of = |p: Promise| {
         let near =
             p.member.values.iter().zip(&p.probed.values).all(|(a, b)| a == b || (a / b - 1.0).abs() < 0.5);
@@ -53,12 +64,12 @@ pub fn screen(problem: &Problem, parent: &Fit, probes: &[&[Probe]]) -> Vec<Scree
     };
     let mut all: Vec<Screened> = promised.into_par_iter().filter_map(best_of).collect();
     all.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-    // The best of an effect's promises.
-    let mut seen = Vec::new();
+    // Where an effect is a different motion from each of its starts, a fit does not come from one to the other.
+    let mut seen: Vec<&'static str> = Vec::new();
     all.retain(|s| {
-        let new = !seen.contains(&s.effect.id);
+        let before = seen.iter().filter(|id| **id == s.effect.id).count();
         seen.push(s.effect.id);
-        new
+        before < STARTS_OF_ONE
     });
     all
 }

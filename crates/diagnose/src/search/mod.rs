@@ -1,6 +1,10 @@
 //! Which sets of effects do the recordings speak for? Forward, swap and backward steps through sets of
 //! effects, to convergence. Every set that was fitted is kept, with its cost: the posterior is over them.
 
+mod expand;
+mod forms;
+mod relatives;
+
 use std::collections::{BTreeMap, BTreeSet};
 
 use kort_identify::fit::{Columns, Fit};
@@ -12,21 +16,15 @@ use rayon::prelude::*;
 use crate::constants::{Constants, SearchConstants};
 use crate::flexible::{TERMS, is_term};
 use crate::probe::{Probe, probe, ways};
-use crate::screen::{Screened, screen};
+use crate::screen::Screened;
 
 /// A set of effects by name, in order of the alphabet.
 pub type Set = Vec<&'static str>;
 
 /// Most effects in a set.
 const MOST_EFFECTS: usize = 8;
-/// Doubt of a screen's cost, as a share of what it promises.
-const SCREEN_DOUBT: f64 = 0.15;
 /// Iterations of an exact fit.
 const ITERATIONS: usize = 12;
-/// Steps of a fit by which its forms are compared.
-const FIRST_STEPS: usize = 4;
-/// Forms are changed as long as that lowers a cost by this.
-const ENOUGH: f64 = 0.3;
 
 /// The search's memory.
 pub struct Search<'a, 'p> {
@@ -161,6 +159,9 @@ impl<'a, 'p> Search<'a, 'p> {
                     next = self.stand_in(&best);
                 }
                 if self.cost(&next) >= before - 1e-9 {
+                    next = self.relatives(&best);
+                }
+                if self.cost(&next) >= before - 1e-9 {
                     return best;
                 }
             }
@@ -240,75 +241,11 @@ impl<'a, 'p> Search<'a, 'p> {
         }
     }
 
-    /// Fits a set anew with each member in its other forms, until none helps: a screen sees only how a form begins,
-    /// and shapes that the data do not speak of are better left at their prior means. The cheapest is kept.
-    fn reshape(&mut self, set: &Set) {
-        while let Some(from) = self.fits.get(set) {
-            let before = from.cost();
-            if !self.reshaped.insert((set.clone(), before.to_bits())) {
-                return;
-            }
-            // A few steps tell which form is worth a fit to the end.
-            let best = self
-                .other_forms(from)
-                .par_iter()
-                .map(|members| {
-                    let (hypothesis, columns) = self.problem.recompose(from, members);
-                    self.problem.finish(self.problem.fit(&hypothesis, &columns, &from.actions, FIRST_STEPS))
-                })
-                .min_by(|a, b| a.cost().total_cmp(&b.cost()));
-            let Some(best) = best.filter(|fit| fit.cost() < before + self.constants.rivals) else { return };
-            let fit = self.problem.settle(&best.resume(), &best.columns, &best.actions, ITERATIONS);
-            self.keep(set.clone(), fit);
-            if self.fits[set].cost() > before - ENOUGH {
-                return;
-            }
-        }
-    }
-
-    /// The members of a fit with one of them in another of its forms. What a form leaves out stays at its prior mean,
-    /// what it adds begins where the catalogue says.
-    fn other_forms(&self, fit: &Fit) -> Vec<Vec<Member>> {
-        let members = self.problem.members(&fit.hypothesis, &fit.values);
-        let mut others = Vec::new();
-        for (k, member) in members.iter().enumerate() {
-            let specs = (member.effect.parameters)(&self.problem.scale);
-            let never = |j: &usize| specs[*j].held && specs[*j].shape;
-            let now: Vec<usize> = (0..specs.len()).filter(|j| !member.held.contains(j)).collect();
-            for mut form in member.effect.forms(&specs) {
-                form.retain(|j| !never(j));
-                form.sort_unstable();
-                if form == now || form.is_empty() {
-                    continue;
-                }
-                let mut other = member.clone();
-                other.held = (0..specs.len()).filter(|j| !form.contains(j)).collect();
-                for j in (0..specs.len()).filter(|j| !never(j) && now.contains(j) != form.contains(j)) {
-                    other.values[j] = match (form.contains(&j), specs[j].shape) {
-                        (true, _) => specs[j].start,
-                        (false, true) => specs[j].mean,
-                        (false, false) => 0.0,
-                    };
-                }
-                let mut all = members.clone();
-                all[k] = other;
-                others.push(all);
-            }
-        }
-        others
-    }
-
     /// Sets of a set's size that are likely enough to be stated beside it.
     fn near(&self, set: &Set) -> Vec<Set> {
         let bar = self.cost(set) + self.constants.rivals;
         let near = |other: &&Set| other.len() == set.len() && self.cost(other) < bar;
         self.fits.keys().filter(near).cloned().collect()
-    }
-
-    /// How far a cost may be off that gains so much: what a screen promises is off by a share of it where the
-    /// response bends.
-    fn doubt(&self, gain: f64) -> f64 {
-        self.constants.rivals + SCREEN_DOUBT * gain.max(0.0)
     }
 
     fn better(&self, set: Set, others: Vec<Set>) -> Set {
@@ -332,65 +269,16 @@ impl<'a, 'p> Search<'a, 'p> {
         self.keep(set.clone(), fit);
     }
 
-    /// Screens all effects on top of a set and fits exactly those that may come near a cost; the sets fitted.
-    fn expand(&mut self, set: &Set, bar: f64) -> Vec<Set> {
-        let Some(parent) = self.fits.get(set) else { return Vec::new() };
-        if !self.screens.contains_key(set) && !set.is_empty() {
-            // What did nothing to the baseline may act on a larger set.
-            let (problem, effects) = (self.problem, &self.effects);
-            self.probes.par_iter_mut().zip(effects).for_each(|(probes, effect)| {
-                if probes.iter().all(Probe::inert) && !set.contains(&effect.id) {
-                    *probes = probe(problem, parent, effect);
-                }
-            });
-        }
-        if !self.screens.contains_key(set) {
-            let rest: Vec<&[Probe]> = self
-                .effects
-                .iter()
-                .zip(&self.probes)
-                .filter(|(e, _)| !set.contains(&e.id))
-                .map(|(_, p)| p.as_slice())
-                .collect();
-            let screened = screen(self.problem, parent, &rest);
-            self.screens.insert(set.clone(), screened);
-        }
-        let with = |effect: &Descriptor| {
-            let mut larger = set.clone();
-            larger.push(effect.id);
-            larger.sort_unstable();
-            larger
-        };
-        let screened = &self.screens[set];
-        let best = screened.first().map_or(f64::INFINITY, |s| s.cost);
-        let doubt = self.doubt(parent.cost() - best);
-        let prior = self.prior(set);
-        let chosen: Vec<&Screened> = screened
-            .iter()
-            .take(self.constants.exact)
-            .filter(|s| s.cost < best + doubt && s.cost + prior + self.price_of(s.effect.id) < bar + doubt)
-            .collect();
-        let sets: Vec<Set> = chosen.iter().map(|s| with(s.effect)).collect();
-        let new: Vec<(Set, Fit)> = chosen
-            .par_iter()
-            .filter(|s| !self.fits.contains_key(&with(s.effect)))
-            .map(|s| {
-                let mut actions = parent.actions.clone();
-                actions.push(s.action.clone());
-                (with(s.effect), self.problem.settle(&s.hypothesis, &s.columns, &actions, ITERATIONS))
-            })
-            .collect();
-        for (set, fit) in new {
-            self.keep(set, fit);
-        }
-        sets
-    }
-
     fn keep(&mut self, set: Set, fit: Fit) {
-        let worse = self.fits.get(&set).is_some_and(|known| known.cost() <= fit.cost());
-        if !worse && !fit.broke_down() {
-            self.fits.insert(set, fit);
+        let known = self.fits.get(&set).map(Fit::cost);
+        if fit.broke_down() || known.is_some_and(|known| known <= fit.cost()) {
+            return;
         }
+        // What was seen from a worse place, with the command's steps elsewhere, is looked at again.
+        if known.is_some_and(|known| known > fit.cost() + self.constants.rivals) {
+            self.screens.remove(&set);
+        }
+        self.fits.insert(set, fit);
     }
 }
 

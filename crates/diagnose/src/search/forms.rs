@@ -1,0 +1,72 @@
+//! Other forms of the members of a set.
+
+use kort_identify::fit::Fit;
+use kort_identify::hypothesis::Member;
+use rayon::prelude::*;
+
+use super::{ITERATIONS, Search, Set};
+
+/// Steps of a fit by which its forms are compared.
+const FIRST_STEPS: usize = 4;
+/// Forms are changed as long as that lowers a cost by this.
+const ENOUGH: f64 = 0.3;
+
+impl Search<'_, '_> {
+    /// Fits a set anew with each member in its other forms, until none helps: a screen sees only how a form begins,
+    /// and shapes that the data do not speak of are better left at their prior means. The cheapest is kept.
+    pub(super) fn reshape(&mut self, set: &Set) {
+        while let Some(from) = self.fits.get(set) {
+            let before = from.cost();
+            if !self.reshaped.insert((set.clone(), before.to_bits())) {
+                return;
+            }
+            // A few steps tell which form is worth a fit to the end.
+            let best = self
+                .other_forms(from)
+                .par_iter()
+                .map(|members| {
+                    let (hypothesis, columns) = self.problem.recompose(from, members);
+                    self.problem.finish(self.problem.fit(&hypothesis, &columns, &from.actions, FIRST_STEPS))
+                })
+                .min_by(|a, b| a.cost().total_cmp(&b.cost()));
+            let Some(best) = best.filter(|fit| fit.cost() < before + self.constants.rivals) else { return };
+            let fit = self.problem.settle(&best.resume(), &best.columns, &best.actions, ITERATIONS);
+            self.keep(set.clone(), fit);
+            if self.fits[set].cost() > before - ENOUGH {
+                return;
+            }
+        }
+    }
+
+    /// The members of a fit with one of them in another of its forms. What a form leaves out stays at its prior mean,
+    /// what it adds begins where the catalogue says.
+    fn other_forms(&self, fit: &Fit) -> Vec<Vec<Member>> {
+        let members = self.problem.members(&fit.hypothesis, &fit.values);
+        let mut others = Vec::new();
+        for (k, member) in members.iter().enumerate() {
+            let specs = (member.effect.parameters)(&self.problem.scale);
+            let never = |j: &usize| specs[*j].held && specs[*j].shape;
+            let now: Vec<usize> = (0..specs.len()).filter(|j| !member.held.contains(j)).collect();
+            for mut form in member.effect.forms(&specs) {
+                form.retain(|j| !never(j));
+                form.sort_unstable();
+                if form == now || form.is_empty() {
+                    continue;
+                }
+                let mut other = member.clone();
+                other.held = (0..specs.len()).filter(|j| !form.contains(j)).collect();
+                for j in (0..specs.len()).filter(|j| !never(j) && now.contains(j) != form.contains(j)) {
+                    other.values[j] = match (form.contains(&j), specs[j].shape) {
+                        (true, _) => specs[j].start,
+                        (false, true) => specs[j].mean,
+                        (false, false) => 0.0,
+                    };
+                }
+                let mut all = members.clone();
+                all[k] = other;
+                others.push(all);
+            }
+        }
+        others
+    }
+}

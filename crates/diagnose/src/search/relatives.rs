@@ -1,0 +1,80 @@
+//! What members of a set are confused with, fitted from every start.
+
+use kort_identify::fit::Fit;
+use kort_identify::hypothesis::{Hypothesis, Member};
+use kort_thruster::effects::Descriptor;
+use rayon::prelude::*;
+
+use super::{ITERATIONS, Search, Set};
+use crate::probe::bends;
+
+/// Starts from which first steps are taken.
+const MOST_BEGUN: usize = 3;
+/// Steps of a fit by which its starts are compared.
+const FIRST_STEPS: usize = 4;
+
+impl Search<'_, '_> {
+    /// Fits, in the place of a member, what the catalogue says it is confused with and no screen led to: play, friction
+    /// or a limit at another size is another motion, of which one linear step says nothing. The best set.
+    pub(super) fn relatives(&mut self, set: &Set) -> Set {
+        let mut tried = Vec::new();
+        for member in set {
+            let rest: Set = set.iter().copied().filter(|m| m != member).collect();
+            let Some(named) = self.descriptor(member) else { continue };
+            let related =
+                |e: &Descriptor| named.confused_with.contains(&e.id) || e.confused_with.contains(member);
+            let others: Vec<&'static Descriptor> = self
+                .effects
+                .iter()
+                .zip(&self.probes)
+                .filter(|(e, probes)| related(e) && bends(probes) && !rest.contains(&e.id))
+                .map(|(e, _)| *e)
+                .collect();
+            self.ensure(&rest, set);
+            for effect in others {
+                let mut place = rest.clone();
+                place.push(effect.id);
+                place.sort_unstable();
+                if self.fits.contains_key(&place) {
+                    continue;
+                }
+                let Some(parent) = self.fits.get(&rest).cloned() else { break };
+                if let Some(fit) = self.from_every_start(&parent, effect) {
+                    self.keep(place.clone(), fit);
+                    tried.push(place);
+                }
+            }
+        }
+        self.better(set.clone(), tried)
+    }
+
+    /// The best fit with one more effect of those that begin at each of its starts, beside the parent's values and
+    /// beside the stated ones, which the parent had to bend.
+    fn from_every_start(&self, parent: &Fit, effect: &'static Descriptor) -> Option<Fit> {
+        let scale = &self.problem.scale;
+        let whole = Member::new(effect, scale);
+        let mut starts = (effect.starts)(scale);
+        starts.insert(0, whole.values.clone());
+        let mut actions = parent.actions.clone();
+        actions.push(vec![0.0; self.problem.spectrum.bands.len()]);
+        let stated: Vec<f64> = (parent.hypothesis.free.iter().zip(&parent.values))
+            .map(|(free, value)| if free.stated { free.mean } else { *value })
+            .collect();
+        let merit = |fit: &Fit| fit.noise.misfit + fit.penalty;
+        let stand = |(start, values): (&Vec<f64>, &[f64])| {
+            let hypothesis = parent.hypothesis.with(values, whole.clone().at(start.clone()), scale);
+            self.problem.fit(&hypothesis, &Vec::new(), &actions, 0)
+        };
+        let begun: Vec<(&Vec<f64>, &[f64])> =
+            starts.iter().flat_map(|s| [(s, &parent.values[..]), (s, &stated[..])]).collect();
+        let mut begun: Vec<Fit> = begun.into_par_iter().map(stand).filter(|f| merit(f).is_finite()).collect();
+        begun.sort_by(|a, b| merit(a).total_cmp(&merit(b)));
+        begun.truncate(MOST_BEGUN);
+        let best = begun
+            .par_iter()
+            .map(|fit| self.problem.fit(&fit.hypothesis, &Vec::new(), &actions, FIRST_STEPS))
+            .min_by(|a, b| merit(a).total_cmp(&merit(b)))?;
+        let from: Hypothesis = best.resume();
+        Some(self.problem.settle(&from, &best.columns, &actions, ITERATIONS))
+    }
+}
