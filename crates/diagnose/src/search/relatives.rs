@@ -39,7 +39,7 @@ impl Search<'_, '_> {
                     continue;
                 }
                 let Some(parent) = self.fits.get(&rest).cloned() else { break };
-                if let Some(fit) = self.from_every_start(&parent, effect) {
+                if let Some(fit) = self.best_of_every_start(&parent, effect) {
                     self.keep(place.clone(), fit);
                     tried.push(place);
                 }
@@ -50,7 +50,7 @@ impl Search<'_, '_> {
 
     /// The best fit with one more effect of those that begin at each of its starts, beside the parent's values and
     /// beside the stated ones, which the parent had to bend.
-    fn from_every_start(&self, parent: &Fit, effect: &'static Descriptor) -> Option<Fit> {
+    fn best_of_every_start(&self, parent: &Fit, effect: &'static Descriptor) -> Option<Fit> {
         let scale = &self.problem.scale;
         let whole = Member::new(effect, scale);
         let mut starts = (effect.starts)(scale);
