@@ -78,7 +78,12 @@ pub fn negligible(problem: &Problem, fit: &Fit) -> Vec<(&'static str, f64)> {
         let most = acts.iter().flatten().zip(full).map(|(v, full)| v.sqrt() / full).fold(0.0, f64::max);
         channels.all(|(acts, signal)| *acts < share * signal).then_some((member.effect.id, most))
     };
-    fit.hypothesis.effects.iter().zip(&fit.actions).filter_map(small).collect()
+    sized(problem, fit).filter_map(small).collect()
+}
+
+/// Effects of a fit that have a size, with what they do.
+fn sized<'a>(problem: &'a Problem, fit: &'a Fit) -> impl Iterator<Item = (&'a Member, &'a Vec<f64>)> {
+    fit.hypothesis.effects.iter().zip(&fit.actions).filter(|(member, _)| member.has_size(&problem.scale))
 }
 
 /// Share of what an effect does that is the same all the time, from which on it is steady.
@@ -94,8 +99,7 @@ pub fn steady(problem: &Problem, fit: &Fit) -> Vec<&'static str> {
         let whole: f64 = (0..bands.len()).map(power).sum();
         (0..bands.len()).filter(|b| first(*b)).map(power).sum::<f64>() > STEADY * whole
     };
-    let effects = fit.hypothesis.effects.iter().zip(&fit.actions);
-    effects.filter(|(_, action)| shifts(action)).map(|(member, _)| member.effect.id).collect()
+    sized(problem, fit).filter(|(_, action)| shifts(action)).map(|(member, _)| member.effect.id).collect()
 }
 
 /// Largest error of good sensors over their full scale, beyond the noise from one sample to the next.

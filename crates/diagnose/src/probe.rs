@@ -251,7 +251,7 @@ fn of_form(
         for _ in 0..2 {
             let floor = problem.floor.with_actions(&actions, &problem.criterion);
             let minimum = model.minimise(&floor, &free, &values, 0.0);
-            let mut acts = probe.always.clone().unwrap_or_else(|| DVector::zeros(problem.spectrum.lines));
+            let mut acts = DVector::zeros(problem.spectrum.lines);
             for (i, k) in form.iter().enumerate() {
                 let at = free_len(parent) + i;
                 acts.axpy(minimum.step[at] * free[at].sigma, &probe.sizes[*k].1, 1.0);

@@ -75,7 +75,7 @@ pub fn screen(problem: &Problem, parent: &Fit, probes: &[&[Probe]]) -> Vec<Scree
 }
 
 fn at(problem: &Problem, parent: &Fit, known: &[DMatrix<f64>], member: Member) -> Option<Screened> {
-    let effect = member.effect;
+    let (effect, has_size) = (member.effect, member.has_size(&problem.scale));
     let hypothesis = parent.hypothesis.with(&parent.values, member, &problem.scale);
     let own: Vec<usize> = (parent.values.len()..hypothesis.free.len()).collect();
     let (lines, new) = if own.len() <= LANES {
@@ -104,8 +104,9 @@ fn at(problem: &Problem, parent: &Fit, known: &[DMatrix<f64>], member: Member) -
         for (k, column) in own.iter().zip(&new) {
             acts.axpy(found.step[*k] * hypothesis.free[*k].sigma, column, 1.0);
         }
-        let last = actions.len() - 1;
-        actions[last] = problem.spectrum.powers(&acts);
+        if let Some(own) = actions.last_mut().filter(|_| has_size) {
+            *own = problem.spectrum.powers(&acts);
+        }
         minimum = Some(found);
     }
     let minimum = minimum?;

@@ -195,11 +195,15 @@ impl Problem<'_> {
         fit
     }
 
-    /// What each effect of a fit does to the response: the change where it is taken away.
+    /// What each effect of a fit does to the response: the change where it is taken away. Nothing is said of what has
+    /// no size: it is no share of the response that may be off by a share.
     fn actions(&self, fit: &Fit) -> Vec<Vec<f64>> {
         let all = self.members(&fit.hypothesis, &fit.values);
         (0..all.len())
             .map(|without| {
+                if !all[without].has_size(&self.scale) {
+                    return vec![0.0; self.spectrum.bands.len()];
+                }
                 let rest: Vec<Member> =
                     all.iter().enumerate().filter(|(i, _)| *i != without).map(|(_, m)| m.clone()).collect();
                 let (smaller, _) = self.recompose(fit, &rest);

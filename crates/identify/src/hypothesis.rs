@@ -100,6 +100,12 @@ impl Member {
     pub fn at(self, values: Vec<f64>) -> Self {
         Self { values, ..self }
     }
+
+    /// Whether it has a size, or is there or not: other equations in the place of the model's, as exact as they are,
+    /// and no addition that is known to a share of itself.
+    pub fn has_size(&self, scale: &Scale) -> bool {
+        (self.effect.parameters)(scale).iter().any(|spec| !spec.shape)
+    }
 }
 
 /// Where inside its log interval each step of the command happened: control ticks before the row that
