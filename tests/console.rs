@@ -122,7 +122,7 @@ fn a_bench_engineer_plays_signals_and_compares_runs() {
         for (name, level) in [("first", 20), ("second", 40)] {
             page.eval("$('signal-kind').value = 'steps'; showFields()");
             let fill = format!(
-                "$('signal-level').value = {level}; $('signal-each_s').value = 0.6; $('signal-record').value = '{name}'; $('play').dataset.ready = ''; preview()"
+                "$('signal-level').value = {level}; $('signal-each_s').value = 1.2; $('signal-record').value = '{name}'; $('play').dataset.ready = ''; preview()"
             );
             page.eval(&fill);
             page.click("play");
