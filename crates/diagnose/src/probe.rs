@@ -115,9 +115,8 @@ pub fn probe(problem: &Problem, baseline: &Fit, effect: &'static Descriptor) -> 
         strengths.iter().filter(|j| **j != only).for_each(|j| values[*j] = 0.0);
         if values[only] == 0.0 { None } else { action(values) }
     };
-    let mut starts = (effect.starts)(&problem.scale);
-    starts.insert(0, whole.values.clone());
-    let mut probes: Vec<Probe> = starts
+    let mut probes: Vec<Probe> = whole
+        .starts(&problem.scale)
         .into_par_iter()
         .filter_map(|start| {
             let member = whole.clone().at(start.clone());

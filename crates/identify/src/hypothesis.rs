@@ -101,6 +101,11 @@ impl Member {
         Self { values, ..self }
     }
 
+    /// Where a fit of it may begin: here, and at the catalogue's other starts.
+    pub fn starts(&self, scale: &Scale) -> Vec<Vec<f64>> {
+        std::iter::once(self.values.clone()).chain((self.effect.starts)(scale)).collect()
+    }
+
     /// Whether it has a size, or is there or not: other equations in the place of the model's, as exact as they are,
     /// and no addition that is known to a share of itself.
     pub fn has_size(&self, scale: &Scale) -> bool {

@@ -1,10 +1,9 @@
 //! Which effects on top of a set are worth an exact fit.
 
 use kort_identify::fit::Fit;
-use kort_thruster::effects::Descriptor;
 use rayon::prelude::*;
 
-use super::{ITERATIONS, Search, Set};
+use super::{ITERATIONS, Search, Set, with};
 use crate::probe::{Probe, probe};
 use crate::screen::{Screened, screen};
 
@@ -52,12 +51,7 @@ impl Search<'_, '_> {
     /// that is not kept bars no other, and what promised less from another start is tried.
     fn fit_those_that_may(&mut self, set: &Set, mut untried: Vec<Screened>, bar: f64) -> Vec<Set> {
         let parent = self.fits[set].clone();
-        let with = |effect: &Descriptor| {
-            let mut larger = set.clone();
-            larger.push(effect.id);
-            larger.sort_unstable();
-            larger
-        };
+        let larger = |screened: &Screened| with(set, screened.effect.id);
         let mut sets: Vec<Set> = Vec::new();
         loop {
             let fitted = sets.iter().filter_map(|s| self.fits.get(s)).map(Fit::cost);
@@ -75,15 +69,15 @@ impl Search<'_, '_> {
             }
             let new: Vec<(Set, Fit)> = chosen
                 .par_iter()
-                .filter(|s| self.fits.get(&with(s.effect)).is_none_or(|fit| s.cost < fit.cost() - ENOUGH))
+                .filter(|s| self.fits.get(&larger(s)).is_none_or(|fit| s.cost < fit.cost() - ENOUGH))
                 .map(|s| {
                     let mut actions = parent.actions.clone();
                     actions.push(s.action.clone());
-                    (with(s.effect), self.problem.settle(&s.hypothesis, &s.columns, &actions, ITERATIONS))
+                    (larger(s), self.problem.settle(&s.hypothesis, &s.columns, &actions, ITERATIONS))
                 })
                 .collect();
             new.into_iter().for_each(|(set, fit)| self.keep(set, fit));
-            for set in chosen.iter().map(|s| with(s.effect)) {
+            for set in chosen.iter().map(larger) {
                 if !sets.contains(&set) {
                     sets.push(set);
                 }

@@ -4,10 +4,8 @@ use kort_identify::fit::Fit;
 use kort_identify::hypothesis::Member;
 use rayon::prelude::*;
 
-use super::{ITERATIONS, Search, Set};
+use super::{FIRST_STEPS, ITERATIONS, Search, Set};
 
-/// Steps of a fit by which its forms are compared.
-const FIRST_STEPS: usize = 4;
 /// Forms are changed as long as that lowers a cost by this.
 const ENOUGH: f64 = 0.3;
 

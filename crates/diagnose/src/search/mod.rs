@@ -25,6 +25,8 @@ pub type Set = Vec<&'static str>;
 const MOST_EFFECTS: usize = 8;
 /// Iterations of an exact fit.
 const ITERATIONS: usize = 12;
+/// Steps of a fit by which forms or starts are compared.
+const FIRST_STEPS: usize = 4;
 
 /// The search's memory.
 pub struct Search<'a, 'p> {
@@ -183,7 +185,7 @@ impl<'a, 'p> Search<'a, 'p> {
                 return best;
             }
             for member in best.clone() {
-                let rest: Set = best.iter().copied().filter(|m| *m != member).collect();
+                let rest = without(&best, member);
                 progress(&format!("instead of {member} beside {}", words(&rest)));
                 self.ensure(&rest, &best);
                 let tried = self.expand(&rest, self.cost(&best));
@@ -207,14 +209,13 @@ impl<'a, 'p> Search<'a, 'p> {
             if same.is_empty() || offered.len() < same.len() || same.iter().any(|id| set.contains(id)) {
                 continue;
             }
-            let mut place: Set = set.iter().copied().filter(|m| m != member).collect();
+            let mut place = without(set, member);
             self.ensure(&place, set);
             for effect in offered {
                 let Some(parent) = self.fits.get(&place).cloned() else { break };
                 let new = Member::new(effect, &self.problem.scale);
                 let hypothesis = parent.hypothesis.with(&parent.values, new, &self.problem.scale);
-                place.push(effect.id);
-                place.sort_unstable();
+                place = with(&place, effect.id);
                 self.fit_set(place.clone(), &hypothesis, &parent.columns, &parent.actions);
             }
             self.reshape(&place);
@@ -229,7 +230,7 @@ impl<'a, 'p> Search<'a, 'p> {
         loop {
             let mut smaller = Vec::new();
             for member in &best {
-                let rest: Set = best.iter().copied().filter(|m| m != member).collect();
+                let rest = without(&best, member);
                 self.ensure(&rest, &best);
                 smaller.push(rest);
             }
@@ -280,6 +281,19 @@ impl<'a, 'p> Search<'a, 'p> {
         }
         self.fits.insert(set, fit);
     }
+}
+
+/// A set with one more effect.
+fn with(set: &Set, id: &'static str) -> Set {
+    let mut larger = set.clone();
+    larger.push(id);
+    larger.sort_unstable();
+    larger
+}
+
+/// A set without one of its members.
+fn without(set: &Set, member: &str) -> Set {
+    set.iter().copied().filter(|id| *id != member).collect()
 }
 
 fn words(set: &Set) -> String {

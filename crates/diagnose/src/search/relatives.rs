@@ -1,17 +1,15 @@
 //! What members of a set are confused with, fitted from every start.
 
 use kort_identify::fit::Fit;
-use kort_identify::hypothesis::{Hypothesis, Member};
+use kort_identify::hypothesis::Member;
 use kort_thruster::effects::Descriptor;
 use rayon::prelude::*;
 
-use super::{ITERATIONS, Search, Set};
+use super::{FIRST_STEPS, ITERATIONS, Search, Set, with, without};
 use crate::probe::bends;
 
 /// Starts from which first steps are taken.
 const MOST_BEGUN: usize = 3;
-/// Steps of a fit by which its starts are compared.
-const FIRST_STEPS: usize = 4;
 
 impl Search<'_, '_> {
     /// Fits, in the place of a member, what the catalogue says it is confused with and no screen led to: play, friction
@@ -19,7 +17,7 @@ impl Search<'_, '_> {
     pub(super) fn relatives(&mut self, set: &Set) -> Set {
         let mut tried = Vec::new();
         for member in set {
-            let rest: Set = set.iter().copied().filter(|m| m != member).collect();
+            let rest = without(set, member);
             let Some(named) = self.descriptor(member) else { continue };
             let related =
                 |e: &Descriptor| named.confused_with.contains(&e.id) || e.confused_with.contains(member);
@@ -32,9 +30,7 @@ impl Search<'_, '_> {
                 .collect();
             self.ensure(&rest, set);
             for effect in others {
-                let mut place = rest.clone();
-                place.push(effect.id);
-                place.sort_unstable();
+                let place = with(&rest, effect.id);
                 if self.fits.contains_key(&place) {
                     continue;
                 }
@@ -53,8 +49,7 @@ impl Search<'_, '_> {
     fn best_of_every_start(&self, parent: &Fit, effect: &'static Descriptor) -> Option<Fit> {
         let scale = &self.problem.scale;
         let whole = Member::new(effect, scale);
-        let mut starts = (effect.starts)(scale);
-        starts.insert(0, whole.values.clone());
+        let starts = whole.starts(scale);
         let mut actions = parent.actions.clone();
         actions.push(vec![0.0; self.problem.spectrum.bands.len()]);
         let stated: Vec<f64> = (parent.hypothesis.free.iter().zip(&parent.values))
@@ -74,7 +69,6 @@ impl Search<'_, '_> {
             .par_iter()
             .map(|fit| self.problem.fit(&fit.hypothesis, &Vec::new(), &actions, FIRST_STEPS))
             .min_by(|a, b| merit(a).total_cmp(&merit(b)))?;
-        let from: Hypothesis = best.resume();
-        Some(self.problem.settle(&from, &best.columns, &actions, ITERATIONS))
+        Some(self.problem.settle(&best.resume(), &best.columns, &actions, ITERATIONS))
     }
 }
