@@ -18,7 +18,7 @@ use std::time::{Duration, Instant};
 use common::Site;
 use common::bench::Bench;
 use kort_emulators::vesc::Make;
-use kort_emulators::{Bench as Emulator, Moteus, ODrive, Vesc, moteus};
+use kort_emulators::{Adapter, Bench as Emulator, Cia402, Moteus, ODrive, Vesc, cia402, moteus};
 use kort_proto::messages::{Command, Outcome, RequestKind, Telemetry};
 use kort_proto::transport::{Ticker, monotonic_ns};
 use kort_thruster::rig::Rig;
@@ -47,6 +47,10 @@ fn main() {
     let moteus = Emulator::start(Moteus::new(moteus::Make::default(), &rig)).expect("a pseudo terminal");
     let (site, emulator) = wired("moteus", "timeout_ms = 100", moteus);
     measure("moteus", site, Some(emulator), seconds);
+    let cia402 = Adapter::new(Cia402::new(cia402::Make::default(), &rig));
+    let cia402 = Emulator::start(cia402).expect("a pseudo terminal");
+    let (site, emulator) = wired("cia402", "timeout_ms = 100, units_per_turn = 4096", cia402);
+    measure("cia402", site, Some(emulator), seconds);
 }
 
 fn measure(name: &str, site: Site, emulator: Option<Emulator>, seconds: u64) {

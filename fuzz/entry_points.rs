@@ -75,17 +75,27 @@ pub fn wire(bytes: &[u8]) {
     let mut vesc = bytes.to_vec();
     let mut odrive = bytes.to_vec();
     let mut moteus = bytes.to_vec();
+    let mut cia402 = bytes.to_vec();
     for part in bytes.chunks(40) {
         kort_servo::drives::vesc::frame::frame(part, &mut vesc);
         kort_servo::drives::odrive::text::line(&String::from_utf8_lossy(part), &mut odrive);
         let hex: String = part.iter().map(|byte| format!("{byte:02x}")).collect();
         moteus.extend(format!("\nrcv 100 {hex}\n").bytes());
+        // Answers to SDO, both of a reading, emergency, heartbeat, each with as many bytes as it has.
+        for (id, length) in [("581", 8), ("181", 5), ("281", 8), ("081", 8), ("701", 1)] {
+            cia402.extend(format!("\rt{id}{length}{}\r", hex.get(..2 * length).unwrap_or_default()).bytes());
+        }
     }
-    for (kind, keys, heard) in
-        [("vesc", "pole_pairs = 7", vesc), ("odrive", "", odrive), ("moteus", "", moteus)]
-    {
+    for (kind, keys, heard) in [
+        ("vesc", "pole_pairs = 7", vesc),
+        ("odrive", "", odrive),
+        ("moteus", "", moteus),
+        ("cia402", "units_per_turn = 4096", cia402),
+        ("cia402", "port = \"can0\"\nunits_per_turn = 4096", bytes.to_vec()),
+    ] {
+        let port = if keys.contains("port") { "" } else { "port = \"/dev/p\"\n" };
         let text = format!(
-            "[thrusters.t1]\nrig = \"r\"\namplifier = \"{kind}\"\n[thrusters.t1.drive]\nport = \"p\"\n{keys}\n"
+            "[thrusters.t1]\nrig = \"r\"\namplifier = \"{kind}\"\n[thrusters.t1.drive]\n{port}{keys}\n"
         );
         let config = Config::parse(&text, None).expect("a sound deployment");
         let thruster = config.thruster("t1").expect("it is there");
@@ -97,6 +107,7 @@ pub fn wire(bytes: &[u8]) {
         for piece in heard.chunks(1 + heard.len() / 5) {
             protocol.ask(&mut out, &mut |_| ());
             protocol.hear(piece, &mut |_| ());
+            protocol.reply(&mut out);
             protocol.tell(Some(1.0), &mut out);
             protocol.hear(piece, &mut |_| ());
             protocol.tell(None, &mut out);

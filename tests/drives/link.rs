@@ -192,10 +192,11 @@ impl Case {
         self.turn(bench, emulator);
     }
 
-    /// Everything that can happen to a wire.
+    /// Everything that can happen to a wire; what turned bits and repeated answers show as is the protocol's.
     pub fn endures_its_wire(
         &self,
         emulator: &Emulator,
+        flipped: &[Fault],
         stale: &[Fault],
         frozen: Duration,
         harmless: &[Mischief],
@@ -206,7 +207,7 @@ impl Case {
             (Mischief::Silent, lost, SILENCE),
             (Mischief::Garbage, lost, SILENCE),
             (Mischief::Truncated, lost, SILENCE),
-            (Mischief::Flipped, lost, SILENCE),
+            (Mischief::Flipped, flipped, SILENCE),
             (Mischief::Stale, stale, frozen),
             (Mischief::Unplugged, lost, TIMEOUT),
         ] {
@@ -245,6 +246,24 @@ impl Case {
         self.ends_at_zero(&mut bench, emulator, &fault, SILENCE, report, || emulator.report(0));
         assert!(bench.site.log().contains(words), "{}", bench.site.log());
         self.ends_at_zero(&mut bench, emulator, &fault, SILENCE, report, || emulator.restart());
+    }
+
+    /// It reaches the drive asked for, on a rig of another kind; a machine that stands still trips it: then once more.
+    pub fn follows(&self, rig: &str, emulator: &Emulator) {
+        let site = self.site(emulator);
+        let config = std::fs::read_to_string(site.config()).unwrap();
+        let config = config
+            .replace("whitcomb-yoerger-1999", rig)
+            .replace("{ full_drive_s = 0.005 }", "{ full_drive_s = 0.5, speed_rad_s = 500.0 }");
+        std::fs::write(site.config(), config).unwrap();
+        let mut bench = Bench::start_at(site);
+        bench.zero = self.command;
+        let there = (0..6).any(|_| {
+            self.turn(&mut bench, emulator);
+            self.drive_for(&mut bench, 500);
+            (emulator.truth().command - self.drive).abs() < 0.01 * self.drive
+        });
+        assert!(there, "{rig}: {:?}", emulator.truth());
     }
 
     /// A servo that is killed or stands still: the drive's own time-out ends it.

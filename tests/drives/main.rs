@@ -2,6 +2,7 @@
 //! Each ends at zero torque at the motor within its bound, with a fault latched, and nothing is resumed.
 
 mod calibrate;
+mod cia402;
 #[path = "../common/mod.rs"]
 mod common;
 mod link;

@@ -26,7 +26,7 @@ fn the_service_drives_it_and_records() {
 fn every_fault_of_the_wire_ends_at_zero() {
     alone(|| {
         let uart = moteus(Make { uart: true, ..Make::default() });
-        case().endures_its_wire(&uart, &[Fault::DriveLost], SILENCE, &[Mischief::Split]);
+        case().endures_its_wire(&uart, &[Fault::DriveLost], &[Fault::DriveLost], SILENCE, &[Mischief::Split]);
     });
 }
 

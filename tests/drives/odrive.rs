@@ -25,7 +25,7 @@ fn every_fault_of_the_wire_ends_at_zero() {
         // Noise costs a line, and with it the answer; a line repeated in the place of the others is no whole answer;
         // whole old answers are VESC's test.
         let stale = [Fault::SensorFrozen, Fault::DriveLost];
-        case().endures_its_wire(&odrive(false), &stale, FROZEN, &[Mischief::Split]);
+        case().endures_its_wire(&odrive(false), &[Fault::DriveLost], &stale, FROZEN, &[Mischief::Split]);
     });
 }
 

@@ -27,7 +27,13 @@ fn the_service_drives_it_and_records() {
 fn every_fault_of_the_wire_ends_at_zero() {
     alone(|| {
         let harmless = [Mischief::Split, Mischief::Noisy];
-        case().endures_its_wire(&vesc(Make::default()), &[Fault::SensorFrozen], FROZEN, &harmless);
+        case().endures_its_wire(
+            &vesc(Make::default()),
+            &[Fault::DriveLost],
+            &[Fault::SensorFrozen],
+            FROZEN,
+            &harmless,
+        );
     });
 }
 
@@ -78,22 +84,7 @@ fn volts_are_given_as_duty_and_speed_to_its_own_loop() {
         {
             let emulator = Emulator::start(Vesc::new(Make::default(), &rig(name))).unwrap();
             let command = Command { kind: kind as u32, ..Command::default() };
-            let case = Case { drive, command, ..case() };
-            let site = case.site(&emulator);
-            let config = std::fs::read_to_string(site.config()).unwrap();
-            let config = config
-                .replace("whitcomb-yoerger-1999", name)
-                .replace("{ full_drive_s = 0.005 }", "{ full_drive_s = 0.5, speed_rad_s = 500.0 }");
-            std::fs::write(site.config(), config).unwrap();
-            let mut bench = crate::common::bench::Bench::start_at(site);
-            bench.zero = command;
-            // A machine that stands still trips it: then once more.
-            let there = (0..6).any(|_| {
-                case.turn(&mut bench, &emulator);
-                case.drive_for(&mut bench, 500);
-                (emulator.truth().command - drive).abs() < 0.01 * drive
-            });
-            assert!(there, "{name}: {:?}", emulator.truth());
+            Case { drive, command, ..case() }.follows(name, &emulator);
         }
     });
 }

@@ -8,16 +8,21 @@
 //! whatever a firmware does that its description does not say.
 
 mod bench;
+mod canopen;
+pub mod cia402;
 pub mod moteus;
 pub mod odrive;
 mod printer;
 mod pty;
+pub mod slcan;
 mod stand;
 pub mod vesc;
 
 pub use bench::{Bench, Device, Mischief, Truth};
+pub use cia402::Cia402;
 pub use moteus::Moteus;
 pub use odrive::ODrive;
 pub use printer::Printer;
+pub use slcan::Adapter;
 pub use stand::Stand;
 pub use vesc::Vesc;

@@ -3,7 +3,7 @@
 
 use std::time::{Duration, Instant};
 
-use kort_emulators::{Bench, Moteus, ODrive, Vesc, moteus, vesc};
+use kort_emulators::{Adapter, Bench, Cia402, Moteus, ODrive, Vesc, cia402, moteus, vesc};
 use kort_proto::config::Config;
 use kort_proto::faults::Fault;
 use kort_proto::transport::monotonic_ns;
@@ -58,11 +58,13 @@ fn a_drives_own_fault_ends_with_it_and_with_a_reset() {
     let vesc = Bench::start(Vesc::new(vesc::Make::default(), &rig)).unwrap();
     let odrive = Bench::start(ODrive::new(&rig, false)).unwrap();
     let moteus = Bench::start(Moteus::new(moteus::Make::default(), &rig)).unwrap();
+    let cia402 = Bench::start(Adapter::new(Cia402::new(cia402::Make::default(), &rig))).unwrap();
     let own = |faults: u64| faults & Fault::AmplifierFault.bit() != 0;
     for (kind, keys, emulator, code) in [
         ("vesc", "pole_pairs = 7", vesc, 4),
         ("odrive", "baud = 115200", odrive, 0x40),
         ("moteus", "address = 1", moteus, 33),
+        ("cia402", "units_per_turn = 4096", cia402, 0x4310),
     ] {
         let mut servo = Loop::new(kind, keys, emulator, &rig);
         servo.until(&format!("{kind} to be ready"), |now, _| now == 0);

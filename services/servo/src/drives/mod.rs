@@ -1,5 +1,6 @@
 //! Drives. One drive, one file, behind one trait; the loop knows no hardware.
 
+pub mod cia402;
 mod lying;
 pub mod moteus;
 pub mod odrive;
@@ -14,6 +15,7 @@ use kort_thruster::rig::{AmplifierKind, Rig};
 use crate::devices::{At, Shown};
 use crate::link::Protocol;
 
+use cia402::Cia402;
 use moteus::Moteus;
 use odrive::ODrive;
 pub use simulated::Simulated;
@@ -45,7 +47,7 @@ pub enum Chosen {
 }
 
 /// Names of the drives, as `amplifier` gives them.
-pub const ALL: [&str; 4] = ["simulated", "vesc", "odrive", "moteus"];
+pub const ALL: [&str; 5] = ["simulated", "vesc", "odrive", "moteus", "cia402"];
 
 /// Reads what the configuration says of the drive.
 ///
@@ -65,6 +67,10 @@ pub fn choose(config: &Config, id: &str, thruster: &Thruster, rig: &Rig) -> Resu
         "moteus" => {
             let moteus = Moteus::new(config, id, thruster, rig)?;
             Ok(Chosen::OnWire(moteus.wired.clone(), Box::new(moteus::Protocol::new(moteus))))
+        }
+        "cia402" => {
+            let drive = Cia402::new(config, id, thruster, rig)?;
+            Ok(Chosen::OnWire(drive.wired.clone(), Box::new(cia402::Protocol::new(drive))))
         }
         other => Err(config.error(format!(
             "`thrusters.{id}.amplifier` = \"{other}\" is no drive\nhint: known are \"{}\"",

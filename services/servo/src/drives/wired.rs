@@ -18,6 +18,9 @@ struct Keys {
     identity: String,
     pole_pairs: Option<u32>,
     address: Option<u8>,
+    bitrate: Option<u32>,
+    units_per_turn: Option<f64>,
+    speed_units: Option<f64>,
 }
 
 impl Default for Keys {
@@ -32,9 +35,26 @@ impl Default for Keys {
             identity: String::new(),
             pole_pairs: None,
             address: None,
+            bitrate: None,
+            units_per_turn: None,
+            speed_units: None,
         }
     }
 }
+
+/// Keys that only some drives have: why another has none, and what to do.
+const OWN: [(&str, &str, &str); 6] = [
+    ("pole_pairs", "this drive tells the speed of the shaft itself", "leave the key out"),
+    ("address", "this drive is alone on its wire", "leave the key out"),
+    (
+        "identity",
+        "kort reads no serial number of this drive",
+        "leave the key out, and name the port by the adapter's: /dev/serial/by-id/…",
+    ),
+    ("bitrate", "this drive is on no CAN adapter", "leave the key out; `baud` is a serial port's"),
+    ("units_per_turn", "this drive tells angles in turns", "leave the key out"),
+    ("speed_units", "this drive tells speed in a unit that kort knows", "leave the key out"),
+];
 
 /// A drive on a wire, as the configuration describes it.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,17 +77,30 @@ pub struct Wired {
     pub pole_pairs: Option<u32>,
     /// Number on the bus, for drives that share one.
     pub address: Option<u8>,
+    /// Bits a second on the CAN behind an adapter on a serial port.
+    pub bitrate: Option<u32>,
+    /// Position units of a turn of the shaft, for drives whose unit is a setting.
+    pub units_per_turn: Option<f64>,
+    /// Velocity units at a turn a second, likewise.
+    pub speed_units: Option<f64>,
+    /// The port is a CAN interface of the system, and this the drive's node there.
+    pub can_node: Option<u8>,
 }
 
 impl Wired {
-    /// Reads and checks the section.
+    /// Reads and checks the section; `own` are those of the keys that not every drive has which this one has.
     ///
     /// # Errors
     /// [`ConfigError`] names key, value and what is allowed.
-    pub fn new(config: &Config, id: &str, thruster: &Thruster) -> Result<Self, ConfigError> {
+    pub fn new(config: &Config, id: &str, thruster: &Thruster, own: &[&str]) -> Result<Self, ConfigError> {
         let section = format!("thrusters.{id}.drive");
         let keys: Keys = config.section(&section, &thruster.drive)?;
         let fail = |key: &str, words: String| Err(config.error(format!("`{section}.{key}` {words}")));
+        for (key, why, hint) in OWN {
+            if let Some(value) = thruster.drive.get(key).filter(|_| !own.contains(&key)) {
+                return fail(key, format!("= {value}: {why}\nhint: {hint}"));
+            }
+        }
         if keys.port.as_os_str().is_empty() {
             return fail(
                 "port",
@@ -119,47 +152,11 @@ impl Wired {
             identity: keys.identity.to_ascii_lowercase(),
             pole_pairs: keys.pole_pairs,
             address: keys.address,
+            bitrate: keys.bitrate,
+            units_per_turn: keys.units_per_turn,
+            speed_units: keys.speed_units,
+            can_node: None,
         })
-    }
-
-    /// For a drive that tells the speed of the shaft itself.
-    ///
-    /// # Errors
-    /// [`ConfigError`] if `pole_pairs` is given.
-    pub fn without_pole_pairs(self, config: &Config, id: &str) -> Result<Self, ConfigError> {
-        match self.pole_pairs {
-            None => Ok(self),
-            Some(pairs) => Err(config.error(format!(
-                "`thrusters.{id}.drive.pole_pairs` = {pairs}: this drive tells the speed of the shaft itself\nhint: leave the key out"
-            ))),
-        }
-    }
-
-    /// For a drive that is alone on its wire.
-    ///
-    /// # Errors
-    /// [`ConfigError`] if `address` is given.
-    pub fn without_address(self, config: &Config, id: &str) -> Result<Self, ConfigError> {
-        match self.address {
-            None => Ok(self),
-            Some(address) => Err(config.error(format!(
-                "`thrusters.{id}.drive.address` = {address}: this drive is alone on its wire\nhint: leave the key out"
-            ))),
-        }
-    }
-
-    /// For a drive whose serial number kort does not read.
-    ///
-    /// # Errors
-    /// [`ConfigError`] if `identity` is given.
-    pub fn without_identity(self, config: &Config, id: &str) -> Result<Self, ConfigError> {
-        if self.identity.is_empty() {
-            return Ok(self);
-        }
-        Err(config.error(format!(
-            "`thrusters.{id}.drive.identity` = \"{}\": kort reads no serial number of this drive\nhint: leave the key out, and name the port by the adapter's: /dev/serial/by-id/…",
-            self.identity
-        )))
     }
 
     /// The wire as its thread is told it; `priority` is the loop's.
@@ -169,6 +166,7 @@ impl Wired {
             name: format!("drive of {id}"),
             port: self.port,
             baud: self.baud,
+            can_node: self.can_node,
             rate_hz: self.rate_hz,
             reading_life_ns: self.reading_life_ns,
             priority,

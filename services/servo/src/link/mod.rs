@@ -6,6 +6,7 @@
 //! drive's own time-out, and from then on exchanges a command and a question at the link's rate. A command is
 //! sent once: a servo that stands still feeds nothing, and the drive's time-out takes the torque away.
 
+pub mod can;
 mod lines;
 #[cfg(feature = "process")]
 mod port;
@@ -45,6 +46,9 @@ pub trait Protocol: Send {
     /// What to say next until the device is known and its time-out confirmed; called some times a second. What
     /// stays unanswered is heard too.
     fn ask(&mut self, out: &mut Vec<u8>, heard: &mut dyn FnMut(Heard));
+
+    /// What is to be said at once after what was just heard: the next step of a conversation in many.
+    fn reply(&mut self, _out: &mut Vec<u8>) {}
 
     /// One exchange: the command (`None`: output off), and the question for the measurements.
     fn tell(&mut self, drive: Option<f64>, out: &mut Vec<u8>);

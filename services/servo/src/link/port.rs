@@ -1,7 +1,8 @@
-//! A serial port: raw, exclusive, and never waited for.
+//! A serial port, raw and exclusive, or a CAN interface of the system: never waited for.
 //!
 //! `rustix` rather than the `serialport` crate: one `poll` over the port and the tick's wake-up needs
-//! the descriptor non-blocking, which `serialport` hides behind a time-out of its own.
+//! the descriptor non-blocking, which `serialport` hides behind a time-out of its own. The crate `socketcan` opens and filters
+//! the CAN socket; frames are read and written as the kernel's records ([`super::can`]).
 
 use std::io;
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
@@ -12,13 +13,24 @@ use rustix::io::Errno;
 use rustix::termios::{
     ControlModes, OptionalActions, QueueSelector, ioctl_tiocexcl, tcflush, tcgetattr, tcsetattr,
 };
+use socketcan::{CanFilter, CanSocket, Socket, SocketOptions};
+
+use super::can::RECORD;
 
 /// Bytes that may wait to be sent; one exchange is some tens.
 const WAITING_MAX: usize = 1024;
 
+/// Bits of a CANopen identifier that are the node.
+const NODE: u32 = 0x7f;
+
+enum Device {
+    Serial(OwnedFd),
+    Can(CanSocket),
+}
+
 /// An open port.
 pub struct Port {
-    descriptor: OwnedFd,
+    device: Device,
     waiting: Vec<u8>,
 }
 
@@ -39,7 +51,22 @@ impl Port {
         tcsetattr(&descriptor, OptionalActions::Now, &settings)?;
         // What was sent to somebody before us is not for us.
         tcflush(&descriptor, QueueSelector::IOFlush)?;
-        Ok(Self { descriptor, waiting: Vec::with_capacity(WAITING_MAX) })
+        Ok(Self { device: Device::Serial(descriptor), waiting: Vec::with_capacity(WAITING_MAX) })
+    }
+
+    /// Opens a CAN interface by its name; of what others say on the bus, only frames of this node come in.
+    ///
+    /// # Errors
+    /// What the system says: no such interface, it is down, the kernel has no CAN.
+    pub fn open_can(interface: &Path, node: u8) -> io::Result<Self> {
+        let socket = CanSocket::open(&interface.to_string_lossy())?;
+        socket.set_filters(&[CanFilter::new(u32::from(node), NODE)])?;
+        Self::on_can(socket)
+    }
+
+    fn on_can(socket: CanSocket) -> io::Result<Self> {
+        socket.set_nonblocking(true)?;
+        Ok(Self { device: Device::Can(socket), waiting: Vec::with_capacity(WAITING_MAX) })
     }
 
     /// Reads what is there; zero if nothing is.
@@ -47,7 +74,7 @@ impl Port {
     /// # Errors
     /// The device is gone.
     pub fn read(&self, into: &mut [u8]) -> io::Result<usize> {
-        match rustix::io::read(&self.descriptor, into) {
+        match rustix::io::read(self, into) {
             Ok(0) => Err(io::Error::new(io::ErrorKind::UnexpectedEof, "the device hung up")),
             Ok(n) => Ok(n),
             Err(Errno::AGAIN | Errno::INTR) => Ok(0),
@@ -70,9 +97,14 @@ impl Port {
             self.waiting.extend_from_slice(bytes);
         }
         while !self.waiting.is_empty() {
-            match rustix::io::write(&self.descriptor, &self.waiting) {
+            // A raw socket takes one frame at a time.
+            let most = if matches!(self.device, Device::Can(_)) { RECORD } else { WAITING_MAX };
+            let next = self.waiting.get(..most).unwrap_or(&self.waiting);
+            match rustix::io::write(&*self, next) {
                 Ok(n) => drop(self.waiting.drain(..n)),
                 Err(Errno::AGAIN | Errno::INTR) => break,
+                // Nobody takes frames off the bus: what is late is of no use, and waiting for room would be a busy loop.
+                Err(Errno::NOBUFS) => self.waiting.clear(),
                 Err(error) => return Err(error.into()),
             }
         }
@@ -82,6 +114,46 @@ impl Port {
 
 impl AsFd for Port {
     fn as_fd(&self) -> BorrowedFd<'_> {
-        self.descriptor.as_fd()
+        match &self.device {
+            Device::Serial(descriptor) => descriptor.as_fd(),
+            Device::Can(socket) => socket.as_fd(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::os::fd::OwnedFd;
+    use std::os::unix::net::UnixDatagram;
+
+    use super::super::can::{Carrier, Frame, Frames};
+    use super::*;
+
+    /// A pair of datagram sockets stands for the kernel's CAN, which not every kernel has: each write is one frame.
+    #[test]
+    fn each_frame_is_a_record_of_its_own() {
+        let (near, far) = UnixDatagram::pair().unwrap();
+        let mut port = Port::on_can(CanSocket::from(OwnedFd::from(near))).unwrap();
+        let said = [Frame::new(0x201, &[0x0f, 0, 0x2c, 0x01]), Frame::new(0x080, &[])];
+        let mut out = Vec::new();
+        said.iter().for_each(|frame| Carrier::Socket.send(frame, &mut out));
+        port.send(&out).unwrap();
+        assert!(!port.is_behind());
+        let mut bytes = [0; 64];
+        for frame in said {
+            let n = far.recv(&mut bytes).unwrap();
+            assert_eq!(n, RECORD);
+            assert_eq!(Frames::new(Carrier::Socket).take(&bytes[..n]), [frame]);
+        }
+        assert_eq!(port.read(&mut bytes).unwrap(), 0, "nothing is there, and it does not wait");
+        far.send(&out[..RECORD]).unwrap();
+        let n = port.read(&mut bytes).unwrap();
+        assert_eq!(Frames::new(Carrier::Socket).take(&bytes[..n]), said[..1]);
+    }
+
+    /// Where the kernel has no CAN, or no interface of this name, the way out is an error.
+    #[test]
+    fn an_interface_that_is_not_there_is_an_error() {
+        assert!(Port::open_can(Path::new("kort-none"), 1).is_err());
     }
 }

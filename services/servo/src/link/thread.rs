@@ -75,7 +75,11 @@ impl Serving {
             ordinary();
         }
         while !self.ending.load(Ordering::Relaxed) {
-            let done = Port::open(&self.wire.port, self.wire.baud).and_then(|mut port| self.serve(&mut port));
+            let done = match self.wire.can_node {
+                Some(node) => Port::open_can(&self.wire.port, node),
+                None => Port::open(&self.wire.port, self.wire.baud),
+            };
+            let done = done.and_then(|mut port| self.serve(&mut port));
             if let Err(error) = done {
                 let port = self.wire.port.display();
                 self.complain(format!(
@@ -122,6 +126,9 @@ impl Serving {
             self.wait(port)?;
             let n = port.read(&mut bytes)?;
             self.hear(bytes.get(..n).unwrap_or_default());
+            out.clear();
+            self.protocol.reply(&mut out);
+            port.send(&out)?;
             let silent_ns = monotonic_ns().saturating_sub(self.told.stamp_ns.max(self.guarded_ns));
             if self.told.guarded && silent_ns > self.wire.reading_life_ns {
                 // Perhaps it still hears, though it is not heard: off, while it is known how it wants to be spoken to.

@@ -30,6 +30,8 @@ pub struct Wire {
     pub port: PathBuf,
     /// Bits a second.
     pub baud: u32,
+    /// The port is a CAN interface of the system, and this the device's node there.
+    pub can_node: Option<u8>,
     /// Exchanges a second.
     pub rate_hz: f64,
     /// How long a reading stands, ns.

@@ -260,6 +260,7 @@ impl Chosen {
                     name,
                     port: line.port.clone(),
                     baud: line.baud,
+                    can_node: None,
                     rate_hz: line.rate_hz,
                     reading_life_ns: self.life_ns,
                     priority,

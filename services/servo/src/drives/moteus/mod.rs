@@ -45,8 +45,7 @@ impl Moteus {
     /// # Errors
     /// [`ConfigError`] names key, value and what is allowed.
     pub fn new(config: &Config, id: &str, thruster: &Thruster, rig: &Rig) -> Result<Self, ConfigError> {
-        let wired =
-            Wired::new(config, id, thruster)?.without_pole_pairs(config, id)?.without_identity(config, id)?;
+        let wired = Wired::new(config, id, thruster, &["address"])?;
         let kind = current_or_speed(config, id, thruster, rig)?;
         let address = wired.address.unwrap_or(1);
         if !(1..=126).contains(&address) {

@@ -41,10 +41,7 @@ impl ODrive {
     /// # Errors
     /// [`ConfigError`] names key, value and what is allowed.
     pub fn new(config: &Config, id: &str, thruster: &Thruster, rig: &Rig) -> Result<Self, ConfigError> {
-        let wired = Wired::new(config, id, thruster)?
-            .without_pole_pairs(config, id)?
-            .without_address(config, id)?
-            .without_identity(config, id)?;
+        let wired = Wired::new(config, id, thruster, &[])?;
         let kind = current_or_speed(config, id, thruster, rig)?;
         Ok(Self { wired, kind })
     }
