@@ -1,33 +1,23 @@
-"""Reads an MCAP file that may have lost its end, as a stranger would: with the mcap package alone.
+"""Reads an MCAP file whose writer may have been killed, as a stranger would: with the mcap package alone, by its end.
 
 Prints one JSON document: what each channel holds, from when to when (ns since 1970), the last state, the metadata.
 """
 import json
 import sys
 
-from mcap.exceptions import McapError
-from mcap.records import Channel, Chunk, Message, Metadata, Schema
-from mcap.stream_reader import StreamReader
+from mcap.reader import make_reader
 
-topics, schemas, channels, about, state, end = {}, {}, {}, {}, None, "whole"
+topics, state = {}, None
 with open(sys.argv[1], "rb") as file:
-    try:
-        for record in StreamReader(file, record_size_limit=None).records:
-            if isinstance(record, Schema):
-                schemas[record.id] = record.name
-            elif isinstance(record, Channel):
-                channels[record.id] = record
-            elif isinstance(record, Metadata):
-                about[record.name] = record.metadata
-            elif isinstance(record, Message):
-                channel = channels[record.channel_id]
-                topic = topics.setdefault(channel.topic, {
-                    "schema": schemas.get(channel.schema_id), "messages": 0, "first_ns": record.log_time})
-                topic["messages"] += 1
-                topic["last_ns"] = record.log_time
-                content = json.loads(record.data)
-                if topic["schema"] == "kort.state/1" and "setpoint" in content:
-                    state = content
-    except (McapError, EOFError) as error:
-        end = type(error).__name__
-print(json.dumps({"topics": topics, "about": about, "state": state, "end": end}))
+    reader = make_reader(file, validate_crcs=True)
+    indexed = reader.get_summary() is not None
+    for schema, channel, message in reader.iter_messages():
+        topic = topics.setdefault(channel.topic, {
+            "schema": schema.name, "messages": 0, "first_ns": message.log_time})
+        topic["messages"] += 1
+        topic["last_ns"] = message.log_time
+        content = json.loads(message.data)
+        if schema.name == "kort.state/1" and "setpoint" in content:
+            state = content
+    about = {record.name: record.metadata for record in reader.iter_metadata()}
+print(json.dumps({"topics": topics, "about": about, "state": state, "indexed": indexed}))

@@ -147,9 +147,14 @@ fn a_flushed_mcap_keeps_its_rows_without_an_end() {
     }
     writer.flush().unwrap();
     std::mem::forget(writer);
-    let torn = decode("rec", out.into_inner().as_slice(), None).unwrap();
+    let bytes = out.into_inner();
+    let torn = decode("rec", bytes.as_slice(), None).unwrap();
     assert_eq!(torn.rows(), 100);
     assert_eq!(torn.losses.len(), 1);
+    // Who goes by a file's end finds one.
+    assert!(::mcap::read::footer(&bytes).is_ok());
+    let messages = ::mcap::MessageStream::new(&bytes).unwrap();
+    assert_eq!(messages.filter(|message| message.is_ok()).count(), 100);
 }
 
 #[test]
@@ -232,17 +237,14 @@ fn gaps_are_noted() {
     assert!(csv(&text).unwrap().notes[0].contains("1 gap(s)"));
 }
 
-/// A disk that takes so many bytes and no more.
+/// A disk that grows to so many bytes and no more.
 struct Small(Cursor<Vec<u8>>, usize);
 
 impl Write for Small {
     fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-        match self.1.checked_sub(bytes.len()) {
-            Some(left) => {
-                self.1 = left;
-                self.0.write(bytes)
-            }
-            None => Err(std::io::ErrorKind::StorageFull.into()),
+        match self.1.saturating_sub(self.0.position() as usize).min(bytes.len()) {
+            0 => Err(std::io::ErrorKind::StorageFull.into()),
+            fits => self.0.write(&bytes[..fits]),
         }
     }
 
@@ -258,11 +260,22 @@ impl std::io::Seek for Small {
 }
 
 #[test]
-fn a_full_disk_is_called_that() {
-    let disk = Small(Cursor::new(Vec::new()), 20_000);
-    let mut rows = LiveMcap::live("t1", &["thrust_n"], Default::default(), 0, disk).unwrap();
-    let refused = (0..200_000).find_map(|i| rows.row(f64::from(i) * 1e-3, &[f64::from(i).sin()]).err());
-    assert_eq!(refused.expect("it is full").kind(), std::io::ErrorKind::StorageFull);
+fn a_full_disk_is_called_that_and_what_it_holds_reads() {
+    for bytes in [20_000, 20_001, 33_333, 60_000] {
+        let mut disk = Small(Cursor::new(Vec::new()), bytes);
+        let mut rows = LiveMcap::live("t1", &["thrust_n"], Default::default(), 0, &mut disk).unwrap();
+        let refused = (0..200_000).find_map(|i| {
+            let row = rows.row(f64::from(i) * 1e-3, &[f64::from(i).sin()]);
+            row.and_then(|()| if i % 100 == 0 { rows.flush() } else { Ok(()) }).err()
+        });
+        assert_eq!(refused.expect("it is full").kind(), std::io::ErrorKind::StorageFull);
+        assert_eq!(rows.finish().expect_err("it stays so").kind(), std::io::ErrorKind::StorageFull);
+        let written = disk.0.into_inner();
+        assert_eq!(written.len(), bytes);
+        let read = decode("rec", written.as_slice(), None).unwrap();
+        assert!(read.rows() > 100 && read.losses.len() == 1, "{bytes}: {} {:?}", read.rows(), read.losses);
+        assert!(::mcap::read::footer(&written).is_ok(), "{bytes}: it ends like any file");
+    }
 }
 
 proptest! {

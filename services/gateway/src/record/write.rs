@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{self, BufWriter};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::sync::{Arc, Mutex};
@@ -46,7 +46,7 @@ impl Item {
     }
 }
 
-type Mcap = LiveMcap<BufWriter<File>>;
+type Mcap = LiveMcap<File>;
 
 /// A recording under way.
 pub struct Job {
@@ -238,8 +238,7 @@ fn create(folder: &Path, info: &RecordingInfo, subject: &Subject, began: SystemT
         .map(|(name, value)| (name.to_owned(), value.to_owned())),
     );
     let path = folder.join(format!("{}.{ENDING}", info.name));
-    let mut file =
-        Mcap::live(&info.thruster, &columns, about, origin_ns, BufWriter::new(File::create_new(path)?))?;
+    let mut file = Mcap::live(&info.thruster, &columns, about, origin_ns, File::create_new(path)?)?;
     file.flush()?;
     write_info(folder, info)?;
     Ok(file)

@@ -1,6 +1,7 @@
 //! MCAP with JSON messages: one channel, one message a row, a field a column. A file of others may
 //! have several channels; their fields become columns over the common log time.
 
+mod ended;
 mod messages;
 mod table;
 mod write;
@@ -30,7 +31,7 @@ fn records(
         .with_prevalidate_chunk_crcs(true)
         .with_record_length_limit(RECORD_LIMIT);
     let mut reader = LinearReader::new_with_options(options);
-    let mut complete = false;
+    let (mut complete, mut ours, mut unfinished) = (false, false, false);
     while let Some(event) = reader.next_event() {
         let torn = match event {
             Ok(LinearReadEvent::ReadRequest(need)) => match input.read(reader.insert(need)) {
@@ -44,7 +45,15 @@ fn records(
             Ok(LinearReadEvent::Record { opcode, data }) => {
                 complete |= opcode == mcap::records::op::DATA_END;
                 match mcap::parse_record(opcode, data) {
-                    Ok(record) => take(record)?,
+                    Ok(record) => {
+                        match &record {
+                            Record::Header(header) => ours = header.library.starts_with(LIBRARY),
+                            // The end that stands behind what is still being written, see [`ended`].
+                            Record::Footer(footer) => unfinished = ours && footer.summary_start == 0,
+                            _ => (),
+                        }
+                        take(record)?;
+                    }
                     Err(e) => return Err(Problem::Mcap { message: e.to_string() }),
                 }
                 continue;
@@ -53,7 +62,7 @@ fn records(
         };
         return Ok((!complete).then_some(torn));
     }
-    Ok(None)
+    Ok(unfinished.then(|| "whoever wrote it was stopped before its end".to_owned()))
 }
 
 /// Decodes from start to end; a file without its end is read up to the last complete chunk.
@@ -76,6 +85,8 @@ pub(super) fn decode(name: &str, input: impl Read, map: Option<&ColumnMap>) -> R
     table.assemble(name, map, losses)
 }
 
+/// How files of ours call their library; its version follows.
+const LIBRARY: &str = "kort ";
 /// Name of the metadata with what is known of a recording.
 const ABOUT: &str = "kort";
 /// Schemas of channels that stand beside the signals.

@@ -6,7 +6,8 @@ use std::io::{self, Seek, Write};
 use mcap::records::MessageHeader;
 use serde_json::Value;
 
-use super::{ABOUT, EVENT, STATE};
+use super::ended::Ended;
+use super::{ABOUT, EVENT, LIBRARY, STATE};
 use crate::columns;
 use crate::units;
 
@@ -15,10 +16,10 @@ const CHUNK_BYTES: u64 = 128 * 1024;
 
 /// Writes rows as JSON messages of one channel; beside it, on request, states and events.
 ///
-/// A chunk is put together in memory and written whole: a file that is cut off at any instant ends with a whole
-/// chunk or in the middle of one, which every MCAP reader takes for a torn file and not for a broken one.
+/// A chunk is put together in memory and written whole, with an end behind it that the next one takes the place of:
+/// whoever is killed at any instant leaves a file that every MCAP reader opens.
 pub struct Rows<W: Write + Seek> {
-    writer: mcap::Writer<W>,
+    writer: mcap::Writer<Ended<W>>,
     channel_id: u16,
     beside: Option<[u16; 2]>,
     origin_ns: u64,
@@ -30,12 +31,12 @@ pub struct Rows<W: Write + Seek> {
 impl<W: Write + Seek> Rows<W> {
     pub(in crate::formats) fn create(topic: &str, columns: &[&str], output: W) -> io::Result<Self> {
         let mut writer = mcap::WriteOptions::new()
-            .library(concat!("kort ", env!("CARGO_PKG_VERSION")))
+            .library(format!("{LIBRARY}{}", env!("CARGO_PKG_VERSION")))
             .compression(Some(mcap::Compression::Zstd))
             .compression_threads(0)
             .chunk_size(Some(CHUNK_BYTES))
             .disable_seeking(true)
-            .create(output)
+            .create(Ended::new(output)?)
             .map_err(cause)?;
         let schema = schema(columns).to_string();
         let schema_id =
