@@ -118,7 +118,11 @@ fn problem(file: &str, message: &str) -> Problem {
     };
     let key = what.split('`').nth(1).map(str::to_owned);
     let found = what.split_once(" = ").and_then(|(_, rest)| {
-        rest.split(" is ").next()?.split([';', ':', '\n']).next().map(|found| found.trim().to_owned())
+        // A colon within a value (an address) is followed by no space.
+        let ends = [" is ", ": ", ";", "\n"];
+        ends.iter()
+            .fold(Some(rest), |found, end| found?.split(end).next())
+            .map(|found| found.trim().to_owned())
     });
     Problem { file: file.to_owned(), key, found, allowed: what.to_owned(), hint }
 }
@@ -162,5 +166,7 @@ mod tests {
         assert_eq!(found.found.as_deref(), Some("1000000"));
         assert!(found.allowed.contains("0.001 to 9"));
         assert_eq!(found.hint.as_deref(), Some("at most 9"));
+        let found = problem("kort.toml", "`gateway.bind` = [::]:8080 is reached from other machines: no tls");
+        assert_eq!(found.found.as_deref(), Some("[::]:8080"));
     }
 }
