@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use kort_proto::transport::monotonic_ns;
 use serde_json::json;
 
 use crate::common::{self, Stack, wait};
@@ -26,21 +27,21 @@ fn slow_sockets_do_not_lock_out_the_stop() {
         stack.thrust(40.0, 60_000);
         let port = stack.site.port;
         let asked = |name: &str| std::env::var(name).ok().and_then(|n| n.parse::<u64>().ok());
-        let (rounds, window_s) =
-            (asked("KORT_SLOW_ROUNDS").unwrap_or(1), asked("KORT_SLOW_SECONDS").unwrap_or(2));
-        let (mut late, mut took) = (Vec::new(), Vec::new());
-        // In turn on one and the same process, beset between two idle windows of the same length: what others do to
-        // the machine falls on all alike, and idle beside idle says how much that is.
-        for _ in 0..rounds {
-            let mut watch = stack.watch();
-            let before_us = late_us(&mut watch, window_s);
+        let rounds = asked("KORT_SLOW_ROUNDS").unwrap_or(2).max(1);
+        let window = Duration::from_millis(asked("KORT_SLOW_MS").unwrap_or(1000));
+        let mut took = Vec::new();
+        // Idle and beset in turn on one and the same process, in windows so short that what others do to the machine
+        // falls on both alike.
+        let mut watch = stack.watch();
+        let (mut idle, mut beset) = (vec![late_us(&mut watch, window)], Vec::new());
+        for round in 0..rounds {
             let slow: Vec<TcpStream> = (0..2000).filter_map(|_| half_a_head(port)).collect();
             assert!(slow.len() > 1500, "{} sockets", slow.len());
             let held = Held::begin(port, slow);
-            let beset_us = late_us(&mut watch, window_s);
+            beset.push(late_us(&mut watch, window));
             took.extend((0..10).map(|_| {
                 let began = Instant::now();
-                assert_eq!(ask(port, "POST", "/v1/stop", &[], "").0, 200);
+                assert_eq!(ask(port, "POST", "/v1/stop", &[], "").0, 200, "round {round}");
                 began.elapsed()
             }));
             drop(held.end());
@@ -49,18 +50,25 @@ fn slow_sockets_do_not_lock_out_the_stop() {
                 let line = metrics.lines().find(|line| line.starts_with("kort_connections_open "))?;
                 (line.rsplit(' ').next()?.parse::<f64>().ok()? < 20.0).then_some(())
             });
-            late.push([before_us, beset_us, late_us(&mut watch, window_s)]);
+            idle.push(late_us(&mut watch, window));
         }
         println!(
-            "servo's wake-ups, us late at p99 of a second: least quarter of {rounds} x {window_s} s, and all"
+            "servo's wake-ups, us late, {rounds} windows of {window:?} of each side in turn: p50, p90, p99"
         );
-        for (side, name) in ["idle", "beset", "idle again"].into_iter().enumerate() {
-            let all: Vec<f64> = late.iter().flat_map(|round| round[side].iter().copied()).collect();
-            println!("{name:12} {:8.1} {:8.1}", quantile(&all, 0.25), quantile(&all, 0.5));
+        for (name, windows) in [("idle", &idle), ("beset", &beset)] {
+            let all = windows.concat();
+            let [p50, p90, p99] = [0.5, 0.9, 0.99].map(|share| quantile(&all, share));
+            println!("{name:6} {p50:8.1} {p90:8.1} {p99:8.1}   of {}", all.len());
         }
-        let idle = |round: &[Vec<f64>; 3]| [&round[0][..], &round[2]].concat();
-        println!("beset beside idle {}", ratio(&late, |round| (round[1].clone(), idle(round))));
-        println!("idle again beside idle {}", ratio(&late, |round| (round[2].clone(), round[0].clone())));
+        // Each beset window beside the two idle ones around it, and each idle one beside those around it in their turn:
+        // what comes of idle beside idle is what this machine lets nobody tell.
+        let around = |at: usize, step: usize| [&idle[at][..], &idle[at + step]].concat();
+        let besets: Vec<_> = (0..beset.len()).map(|at| (beset[at].clone(), around(at, 1))).collect();
+        let idles: Vec<_> = (0..idle.len() - 2).map(|at| (idle[at + 1].clone(), around(at, 2))).collect();
+        println!("p99 beset beside idle {}", ratio(&besets));
+        if !idles.is_empty() {
+            println!("p99 idle beside idle  {}", ratio(&idles));
+        }
         took.sort();
         let (median, worst) = (took[took.len() / 2], took[took.len() - 1]);
         println!("stop among 2000 slow sockets, {} times: median {median:?}, worst {worst:?}", took.len());
@@ -106,27 +114,24 @@ fn quantile(of: &[f64], share: f64) -> f64 {
     all[((all.len() - 1) as f64 * share).round() as usize]
 }
 
-/// Least quarters of the seconds of two sides beside each other: what others do to the machine makes seconds later and
-/// none earlier, so the least late are those in which it was left alone, on either side alike. The doubt is that of
-/// rounds drawn anew from these rounds.
-fn ratio(rounds: &[[Vec<f64>; 3]], sides: impl Fn(&[Vec<f64>; 3]) -> (Vec<f64>, Vec<f64>)) -> String {
-    let of = |rounds: &mut dyn Iterator<Item = usize>, all: &[(Vec<f64>, Vec<f64>)]| {
-        let (mut above, mut below) = (Vec::new(), Vec::new());
-        for at in rounds {
-            above.extend(&all[at].0);
-            below.extend(&all[at].1);
-        }
-        100.0 * (quantile(&above, 0.25) / quantile(&below, 0.25) - 1.0)
+/// How much larger the p99 of all wake-ups is on the first side than on the second, with the doubt of 95 % that comes of
+/// drawing these pairs of windows anew.
+fn ratio(pairs: &[(Vec<f64>, Vec<f64>)]) -> String {
+    let of = |pairs_drawn: &[usize]| {
+        let p99 = |side: fn(&(Vec<f64>, Vec<f64>)) -> &Vec<f64>| {
+            let all: Vec<f64> = pairs_drawn.iter().flat_map(|at| side(&pairs[*at]).iter().copied()).collect();
+            quantile(&all, 0.99)
+        };
+        100.0 * (p99(|pair| &pair.0) / p99(|pair| &pair.1) - 1.0)
     };
-    let all: Vec<_> = rounds.iter().map(sides).collect();
     let mut seed = 1u64;
     let mut draw = || {
         seed = seed.wrapping_mul(0x5851_F42D_4C95_7F2D).wrapping_add(0x1405_7B7E_F767_814F);
-        ((seed >> 33) % all.len() as u64) as usize
+        ((seed >> 33) % pairs.len() as u64) as usize
     };
     let drawn: Vec<f64> =
-        (0..1000).map(|_| of(&mut std::iter::repeat_with(&mut draw).take(all.len()), &all)).collect();
-    let whole = of(&mut (0..all.len()), &all);
+        (0..400).map(|_| of(&(0..pairs.len()).map(|_| draw()).collect::<Vec<_>>())).collect();
+    let whole = of(&(0..pairs.len()).collect::<Vec<_>>());
     format!("{whole:+.1} % ({:+.1} % to {:+.1} %)", quantile(&drawn, 0.025), quantile(&drawn, 0.975))
 }
 
@@ -167,19 +172,19 @@ impl Held {
     }
 }
 
-/// How late the servo wakes, by its own clock: the p99 of each second, us.
-fn late_us(watch: &mut common::Watch, seconds: u64) -> Vec<f64> {
+/// How late the servo wakes in a stretch of time, by its own clock: each wake-up, us.
+fn late_us(watch: &mut common::Watch, window: Duration) -> Vec<f64> {
     // What was on its way before is not of this time.
-    let from_ns = watch.next().time_ns + 100_000_000;
-    let mut late_ns = vec![Vec::new(); seconds as usize];
+    let from_ns = monotonic_ns() + 20_000_000;
+    let until_ns = from_ns + window.as_nanos() as u64;
+    let mut late_us = Vec::new();
     loop {
         let t = watch.next();
-        let Some(since_ns) = t.time_ns.checked_sub(from_ns) else { continue };
-        match late_ns.get_mut((since_ns / 1_000_000_000) as usize) {
-            Some(second) => second.push(t.timing.lateness_ns as f64 * 1e-3),
-            None => break,
+        if t.time_ns >= until_ns {
+            return late_us;
+        }
+        if t.time_ns >= from_ns {
+            late_us.push(t.timing.lateness_ns as f64 * 1e-3);
         }
     }
-    // A second in which the machine stood still has no wake-up at all.
-    late_ns.iter().filter(|second| !second.is_empty()).map(|second| quantile(second, 0.99)).collect()
 }
