@@ -67,6 +67,8 @@ pub enum EventKind {
     FaultsCleared,
     /// A fault was latched: a stop that nobody asked for, if the drive was armed.
     Tripped,
+    /// A fault that was latched before the service started is latched still; the log had not told it.
+    FaultInherited,
     /// A path of the thruster is off against its rig description, or is well again.
     Mismatch,
     /// A process of the service started.
@@ -85,6 +87,13 @@ pub enum EventKind {
     RecordingDeleted,
     /// The service was stopped on request.
     ServiceStopped,
+}
+
+impl EventKind {
+    /// Does it tell of a fault that is latched since?
+    pub fn latches(self) -> bool {
+        matches!(self, Self::Tripped | Self::FaultInherited)
+    }
 }
 
 /// One line of the log.
@@ -108,6 +117,9 @@ pub struct Event {
     /// Code of the fault, where it is about one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fault: Option<u32>,
+    /// When it came about, RFC 3339, where that was long before it was told.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub since: Option<String>,
     /// What the thruster did just before a stop that nobody asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub before: Option<Before>,
@@ -147,6 +159,7 @@ impl Event {
             who: who.to_owned(),
             detail: detail.into(),
             fault: None,
+            since: None,
             before: None,
         }
     }
@@ -154,6 +167,11 @@ impl Event {
     /// About this fault.
     pub fn fault(self, fault: Fault) -> Self {
         Self { fault: Some(fault.code()), ..self }
+    }
+
+    /// It came about at this time, RFC 3339, and is told only now.
+    pub fn since(self, time: String) -> Self {
+        Self { since: Some(time), ..self }
     }
 
     /// With what the thruster did before.

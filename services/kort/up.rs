@@ -2,6 +2,7 @@
 //! replaces one that dies or hangs, and stops with thrust at zero first.
 
 mod error;
+mod inherited;
 mod role;
 mod scribe;
 mod watch;
@@ -61,10 +62,10 @@ pub fn run(config: &Config, deployment: &Deployment) -> Result<(), UpError> {
     let owner = deployment.own()?;
     kort_gateway::check(&gateway)?;
     let log = EventLog::open(&gateway.events).map_err(system("the event log"))?;
-    let scribe = Scribe::start(log, deployment.watched_file()).map_err(system("a thread"))?;
+    let scribe = Scribe::start(log.clone(), deployment.watched_file()).map_err(system("a thread"))?;
     let program = std::env::current_exe().map_err(system("this program's own path"))?;
     let mut service = Service::new(config, owner, scribe, program);
-    service.begin()?;
+    service.begin(&log)?;
     let file = config.file.as_ref().map_or_else(
         || "as built in; --config FILE takes another, config/kort.toml is found by itself".to_owned(),
         |file| file.display().to_string(),
@@ -100,7 +101,7 @@ impl Service {
         let before = Watched::read(&owner.deployment().watched_file());
         let ids: Vec<String> = config.thrusters.keys().cloned().collect();
         let watches =
-            ids.iter().map(|id| Watch::new(id, before.thrusters.get(id).copied().unwrap_or_default()));
+            ids.iter().map(|id| Watch::new(id, before.thrusters.get(id).cloned().unwrap_or_default()));
         let roles = ids
             .iter()
             .flat_map(|id| [Role::new("servo", Some(id)), Role::new("controller", Some(id))])
@@ -120,9 +121,10 @@ impl Service {
     }
 
     /// Creates the shared memory and starts every process.
-    fn begin(&mut self) -> Result<(), UpError> {
+    fn begin(&mut self, log: &EventLog) -> Result<(), UpError> {
         let ids: Vec<&str> = self.ids.iter().map(String::as_str).collect();
         self.owner.create(&ids)?;
+        inherited::tell(self.watches.iter().map(|watch| (watch.id(), &watch.stood)), log);
         for watch in &mut self.watches {
             if watch.stood.armed {
                 let words = format!("the service ended while {} was armed, at {}", watch.id(), watch.words());
@@ -303,7 +305,7 @@ impl Service {
             count: role.restarts,
             pid: role.child.as_ref().map(std::process::Child::id),
         });
-        let stood = self.watches.iter().map(|watch| (watch.id().to_owned(), watch.stood));
+        let stood = self.watches.iter().map(|watch| (watch.id().to_owned(), watch.stood.clone()));
         let now = Watched { restarts: restarts.collect(), thrusters: stood.collect() };
         let key = |watched: &Watched| -> Vec<(bool, u64, u64)> {
             watched.thrusters.values().map(|s| (s.armed, s.servo_faults, s.controller_faults)).collect()

@@ -3,7 +3,9 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+mod inherited;
 mod refusals;
+mod strangers;
 
 use std::time::{Duration, Instant};
 

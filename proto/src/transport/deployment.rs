@@ -8,7 +8,7 @@
 //! the previous one cannot put anything in the way of the next.
 
 use std::fs;
-use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt};
+use std::os::unix::fs::{DirBuilderExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -17,12 +17,16 @@ use rustix::fs::{FlockOperation, flock};
 
 use super::clock::monotonic_ns;
 use super::error::TransportError;
+use super::ours::{nobody_else_may_replace, ours_alone, write_whole};
 use super::ports::{Services, create_services};
 use super::room;
 use crate::names::MESSAGES_VERSION;
 
 /// Longest root: the sockets by which iceoryx2 wakes a process lie under it, and a socket path has 107 bytes.
 pub(super) const ROOT_BYTES_MAX: usize = 35;
+
+/// What lies beside the root, whichever process made it.
+const BESIDE: [&str; 5] = ["lock", "generation", "generation.new", "watched", "watched.new"];
 
 /// Where a deployment's shared memory lives.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -60,6 +64,9 @@ impl Deployment {
     /// [`TransportError::NoGeneration`] if there is none, [`TransportError::Version`] if its messages are others.
     pub(super) fn generation_of_our_version(&self) -> Result<u64, TransportError> {
         let none = || TransportError::NoGeneration { root: self.root.clone() };
+        // Whoever else could write these could have us take part in a deployment of theirs.
+        ours_alone(&self.root)?;
+        ours_alone(&self.generation_file())?;
         let text = fs::read_to_string(self.generation_file()).map_err(|_| none())?;
         let mut words = text.split_whitespace();
         let generation = words.next().and_then(|number| number.parse().ok()).ok_or_else(none)?;
@@ -105,8 +112,10 @@ impl Deployment {
             nobody_else_may_replace(parent)?;
         }
         ours_alone(&self.root)?;
+        for extension in BESIDE {
+            ours_alone(&self.beside(extension))?;
+        }
         let lock_path = self.beside("lock");
-        ours_alone(&lock_path)?;
         let lock = fs::OpenOptions::new()
             .create(true)
             .truncate(false)
@@ -237,11 +246,7 @@ impl Owner {
         self.node = Some(node);
         let path = self.deployment.generation_file();
         let draft = self.deployment.beside("generation.new");
-        ours_alone(&path)?;
-        ours_alone(&draft)?;
-        fs::write(&draft, format!("{generation} {MESSAGES_VERSION}"))
-            .and_then(|()| fs::rename(&draft, &path))
-            .map_err(|error| TransportError::File { path, error })?;
+        write_whole(&path, &draft, format!("{generation} {MESSAGES_VERSION}").as_bytes())?;
         Ok(generation)
     }
 
@@ -296,42 +301,6 @@ fn allow_files(thrusters: u64) -> Result<(), TransportError> {
         Some(limit) if limit < needed => Err(TransportError::OpenFiles { limit, needed }),
         _ => Ok(()),
     }
-}
-
-/// A file or folder of the deployment, if it is there already, must be this user's, and nobody else may write it.
-pub(super) fn ours_alone(path: &Path) -> Result<(), TransportError> {
-    let Ok(about) = fs::symlink_metadata(path) else { return Ok(()) };
-    let foreign = |why: String| Err(TransportError::Foreign { path: path.to_path_buf(), why });
-    if about.file_type().is_symlink() {
-        return foreign("is a link".into());
-    }
-    let me = rustix::process::getuid().as_raw();
-    if about.uid() != me {
-        return foreign(format!("belongs to user {}, this is user {me}", about.uid()));
-    }
-    if about.mode() & 0o022 != 0 {
-        return foreign(format!("may be written by others (mode {:o})", about.mode() & 0o7777));
-    }
-    Ok(())
-}
-
-/// The folder that holds root and lock: where others may write, they must not be able to replace what is ours.
-fn nobody_else_may_replace(folder: &Path) -> Result<(), TransportError> {
-    let Ok(about) = fs::metadata(folder) else { return Ok(()) };
-    let others_write = about.mode() & 0o002 != 0;
-    let sticky = about.mode() & 0o1000 != 0;
-    let owner = about.uid();
-    let me = rustix::process::getuid().as_raw();
-    if (others_write && !sticky) || (owner != me && owner != 0) {
-        return Err(TransportError::Foreign {
-            path: folder.to_path_buf(),
-            why: format!(
-                "user {owner} or others may replace what is in it (mode {:o})",
-                about.mode() & 0o7777
-            ),
-        });
-    }
-    Ok(())
 }
 
 impl Drop for Owner {

@@ -4,6 +4,7 @@
 mod clock;
 mod deployment;
 mod error;
+mod ours;
 mod ports;
 mod rig;
 mod room;
@@ -15,4 +16,4 @@ pub use error::TransportError;
 pub use ports::{
     ControllerPorts, GatewayPorts, Inbox, Outbox, ServoPorts, SupervisorPorts, Ticks, Waker, create_services,
 };
-pub use watched::{Restarts, Stood, Watched};
+pub use watched::{Latched, Restarts, Stood, Watched};

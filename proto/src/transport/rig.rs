@@ -4,8 +4,9 @@
 use std::fs;
 use std::path::PathBuf;
 
-use super::deployment::{Deployment, ours_alone};
+use super::deployment::Deployment;
 use super::error::TransportError;
+use super::ours::{ours_alone, write_whole};
 
 impl Deployment {
     /// Lays down the text for a thruster's controller, whole or not at all.
@@ -14,11 +15,7 @@ impl Deployment {
     /// [`TransportError::Foreign`] if somebody else could write there, [`TransportError::File`] if the disk refuses.
     pub fn put_rig(&self, thruster: &str, text: &str) -> Result<(), TransportError> {
         let (path, draft) = (self.rig_file(thruster), self.beside(&format!("rig.{thruster}.new")));
-        ours_alone(&path)?;
-        ours_alone(&draft)?;
-        fs::write(&draft, text)
-            .and_then(|()| fs::rename(&draft, &path))
-            .map_err(|error| TransportError::File { path, error })
+        write_whole(&path, &draft, text.as_bytes())
     }
 
     /// The text that was laid down last.

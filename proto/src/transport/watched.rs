@@ -6,6 +6,10 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use super::error::TransportError;
+use super::ours::{ours_alone, write_whole};
+use crate::events::Before;
+
 /// Processes and thrusters under a supervisor.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
@@ -30,7 +34,7 @@ pub struct Restarts {
 }
 
 /// How a thruster stood when it was last looked at.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Stood {
     /// Was the drive armed?
@@ -43,21 +47,38 @@ pub struct Stood {
     pub thrust_n: Option<f64>,
     /// Shaft speed, rad/s; absent if not measured.
     pub shaft_speed_rad_s: Option<f64>,
+    /// How each latched fault came: whoever finds it at a later start tells it as old as it is.
+    pub latched: Vec<Latched>,
+}
+
+/// A latched fault and how it came.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Latched {
+    /// Code of the fault.
+    pub code: u32,
+    /// When it was latched: wall time, RFC 3339.
+    pub since: String,
+    /// What the thruster did just before, if that stopped it.
+    pub before: Option<Before>,
 }
 
 impl Watched {
-    /// Reads the file; nothing, or nothing readable, is as good as an empty one.
+    /// Reads the file; nothing, nothing readable, or what somebody else could have written is as good as an empty one.
     pub fn read(path: &Path) -> Self {
-        std::fs::read(path).ok().and_then(|text| serde_json::from_slice(&text).ok()).unwrap_or_default()
+        let text = ours_alone(path).ok().and_then(|()| std::fs::read(path).ok());
+        text.and_then(|text| serde_json::from_slice(&text).ok()).unwrap_or_default()
     }
 
     /// Writes the file whole or not at all.
     ///
     /// # Errors
-    /// The disk refuses.
-    pub fn write(&self, path: &Path) -> std::io::Result<()> {
-        let draft = path.with_extension("draft");
-        std::fs::write(&draft, serde_json::to_vec(self)?)?;
-        std::fs::rename(draft, path)
+    /// [`TransportError::Foreign`] if somebody else could write there, [`TransportError::File`] if the disk refuses.
+    pub fn write(&self, path: &Path) -> Result<(), TransportError> {
+        let file_error =
+            |error: serde_json::Error| TransportError::File { path: path.to_path_buf(), error: error.into() };
+        let bytes = serde_json::to_vec(self).map_err(file_error)?;
+        let mut draft = path.as_os_str().to_owned();
+        draft.push(".new");
+        write_whole(path, Path::new(&draft), &bytes)
     }
 }

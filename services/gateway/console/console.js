@@ -263,7 +263,7 @@ async function loadEvents() {
     lastEvent = event.id;
     const item = document.createElement("li");
     item.textContent = `${new Date(event.time).toLocaleTimeString()}  ${event.thruster ?? "all"}  ${event.detail}`;
-    if (["tripped", "process_ended", "process_hung", "recording_ended"].includes(event.kind)) item.className = "bad";
+    if (["tripped", "fault_inherited", "process_ended", "process_hung", "recording_ended"].includes(event.kind)) item.className = "bad";
     $("events").prepend(item);
   }
   while ($("events").children.length > 200) $("events").lastChild.remove();

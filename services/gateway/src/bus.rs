@@ -229,11 +229,10 @@ impl Bridge {
         let id = &self.link.thruster.id;
         for fault in Fault::in_set(faults & !known.unwrap_or(0)) {
             let of_fault = |event: &Event| match event.kind {
-                EventKind::Tripped => event.fault == Some(fault.code()),
+                kind if kind.latches() => event.fault == Some(fault.code()),
                 kind => kind == EventKind::FaultsCleared,
             };
-            let told =
-                self.link.events.latest(id, of_fault).is_some_and(|event| event.kind == EventKind::Tripped);
+            let told = self.link.events.latest(id, of_fault).is_some_and(|event| event.kind.latches());
             if known.is_none() && told {
                 continue;
             }

@@ -292,15 +292,14 @@ impl Thruster {
 
     /// A fault with what the event log knows of how it came.
     fn fault_view(&self, fault: Fault) -> FaultView {
-        let tripped = self
-            .events
-            .latest(&self.id, |event| event.kind == EventKind::Tripped && event.fault == Some(fault.code()));
+        let came =
+            self.events.latest(&self.id, |event| event.kind.latches() && event.fault == Some(fault.code()));
         FaultView {
             code: fault.code(),
             name: fault.name(),
             help: fault.help(),
-            since: tripped.as_ref().map(|event| event.time.clone()),
-            before: tripped.and_then(|event| event.before).map(|before| BeforeView {
+            since: came.as_ref().map(|event| event.since.as_ref().unwrap_or(&event.time).clone()),
+            before: came.and_then(|event| event.before).map(|before| BeforeView {
                 thrust_n: before.thrust_n,
                 shaft_speed_rad_s: before.shaft_speed_rad_s,
             }),

@@ -54,13 +54,15 @@ fn write(log: &EventLog, watched: &std::path::Path, inbox: &Receiver<Entry>) {
     let mut complained = false;
     for entry in inbox {
         let written = match entry {
-            Entry::Event(event) => log.append(&event),
-            Entry::Watched(state) => state.write(watched),
+            Entry::Event(event) => {
+                log.append(&event).map_err(|error| format!("{error}\nhint: gateway.events needs space"))
+            }
+            Entry::Watched(state) => state.write(watched).map_err(|error| error.to_string()),
         };
         match written {
             Ok(()) => complained = false,
             Err(error) if !std::mem::replace(&mut complained, true) => {
-                warn!("what happened cannot be written down: {error}\nhint: gateway.events needs space");
+                warn!("what happened cannot be written down: {error}");
             }
             Err(_) => (),
         }

@@ -1,10 +1,11 @@
 //! What the supervisor hears of one thruster through shared memory: that its processes beat, and how it stands.
 
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
+use kort_proto::events::Before;
 use kort_proto::faults::Fault;
 use kort_proto::messages::{Request, RequestKind, Trip};
-use kort_proto::transport::{Deployment, Stood, SupervisorPorts, monotonic_ns};
+use kort_proto::transport::{Deployment, Latched, Stood, SupervisorPorts, monotonic_ns};
 
 use super::role::Heritage;
 
@@ -89,7 +90,27 @@ impl Watch {
             self.speed_max_rad_s = state.speed_max_rad_s;
         }
         beats.gateway = ports.setpoint.latest().is_some();
+        if beats.servo || beats.controller {
+            self.note_latched();
+        }
         beats
+    }
+
+    /// Notes when each latched fault came, and forgets those that were cleared.
+    fn note_latched(&mut self) {
+        let faults = self.stood.servo_faults | self.stood.controller_faults;
+        let latched = &mut self.stood.latched;
+        latched.retain(|known| Fault::in_set(faults).any(|fault| fault.code() == known.code));
+        for fault in Fault::in_set(faults) {
+            if latched.iter().all(|known| known.code != fault.code()) {
+                let stopped = Some(&self.tripped).filter(|trip| trip.at_ns != 0);
+                latched.push(Latched {
+                    code: fault.code(),
+                    since: humantime::format_rfc3339_micros(SystemTime::now()).to_string(),
+                    before: stopped.map(|trip| Before::of(trip.thrust_n, trip.shaft_speed_rad_s)),
+                });
+            }
+        }
     }
 
     /// What the successor of a process takes over: a servo that ended while armed is a stop nobody asked for.

@@ -1,0 +1,89 @@
+//! Another user of the machine who was there first, or writes where we do. As root the stranger is user 65534; as
+//! anybody else only what needs no other user is tried.
+
+use std::fs::{self, Permissions};
+use std::os::unix::fs::{PermissionsExt, chown, symlink};
+use std::path::Path;
+
+use crate::LEASE_MS;
+use crate::common::{self, Site, Stack, kill, run};
+
+const STRANGER: u32 = 65534;
+
+/// Refused at the start with these words and a hint, nothing of ours written anywhere.
+fn is_refused(site: &Site, what: &Path, why: &str) {
+    let out = run(&mut site.command("up"));
+    let words = String::from_utf8_lossy(&out.stderr);
+    assert_eq!(out.status.code(), Some(1), "{words}");
+    for part in [what.to_str().unwrap(), why, "hint:", "--root"] {
+        assert!(words.contains(part), "{part} is not in {words}");
+    }
+    assert_eq!(words.matches("error:").count(), 1, "one message: {words}");
+}
+
+/// Like `/tmp`: everybody may lay something there, nobody may take it away.
+fn shared(site: &Site) {
+    fs::set_permissions(site.folder.path(), Permissions::from_mode(0o1777)).unwrap();
+}
+
+const BESIDE: [&str; 5] =
+    ["shm.lock", "shm.generation", "shm.generation.new", "shm.watched", "shm.watched.new"];
+
+#[test]
+fn what_another_user_laid_where_we_begin_is_refused_in_words() {
+    let site = Site::new();
+    shared(&site);
+    if !rustix::process::geteuid().is_root() {
+        eprintln!("not tried: files of another user (this is not root)");
+        return;
+    }
+    let forged = r#"{"thrusters": {"t1": {"armed": true, "servo_faults": 4096}}}"#;
+    for name in BESIDE {
+        let file = site.folder.path().join(name);
+        fs::write(&file, forged).unwrap();
+        // Ours to read and write, as far as the mode goes.
+        fs::set_permissions(&file, Permissions::from_mode(0o666)).unwrap();
+        chown(&file, Some(STRANGER), Some(STRANGER)).unwrap();
+        is_refused(&site, &file, "belongs to user 65534, this is user 0");
+        assert_eq!(fs::read_to_string(&file).unwrap(), forged, "{name}");
+        fs::remove_file(&file).unwrap();
+    }
+    fs::create_dir(site.root()).unwrap();
+    fs::set_permissions(site.root(), Permissions::from_mode(0o777)).unwrap();
+    chown(site.root(), Some(STRANGER), Some(STRANGER)).unwrap();
+    is_refused(&site, &site.root(), "belongs to user 65534, this is user 0");
+    // Who only joins believes it no more than who owns.
+    let generation = format!("1 {}", kort_proto::names::MESSAGES_VERSION);
+    fs::write(site.folder.path().join("shm.generation"), generation).unwrap();
+    let out = run(&mut site.command("controller"));
+    let words = String::from_utf8_lossy(&out.stderr);
+    assert!(out.status.code() == Some(1) && words.contains("belongs to user 65534"), "{words}");
+    fs::remove_dir(site.root()).unwrap();
+}
+
+#[test]
+fn a_link_that_somebody_laid_is_never_written_through() {
+    common::in_real_time(|| {
+        let site = Site::new();
+        shared(&site);
+        let victim = site.folder.path().join("victim");
+        fs::write(&victim, "whole").unwrap();
+        for name in BESIDE {
+            let link = site.folder.path().join(name);
+            symlink(&victim, &link).unwrap();
+            is_refused(&site, &link, "is a link");
+            fs::remove_file(link).unwrap();
+        }
+        // Laid under way, where the next draft will be: told, and the thrust knows nothing of it.
+        let mut stack = Stack::start_at(site);
+        symlink(&victim, stack.site.folder.path().join("shm.watched.new")).unwrap();
+        stack.thrust(60.0, LEASE_MS);
+        common::wait("the log to name it", || {
+            stack.site.log().contains("shm.watched.new: is a link").then_some(())
+        });
+        assert_eq!(fs::read_to_string(&victim).unwrap(), "whole");
+        kill(stack.supervisor.id(), "INT");
+        assert!(stack.supervisor.wait().unwrap().success());
+        assert_eq!(fs::read_to_string(&victim).unwrap(), "whole");
+    });
+}
