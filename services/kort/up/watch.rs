@@ -115,16 +115,11 @@ impl Watch {
 
     /// What the successor of a process takes over: a servo that ended while armed is a stop nobody asked for.
     pub fn heritage(&self, role: &str) -> Heritage {
-        let now = Trip {
-            at_ns: monotonic_ns(),
-            thrust_n: self.stood.thrust_n.unwrap_or(f64::NAN),
-            shaft_speed_rad_s: self.stood.shaft_speed_rad_s.unwrap_or(f64::NAN),
-            drive: f64::NAN,
-        };
         match role {
-            "servo" if self.stood.armed => {
-                Heritage { latched: self.stood.servo_faults | Fault::ServoRestarted.bit(), tripped: now }
-            }
+            "servo" if self.stood.armed => Heritage {
+                latched: self.stood.servo_faults | Fault::ServoRestarted.bit(),
+                tripped: self.stop_of_now(),
+            },
             "servo" => Heritage { latched: self.stood.servo_faults, tripped: self.tripped },
             "controller" => Heritage { latched: self.stood.controller_faults, tripped: Trip::default() },
             _ => Heritage::default(),
@@ -134,9 +129,21 @@ impl Watch {
     /// The servo has ended: its successor starts disarmed.
     pub fn servo_ended(&mut self) {
         if self.stood.armed {
+            self.tripped = self.stop_of_now();
             self.stood.servo_faults |= Fault::ServoRestarted.bit();
+            self.note_latched();
         }
         self.stood.armed = false;
+    }
+
+    /// What the thruster did when it was last heard, as a stop of this instant.
+    fn stop_of_now(&self) -> Trip {
+        Trip {
+            at_ns: monotonic_ns(),
+            thrust_n: self.stood.thrust_n.unwrap_or(f64::NAN),
+            shaft_speed_rad_s: self.stood.shaft_speed_rad_s.unwrap_or(f64::NAN),
+            drive: f64::NAN,
+        }
     }
 
     /// Asks servo or controller for something.
