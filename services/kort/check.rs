@@ -120,9 +120,7 @@ fn problem(file: &str, message: &str) -> Problem {
     let found = what.split_once(" = ").and_then(|(_, rest)| {
         // A colon within a value (an address) is followed by no space.
         let ends = [" is ", ": ", ";", "\n"];
-        ends.iter()
-            .fold(Some(rest), |found, end| found?.split(end).next())
-            .map(|found| found.trim().to_owned())
+        ends.iter().try_fold(rest, |found, end| found.split(end).next()).map(|found| found.trim().to_owned())
     });
     Problem { file: file.to_owned(), key, found, allowed: what.to_owned(), hint }
 }

@@ -114,11 +114,14 @@ fn quantile(of: &[f64], share: f64) -> f64 {
     all[((all.len() - 1) as f64 * share).round() as usize]
 }
 
+/// Wake-ups of two windows, or of two groups of them, that stand beside each other.
+type Pair = (Vec<f64>, Vec<f64>);
+
 /// How much larger the p99 of all wake-ups is on the first side than on the second, with the doubt of 95 % that comes of
 /// drawing these pairs of windows anew.
-fn ratio(pairs: &[(Vec<f64>, Vec<f64>)]) -> String {
+fn ratio(pairs: &[Pair]) -> String {
     let of = |pairs_drawn: &[usize]| {
-        let p99 = |side: fn(&(Vec<f64>, Vec<f64>)) -> &Vec<f64>| {
+        let p99 = |side: fn(&Pair) -> &Vec<f64>| {
             let all: Vec<f64> = pairs_drawn.iter().flat_map(|at| side(&pairs[*at]).iter().copied()).collect();
             quantile(&all, 0.99)
         };
