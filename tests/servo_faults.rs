@@ -133,3 +133,29 @@ fn a_speed_drive_that_tells_no_current_arms_and_is_guarded_by_its_speed() {
     assert!(last.armed == 1 && last.faults == 0, "{last:?}");
     assert!((last.signals.shaft_speed_rad_s - 30.0).abs() < 3.0, "{last:?}");
 }
+
+/// The cores named in the configuration are those of the loop; one that is not there is said, and the loop runs on.
+#[test]
+fn the_loop_stays_on_its_cores() {
+    let allowed = |process: &str| {
+        let status = std::fs::read_to_string(format!("/proc/{process}/status")).unwrap();
+        let list = status.lines().find_map(|line| line.strip_prefix("Cpus_allowed_list:")).unwrap();
+        list.trim().to_owned()
+    };
+    let own = allowed("self");
+    let last = own.rsplit([',', '-']).next().unwrap();
+    for cores in [last.to_owned(), format!("{last}, 1023")] {
+        let site = Site::new();
+        let config = std::fs::read_to_string(site.config()).unwrap();
+        let config = config.replace("rate_hz = 500 }", &format!("rate_hz = 500, cores = [{cores}] }}"));
+        std::fs::write(site.config(), config).unwrap();
+        let bench = Bench::start_at(site);
+        assert_eq!(allowed(&bench.servo.id().to_string()), last);
+        assert_eq!(
+            bench.site.log().contains("not all are there"),
+            cores.contains("1023"),
+            "{}",
+            bench.site.log()
+        );
+    }
+}

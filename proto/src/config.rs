@@ -97,11 +97,13 @@ pub struct ServoLoop {
     pub rate_hz: f64,
     /// SCHED_FIFO priority, 1 to 90; zero leaves the scheduler alone.
     pub priority: i32,
+    /// Cores that the loop, and the threads of its devices, are kept on, counted from zero; none: wherever the system likes.
+    pub cores: Vec<usize>,
 }
 
 impl Default for ServoLoop {
     fn default() -> Self {
-        Self { rate_hz: 1000.0, priority: 80 }
+        Self { rate_hz: 1000.0, priority: 80, cores: Vec::new() }
     }
 }
 
@@ -113,6 +115,8 @@ pub struct ControllerLoop {
     pub rate_hz: f64,
     /// SCHED_FIFO priority, 1 to 90; zero leaves the scheduler alone.
     pub priority: i32,
+    /// Cores that the loop is kept on, as the servo's.
+    pub cores: Vec<usize>,
     /// Law, observer, estimator and their options: a file of `config/controllers`, relative to
     /// this file; empty takes the defaults of the law.
     pub file: PathBuf,
@@ -124,7 +128,14 @@ pub struct ControllerLoop {
 
 impl Default for ControllerLoop {
     fn default() -> Self {
-        Self { rate_hz: 250.0, priority: 70, file: PathBuf::new(), law: String::new(), setpoint_rise_s: None }
+        Self {
+            rate_hz: 250.0,
+            priority: 70,
+            cores: Vec::new(),
+            file: PathBuf::new(),
+            law: String::new(),
+            setpoint_rise_s: None,
+        }
     }
 }
 
@@ -202,6 +213,17 @@ impl Config {
                 t.servo.rate_hz,
                 "at most the servo's rate",
             )?;
+            for (key, cores) in [("servo.cores", &t.servo.cores), ("controller.cores", &t.controller.cores)] {
+                for core in cores {
+                    check(
+                        key,
+                        *core as f64,
+                        0.0,
+                        1023.0,
+                        "cores are counted from 0; leave it out for all of them",
+                    )?;
+                }
+            }
             if let Some(rise_s) = t.controller.setpoint_rise_s {
                 check(
                     "controller.setpoint_rise_s",
@@ -337,6 +359,9 @@ mod tests {
         let fast = BUILT_IN.replace("rate_hz = 1000", "rate_hz = 90000");
         let error = Config::parse(&fast, None).unwrap_err().to_string();
         assert!(error.contains("thrusters.t1.servo.rate_hz") && error.contains("100 to 5000"), "{error}");
+        let far = BUILT_IN.replace("rate_hz = 1000", "rate_hz = 1000\ncores = [1, 1024]");
+        let error = Config::parse(&far, None).unwrap_err().to_string();
+        assert!(error.contains("thrusters.t1.servo.cores") && error.contains("0 to 1023"), "{error}");
         let odd = BUILT_IN.replace("rate_hz = 250", "rate_hz = 300");
         assert!(Config::parse(&odd, None).unwrap_err().to_string().contains("does not divide"));
     }

@@ -92,6 +92,28 @@ pub fn realtime(priority: i32, lock_memory: bool) -> Vec<String> {
     missing
 }
 
+/// Keeps the calling thread, and those that it starts from now on, on these cores, counted from zero; none named: wherever
+/// the system likes.
+///
+/// Returns what was not done, in words fit for a warning.
+pub fn keep_on(cores: &[usize]) -> Option<String> {
+    use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
+    if cores.is_empty() {
+        return None;
+    }
+    let mut wanted = CpuSet::new();
+    cores.iter().filter(|core| **core < CpuSet::MAX_CPU).for_each(|core| wanted.set(*core));
+    // The kernel leaves out cores that are not there, or not this process's, and refuses only if none is left.
+    let words = match sched_setaffinity(None, &wanted).and_then(|()| sched_getaffinity(None)) {
+        Err(e) => format!("cannot be kept on cores {cores:?} ({e}): it runs wherever the system likes"),
+        Ok(got) if cores.iter().all(|core| *core < CpuSet::MAX_CPU && got.is_set(*core)) => return None,
+        Ok(_) => format!("of the cores {cores:?} not all are there: it is kept on the others"),
+    };
+    Some(format!(
+        "{words}\nhint: `nproc --all` says how many there are, counted from 0; containers and services have fewer"
+    ))
+}
+
 /// Makes the calling thread an ordinary one, whatever it inherited: a service manager (or `chrt`)
 /// that starts a process as a real-time one makes all its threads so, and one that works at the
 /// priority of a loop keeps the loop waiting.
@@ -118,6 +140,28 @@ pub fn idle() -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_thread_and_those_it_starts_stay_on_their_core_and_one_that_is_not_there_is_said() {
+        let cores = || {
+            let set = rustix::thread::sched_getaffinity(None).expect("a set");
+            (0..rustix::thread::CpuSet::MAX_CPU).filter(|core| set.is_set(*core)).collect::<Vec<_>>()
+        };
+        let all = cores();
+        let last = *all.last().expect("a core");
+        std::thread::spawn(move || {
+            assert_eq!(keep_on(&[]), None);
+            assert_eq!(cores(), all);
+            assert_eq!(keep_on(&[last]), None);
+            assert_eq!(std::thread::spawn(cores).join().expect("a thread"), [last]);
+            let words = keep_on(&[last, 1023]).expect("words");
+            assert!(words.contains("not all are there") && words.contains("hint: "), "{words}");
+            assert!(keep_on(&[1023]).expect("words").contains("wherever the system likes"));
+            assert_eq!(cores(), [last], "what was not done changes nothing");
+        })
+        .join()
+        .expect("a thread");
+    }
 
     #[test]
     fn a_thread_that_a_real_time_one_starts_can_be_made_ordinary() {

@@ -10,7 +10,7 @@ mod rig;
 mod room;
 mod watched;
 
-pub use clock::{Ticker, idle, monotonic_ns, ordinary, realtime};
+pub use clock::{Ticker, idle, keep_on, monotonic_ns, ordinary, realtime};
 pub use deployment::{Deployment, Owner};
 pub use error::TransportError;
 pub use ports::{

@@ -9,7 +9,7 @@ use kort_control::{ControllerConfig, LawKind, ModelError};
 use kort_proto::config::{Config, ConfigError, Thruster};
 use kort_proto::messages::{Command, Reply, RequestKind, Timing};
 use kort_proto::revision;
-use kort_proto::transport::{ControllerPorts, Deployment, TransportError, monotonic_ns, realtime};
+use kort_proto::transport::{ControllerPorts, Deployment, TransportError, keep_on, monotonic_ns, realtime};
 use kort_thruster::rig::Rig;
 use thiserror::Error;
 use tracing::{info, warn};
@@ -96,6 +96,10 @@ pub fn run(config: &Config, deployment: &Deployment, id: &str, latched: u64) -> 
     }
     // Before this thread becomes a real-time one: designing a controller must not keep a tick waiting.
     let workshop = Workshop::start(deployment, id, period_ns).map_err(ControllerError::Thread)?;
+    // Behind it too: the workshop runs wherever there is room.
+    if let Some(missing) = keep_on(&thruster.controller.cores) {
+        warn!(thruster = id, "controller: {missing}");
+    }
     if thruster.controller.priority > 0 {
         for missing in realtime(thruster.controller.priority, false) {
             warn!("{missing}");

@@ -7,7 +7,7 @@ use std::time::Duration;
 use kort_proto::config::{Config, ConfigError};
 use kort_proto::messages::{Request, Trip};
 use kort_proto::transport::{
-    Deployment, ServoPorts, Ticker, TransportError, monotonic_ns, ordinary, realtime,
+    Deployment, ServoPorts, Ticker, TransportError, keep_on, monotonic_ns, ordinary, realtime,
 };
 use kort_thruster::rig::Rig;
 use thiserror::Error;
@@ -102,6 +102,9 @@ pub fn run(
     let owner = if join { None } else { Some(own(config, deployment, &stop)?) };
     deployment.wait_for_generation(Duration::from_secs(10))?;
     let mut ports = ServoPorts::open(deployment, id)?;
+    if let Some(missing) = keep_on(&thruster.servo.cores) {
+        warn!(thruster = id, "servo: {missing}");
+    }
     if priority > 0 {
         for missing in realtime(priority, true) {
             warn!("{missing}");

@@ -14,7 +14,7 @@ use kort_calibrate::{Next, Plan, Session};
 use kort_proto::config::Config;
 use kort_proto::faults::Names;
 use kort_proto::messages::{Command, DriveKind, Outcome, Process, Request, RequestKind, Telemetry};
-use kort_proto::transport::{ControllerPorts, Deployment, GatewayPorts, realtime};
+use kort_proto::transport::{ControllerPorts, Deployment, GatewayPorts, keep_on, realtime};
 use kort_servo::settings::Settings;
 use kort_thruster::rig::Rig;
 use rustix::process::{Pid, Signal, kill_process};
@@ -75,6 +75,9 @@ pub fn run(bench: &Bench) -> Result<Ended, Failure> {
     );
     let mut servo = Servo::start(bench)?;
     let mut wire = Wire::open(bench, settings.limits.kind, &mut servo, &stop)?;
+    if let Some(missing) = keep_on(&thruster.controller.cores) {
+        eprintln!("warning: {missing}");
+    }
     if thruster.controller.priority > 0 {
         for missing in realtime(thruster.controller.priority, false) {
             eprintln!("warning: {missing}");
