@@ -42,8 +42,7 @@ pub struct Rest {
 /// What a fit leaves that is no noise: either it follows what the machine does by more than our equations may err, or
 /// it is larger than sensors of this kind err.
 pub fn more_than_noise(problem: &Problem, fit: &Fit, residual: &Stack, floor: &Noise) -> Option<Rest> {
-    let may_err =
-        problem.spectrum.variances(problem.floor.with_actions(&fit.actions, &problem.criterion).levels());
+    let may_err = problem.spectrum.variances(fit.floor.levels());
     let following = follows(problem, fit, residual);
     let lasting = lasting(problem, residual);
     let mut all = Vec::new();
@@ -66,7 +65,7 @@ pub fn more_than_noise(problem: &Problem, fit: &Fit, residual: &Stack, floor: &N
 
 /// Effects of a fit that do less, on every channel, than our equations may err by, each with what it does at most over
 /// full scale: such a name would be one for the error of an equation.
-pub fn negligible(problem: &Problem, fit: &Fit) -> Vec<(&'static str, f64)> {
+pub fn negligible(problem: &Problem, fit: &Fit, actions: &[Vec<f64>]) -> Vec<(&'static str, f64)> {
     // The form error alone: doubts of stamps and of what runs between samples are no error of an equation.
     let signal: Vec<f64> = problem.spectrum.bands.iter().map(|band| band.signal).collect();
     let share = problem.criterion.form_error.powi(2);
@@ -78,19 +77,23 @@ pub fn negligible(problem: &Problem, fit: &Fit) -> Vec<(&'static str, f64)> {
         let most = acts.iter().flatten().zip(full).map(|(v, full)| v.sqrt() / full).fold(0.0, f64::max);
         channels.all(|(acts, signal)| *acts < share * signal).then_some((member.effect.id, most))
     };
-    sized(problem, fit).filter_map(small).collect()
+    sized(problem, fit, actions).filter_map(small).collect()
 }
 
 /// Effects of a fit that have a size, with what they do.
-fn sized<'a>(problem: &'a Problem, fit: &'a Fit) -> impl Iterator<Item = (&'a Member, &'a Vec<f64>)> {
-    fit.hypothesis.effects.iter().zip(&fit.actions).filter(|(member, _)| member.has_size(&problem.scale))
+fn sized<'a>(
+    problem: &'a Problem,
+    fit: &'a Fit,
+    actions: &'a [Vec<f64>],
+) -> impl Iterator<Item = (&'a Member, &'a Vec<f64>)> {
+    fit.hypothesis.effects.iter().zip(actions).filter(|(member, _)| member.has_size(&problem.scale))
 }
 
 /// Share of what an effect does that is the same all the time, from which on it is steady.
 const STEADY: f64 = 0.9;
 
 /// Effects of a fit that only shift each channel.
-pub fn steady(problem: &Problem, fit: &Fit) -> Vec<&'static str> {
+pub fn steady(problem: &Problem, fit: &Fit, actions: &[Vec<f64>]) -> Vec<&'static str> {
     let bands = &problem.spectrum.bands;
     // The first band of each channel is its constant.
     let first = |b: usize| b == 0 || !bands[b - 1].continues;
@@ -99,7 +102,7 @@ pub fn steady(problem: &Problem, fit: &Fit) -> Vec<&'static str> {
         let whole: f64 = (0..bands.len()).map(power).sum();
         (0..bands.len()).filter(|b| first(*b)).map(power).sum::<f64>() > STEADY * whole
     };
-    sized(problem, fit).filter(|(_, action)| shifts(action)).map(|(member, _)| member.effect.id).collect()
+    sized(problem, fit, actions).filter(|(_, action)| shifts(action)).map(|(member, _)| member.effect.id).collect()
 }
 
 /// Largest error of good sensors over their full scale, beyond the noise from one sample to the next.

@@ -233,7 +233,7 @@ fn of_form(
     };
     let model = Quadratic::extended(&problem.spectrum, &problem.criterion, &lines, &columns, &free, known);
     let lively = if form.len() > MOST_ALONE { &LIVELINESS[..] } else { &LIVELINESS[..1] };
-    let tried = lively.iter().filter_map(|liveliness| {
+    let tried = lively.iter().map(|liveliness| {
         let mut free = free.clone();
         free[free_len(parent)..].iter_mut().for_each(|f| f.sigma *= liveliness);
         let narrowed;
@@ -243,25 +243,9 @@ fn of_form(
             narrowed = model.scaled(free_len(parent), *liveliness);
             &narrowed
         };
-        let mut actions = parent.actions.clone();
-        actions.push(vec![0.0; problem.spectrum.bands.len()]);
-        let mut found = None;
-        // Twice: the form error of what the effect does is known once its size is.
-        for _ in 0..2 {
-            let floor = problem.floor.with_actions(&actions, &problem.criterion);
-            let minimum = model.minimise(&floor, &free, &values, 0.0);
-            let mut acts = DVector::zeros(problem.spectrum.lines);
-            for (i, k) in form.iter().enumerate() {
-                let at = free_len(parent) + i;
-                acts.axpy(minimum.step[at] * free[at].sigma, &probe.sizes[*k].1, 1.0);
-            }
-            let last = actions.len() - 1;
-            actions[last] = problem.spectrum.powers(&acts);
-            found = Some(minimum);
-        }
-        let found = found?;
+        let found = model.minimise(&parent.floor, &free, &values, 0.0);
         let cost = found.misfit + found.penalty + model.price(&found.noise);
-        Some((cost, *liveliness, found, free))
+        (cost, *liveliness, found, free)
     });
     let (cost, liveliness, found, free) = tried.min_by(|a, b| a.0.total_cmp(&b.0))?;
     member.liveliness = liveliness;

@@ -26,8 +26,6 @@ pub struct Screened {
     pub columns: Columns,
     /// Its cost there, without the prior odds of its effects.
     pub cost: f64,
-    /// What the effect does to the response there: mean square by band.
-    pub action: Vec<f64>,
 }
 
 /// Starts of one effect that are fitted on top of one set.
@@ -75,7 +73,7 @@ pub fn screen(problem: &Problem, parent: &Fit, probes: &[&[Probe]]) -> Vec<Scree
 }
 
 fn at(problem: &Problem, parent: &Fit, known: &[DMatrix<f64>], member: Member) -> Option<Screened> {
-    let (effect, has_size) = (member.effect, member.has_size(&problem.scale));
+    let effect = member.effect;
     let hypothesis = parent.hypothesis.with(&parent.values, member, &problem.scale);
     let own: Vec<usize> = (parent.values.len()..hypothesis.free.len()).collect();
     let (lines, new) = if own.len() <= LANES {
@@ -93,24 +91,8 @@ fn at(problem: &Problem, parent: &Fit, known: &[DMatrix<f64>], member: Member) -
         parent.columns.iter().flatten().map(AsRef::as_ref).chain(&new).collect();
     let model =
         Quadratic::extended(&problem.spectrum, &problem.criterion, &lines, &columns, &hypothesis.free, known);
-    let mut actions = parent.actions.clone();
-    actions.push(vec![0.0; problem.spectrum.bands.len()]);
-    // Twice: the form error of what the effect does is known once its size is.
-    let mut minimum = None;
-    for _ in 0..2 {
-        let floor = problem.floor.with_actions(&actions, &problem.criterion);
-        let found = model.minimise(&floor, &hypothesis.free, &hypothesis.start, 0.0);
-        let mut acts = &parent.lines - &lines;
-        for (k, column) in own.iter().zip(&new) {
-            acts.axpy(found.step[*k] * hypothesis.free[*k].sigma, column, 1.0);
-        }
-        if let Some(own) = actions.last_mut().filter(|_| has_size) {
-            *own = problem.spectrum.powers(&acts);
-        }
-        minimum = Some(found);
-    }
-    let minimum = minimum?;
+    let minimum = model.minimise(&parent.floor, &hypothesis.free, &hypothesis.start, 0.0);
     let cost = minimum.misfit + minimum.penalty + model.price(&minimum.noise);
     let columns = parent.columns.iter().cloned().chain(new.into_iter().map(|c| Some(Arc::new(c)))).collect();
-    Some(Screened { effect, hypothesis, columns, cost, action: actions.pop()? })
+    Some(Screened { effect, hypothesis, columns, cost })
 }

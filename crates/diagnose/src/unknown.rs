@@ -42,11 +42,11 @@ fn put_on(search: &mut Search, set: &Set, terms: &[&'static Descriptor]) -> Opti
     if cost + search.price_of(term.id) >= parent.cost() {
         return None;
     }
-    let (columns, actions) = (parent.columns.clone(), parent.actions.clone());
+    let columns = parent.columns.clone();
     let mut larger = set.clone();
     larger.push(term.id);
     larger.sort_unstable();
-    search.fit_set(larger.clone(), &hypothesis, &columns, &actions);
+    search.fit_set(larger.clone(), &hypothesis, &columns);
     search.fits.contains_key(&larger).then_some(larger)
 }
 
@@ -92,8 +92,7 @@ fn promise(
                 &hypothesis.free,
                 known.curvature(),
             );
-            let floor = problem.floor.with_actions(&parent.actions, &problem.criterion);
-            let found = model.minimise(&floor, &hypothesis.free, &hypothesis.start, 0.0);
+            let found = model.minimise(&parent.floor, &hypothesis.free, &hypothesis.start, 0.0);
             let cost = found.misfit + found.penalty + model.price(&found.noise);
             let start = hypothesis
                 .free

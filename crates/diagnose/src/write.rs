@@ -109,7 +109,7 @@ impl<'a, 'p> Writer<'a, 'p> {
             .filter(|m| m.effect.id != member)
             .collect();
         let (hypothesis, columns) = self.problem.recompose(from, &members);
-        self.problem.fit(&hypothesis, &columns, &[], 2 * TRAINING)
+        self.problem.fit(&hypothesis, &columns, &self.last.floor, 2 * TRAINING)
     }
 
     fn excess(&self, residual: &Stack) -> f64 {
@@ -132,11 +132,12 @@ impl<'a, 'p> Writer<'a, 'p> {
         let whole = (self.excess(&baseline_full) - self.excess(&last_full)).max(1e-300);
         let left = (self.excess(&named_full) - self.excess(&last_full)).max(0.0) / whole;
         let rest = left::more_than_noise(problem, self.last, &last_full, &self.floor);
-        let negligible = left::negligible(problem, self.last);
+        let actions = problem.actions(self.last);
+        let negligible = left::negligible(problem, self.last, &actions);
         let circumstances = Circumstances {
             negligible: negligible.iter().map(|n| n.0).collect(),
             thin: thin.is_some(),
-            steady: left::steady(problem, self.last),
+            steady: left::steady(problem, self.last, &actions),
             broke_down: false,
             left,
             beside_unknown: self.beside_unknown,

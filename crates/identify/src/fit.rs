@@ -33,8 +33,8 @@ pub struct Fit {
     pub lines: DVector<f64>,
     /// Derivatives, perhaps from nearby.
     pub columns: Columns,
-    /// What each effect does to the response: mean square by band.
-    pub actions: Vec<Vec<f64>>,
+    /// Least noise it is held to.
+    pub floor: Floor,
     /// Its noise.
     pub noise: Noise,
     /// Squared distance from the priors' means, in standard deviations.
@@ -66,22 +66,20 @@ impl Fit {
 }
 
 impl Problem<'_> {
-    /// Fits a hypothesis from its start, under the form error of what its effects are known to do.
-    /// `known` holds derivatives from a nearby fit; they serve until a step falls short of what they
+    /// Fits a hypothesis from its start, held to noise no less than `floor`. `known` holds derivatives from a nearby fit; they serve until a step falls short of what they
     /// promise, which saves most simulations while hypotheses are compared.
     pub fn fit(
         &self,
         hypothesis: &Hypothesis,
         known: &Columns,
-        actions: &[Vec<f64>],
+        floor: &Floor,
         iterations: usize,
     ) -> Fit {
-        let floor = self.floor.with_actions(actions, &self.criterion);
         let free = &hypothesis.free;
         let n = free.len();
         let mut values = hypothesis.start.clone();
         let mut lines = self.residual_lines(hypothesis, &values);
-        let mut merit = self.merit(hypothesis, &values, &lines, &floor);
+        let mut merit = self.merit(hypothesis, &values, &lines, floor);
         let mut columns = known.clone();
         columns.resize(n, None);
         let mut fresh = columns.iter().all(Option::is_none);
@@ -91,13 +89,13 @@ impl Problem<'_> {
             let model = self.about(&lines, &columns, hypothesis);
             let mut outcome = None;
             for _ in 0..5 {
-                let minimum = model.minimise(&floor, free, &values, damping);
+                let minimum = model.minimise(floor, free, &values, damping);
                 let trial: Vec<f64> = (0..n)
                     .map(|k| (values[k] + minimum.step[k] * free[k].sigma).clamp(free[k].low, free[k].high))
                     .collect();
                 let promised = merit - minimum.misfit - minimum.penalty;
                 let trial_lines = self.residual_lines(hypothesis, &trial);
-                let trial_merit = self.merit(hypothesis, &trial, &trial_lines, &floor);
+                let trial_merit = self.merit(hypothesis, &trial, &trial_lines, floor);
                 if trial_merit < merit {
                     outcome = Some((merit - trial_merit, promised));
                     (values, lines, merit) = (trial, trial_lines, trial_merit);
@@ -134,14 +132,14 @@ impl Problem<'_> {
             }
         }
         let powers = self.spectrum.powers(&lines);
-        let noise = Noise::of(&self.spectrum.bands, &powers, &floor, &self.criterion);
+        let noise = Noise::of(&self.spectrum.bands, &powers, floor, &self.criterion);
         Fit {
             penalty: hypothesis.penalty(&values),
             hypothesis: hypothesis.clone(),
             values,
             lines,
             columns,
-            actions: actions.to_vec(),
+            floor: floor.clone(),
             noise,
             price: f64::NAN,
         }
@@ -152,27 +150,26 @@ impl Problem<'_> {
     pub fn settle_from_stated(&self, hypothesis: &Hypothesis, iterations: usize) -> Fit {
         let mut placed = hypothesis.clone();
         for _ in 0..PLACINGS {
-            let stated = self.fit(&placed, &Vec::new(), &[], 0);
+            let stated = self.fit(&placed, &Vec::new(), &self.floor, 0);
             let Some(inputs) = self.place_edges(&stated) else { break };
             placed.inputs = Arc::new(inputs);
         }
-        self.settle(&placed, &Vec::new(), &[], iterations)
+        self.settle(&placed, &Vec::new(), &self.floor, iterations)
     }
 
-    /// A fit to a finish: from its start, with the steps of the command placed for it, the form error of its
-    /// effects' own actions counted, and its price known.
+    /// A fit to a finish: from its start, with the steps of the command placed for it, and its price known.
     pub fn settle(
         &self,
         hypothesis: &Hypothesis,
         known: &Columns,
-        actions: &[Vec<f64>],
+        floor: &Floor,
         iterations: usize,
     ) -> Fit {
-        let mut fit = self.fit(hypothesis, known, actions, iterations);
+        let mut fit = self.fit(hypothesis, known, floor, iterations);
         for _ in 0..PLACINGS {
             let Some(inputs) = self.place_edges(&fit) else { break };
             let moved = Hypothesis { inputs: Arc::new(inputs), ..fit.resume() };
-            let next = self.fit(&moved, &fit.columns, actions, iterations);
+            let next = self.fit(&moved, &fit.columns, floor, iterations);
             let gain = fit.noise.misfit + fit.penalty - next.noise.misfit - next.penalty;
             if gain > 0.0 {
                 fit = next;
@@ -184,20 +181,18 @@ impl Problem<'_> {
         self.finish(fit)
     }
 
-    /// Counts the form error of a fit's effects and prices its numbers.
+    /// Learns a fit's noise over its floor and prices its numbers.
     pub fn finish(&self, mut fit: Fit) -> Fit {
-        fit.actions = self.actions(&fit);
-        let floor = self.floor.with_actions(&fit.actions, &self.criterion);
         let powers = self.spectrum.powers(&fit.lines);
-        fit.noise = Noise::of(&self.spectrum.bands, &powers, &floor, &self.criterion);
+        fit.noise = Noise::of(&self.spectrum.bands, &powers, &fit.floor, &self.criterion);
         self.complete(&fit.hypothesis, &fit.values, &mut fit.columns);
         fit.price = self.about(&fit.lines, &fit.columns, &fit.hypothesis).price(&fit.noise);
         fit
     }
 
-    /// What each effect of a fit does to the response: the change where it is taken away. Nothing is said of what has
-    /// no size: it is no share of the response that may be off by a share.
-    fn actions(&self, fit: &Fit) -> Vec<Vec<f64>> {
+    /// What each effect of a fit does to the response: the change where it is taken away, mean square by band. Nothing
+    /// is said of what has no size.
+    pub fn actions(&self, fit: &Fit) -> Vec<Vec<f64>> {
         let all = self.members(&fit.hypothesis, &fit.values);
         (0..all.len())
             .map(|without| {
@@ -290,7 +285,7 @@ impl Problem<'_> {
     /// A fit taken further under the present masks.
     pub fn again(&self, fit: &Fit, iterations: usize) -> Fit {
         let columns = if fit.lines.len() == self.spectrum.lines { fit.columns.clone() } else { Vec::new() };
-        let actions = if columns.is_empty() { Vec::new() } else { fit.actions.clone() };
-        self.fit(&fit.resume(), &columns, &actions, iterations)
+        let floor = if columns.is_empty() { &self.floor } else { &fit.floor };
+        self.fit(&fit.resume(), &columns, floor, iterations)
     }
 }

@@ -167,7 +167,7 @@ pub fn identify(
     if moving.contains(&true) {
         for _ in 0..2 {
             place_starts(&mut problem, &best, &moving);
-            best = problem.settle(&best.resume(), &Vec::new(), &best.actions, ITERATIONS);
+            best = problem.settle(&best.resume(), &Vec::new(), &best.floor, ITERATIONS);
         }
     }
     let problem = &problem;
@@ -271,7 +271,7 @@ fn several_starts(
                 *value = (free.mean + offset * free.sigma).clamp(free.low, free.high);
             }
         }
-        let fit = problem.fit(&from, &Vec::new(), &fits[0].actions, ITERATIONS);
+        let fit = problem.fit(&from, &Vec::new(), &fits[0].floor, ITERATIONS);
         fits.push(problem.finish(fit));
     }
     let (place, _) = fits.iter().enumerate().fold((0, fits[0].cost()), |at, (k, f)| {

@@ -106,15 +106,16 @@ impl Floor {
         Self(self.0.iter().zip(doubt).map(|(f, d)| f + d).collect())
     }
 
-    /// With the form error of effects that do this to the response (mean squares by band, one list an effect).
-    pub fn with_actions(&self, actions: &[Vec<f64>], criterion: &Criterion) -> Self {
-        let mut floor = self.0.clone();
-        for action in actions {
-            for (f, power) in floor.iter_mut().zip(action) {
-                *f += criterion.own_form_error.powi(2) * power;
-            }
-        }
-        Self(floor)
+    /// With the form error of what is to explain a mismatch (mean square by band): its equations are as good as a share
+    /// of it.
+    pub fn explaining(&self, mismatch: &[f64], criterion: &Criterion) -> Self {
+        let share = criterion.own_form_error.powi(2);
+        Self(self.0.iter().zip(mismatch).map(|(f, m)| f + share * m).collect())
+    }
+
+    /// The lower of two, band by band.
+    pub fn or_lower(&self, other: &Self) -> Self {
+        Self(self.0.iter().zip(&other.0).map(|(a, b)| a.min(*b)).collect())
     }
 }
 

@@ -71,9 +71,8 @@ impl Search<'_, '_> {
                 .par_iter()
                 .filter(|s| self.fits.get(&larger(s)).is_none_or(|fit| s.cost < fit.cost() - ENOUGH))
                 .map(|s| {
-                    let mut actions = parent.actions.clone();
-                    actions.push(s.action.clone());
-                    (larger(s), self.problem.settle(&s.hypothesis, &s.columns, &actions, ITERATIONS))
+                    let floor = self.floor_of(&larger(s));
+                    (larger(s), self.problem.settle(&s.hypothesis, &s.columns, &floor, ITERATIONS))
                 })
                 .collect();
             new.into_iter().for_each(|(set, fit)| self.keep(set, fit));

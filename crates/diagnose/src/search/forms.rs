@@ -24,11 +24,11 @@ impl Search<'_, '_> {
                 .par_iter()
                 .map(|members| {
                     let (hypothesis, columns) = self.problem.recompose(from, members);
-                    self.problem.finish(self.problem.fit(&hypothesis, &columns, &from.actions, FIRST_STEPS))
+                    self.problem.finish(self.problem.fit(&hypothesis, &columns, &from.floor, FIRST_STEPS))
                 })
                 .min_by(|a, b| a.cost().total_cmp(&b.cost()));
             let Some(best) = best.filter(|fit| fit.cost() < before + self.constants.rivals) else { return };
-            let fit = self.problem.settle(&best.resume(), &best.columns, &best.actions, ITERATIONS);
+            let fit = self.problem.settle(&best.resume(), &best.columns, &best.floor, ITERATIONS);
             self.keep(set.clone(), fit);
             if self.fits[set].cost() > before - ENOUGH {
                 return;

@@ -9,6 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use kort_identify::fit::{Columns, Fit};
 use kort_identify::hypothesis::{Hypothesis, Member};
+use kort_identify::noise::Floor;
 use kort_identify::simulate::Problem;
 use kort_thruster::effects::Descriptor;
 use rayon::prelude::*;
@@ -42,6 +43,8 @@ pub struct Search<'a, 'p> {
     probes: Vec<Vec<Probe>>,
     /// In how many ways each effect may act here.
     ways: Vec<usize>,
+    /// Least noise that a set is held to: of all sets under no name, lower ones under effects without a size.
+    floors: BTreeMap<&'static str, Floor>,
     constants: SearchConstants,
     temper: f64,
 }
@@ -58,6 +61,7 @@ impl<'a, 'p> Search<'a, 'p> {
             reshaped: BTreeSet::new(),
             probes: Vec::new(),
             ways: Vec::new(),
+            floors: BTreeMap::new(),
             constants: constants.search,
             temper: constants.posterior.temper,
         }
@@ -106,10 +110,8 @@ impl<'a, 'p> Search<'a, 'p> {
     }
 
     /// Fits a set from a hypothesis and keeps it if it does better than what is known of it.
-    pub fn fit_set(&mut self, set: Set, from: &Hypothesis, columns: &Columns, actions: &[Vec<f64>]) {
-        let mut actions = actions.to_vec();
-        actions.resize(from.effects.len(), vec![0.0; self.problem.spectrum.bands.len()]);
-        let fit = self.problem.settle(from, columns, &actions, ITERATIONS);
+    pub fn fit_set(&mut self, set: Set, from: &Hypothesis, columns: &Columns) {
+        let fit = self.problem.settle(from, columns, &self.floor_of(&set), ITERATIONS);
         self.keep(set, fit);
     }
 
@@ -122,7 +124,7 @@ impl<'a, 'p> Search<'a, 'p> {
     pub fn run(&mut self, baseline: &Hypothesis, progress: &(dyn Fn(&str) + Sync)) -> Set {
         progress("fitting the baseline");
         let first = self.problem.settle_from_stated(baseline, 2 * ITERATIONS);
-        let second = self.problem.settle(&first.resume(), &first.columns, &[], ITERATIONS);
+        let second = self.problem.settle(&first.resume(), &first.columns, &first.floor, ITERATIONS);
         self.fits.insert(Vec::new(), second);
         let best: Set = Vec::new();
         let baseline = &self.fits[&best];
@@ -133,7 +135,42 @@ impl<'a, 'p> Search<'a, 'p> {
         self.probes = self.effects.par_iter().map(|e| probe(self.problem, baseline, e)).collect();
         let ways = |(e, probes): (&&Descriptor, &Vec<Probe>)| ways(e, &self.problem.scale, probes);
         self.ways = self.effects.iter().zip(&self.probes).map(ways).collect();
+        self.hold(&best, "");
+        self.fit_what_has_no_size();
         self.climb(best, progress)
+    }
+
+    /// What has no size is there or not: other equations in the place of the model's, as exact as they are. What else
+    /// there is explains what they leave.
+    fn fit_what_has_no_size(&mut self) {
+        let baseline = self.fits[&Set::new()].clone();
+        for effect in self.effects.clone() {
+            let member = Member::new(effect, &self.problem.scale);
+            if member.has_size(&self.problem.scale) {
+                continue;
+            }
+            let set = vec![effect.id];
+            let hypothesis = baseline.hypothesis.with(&baseline.values, member, &self.problem.scale);
+            self.fit_set(set.clone(), &hypothesis, &baseline.columns);
+            self.hold(&set, effect.id);
+        }
+    }
+
+    /// Holds a set, and whatever explains its mismatch, to the form error of what would explain it.
+    fn hold(&mut self, set: &Set, under: &'static str) {
+        let Some(mut fit) = self.fits.remove(set) else { return };
+        let mismatch = self.problem.spectrum.powers(&fit.lines);
+        let floor = self.problem.floor.explaining(&mismatch, &self.problem.criterion);
+        fit.floor = floor.clone();
+        self.fits.insert(set.clone(), self.problem.finish(fit));
+        self.floors.insert(under, floor);
+    }
+
+    /// Least noise that a set is held to: the same for all that could explain the same mismatch, so that none gains by
+    /// how much of the signal it claims to make.
+    fn floor_of(&self, set: &Set) -> Floor {
+        let own = set.iter().filter_map(|id| self.floors.get(id));
+        own.fold(self.floors.get("").unwrap_or(&self.problem.floor).clone(), |floor, own| floor.or_lower(own))
     }
 
     /// Forward, swap and backward steps from a set that is fitted, until none helps; the best set.
@@ -216,7 +253,7 @@ impl<'a, 'p> Search<'a, 'p> {
                 let new = Member::new(effect, &self.problem.scale);
                 let hypothesis = parent.hypothesis.with(&parent.values, new, &self.problem.scale);
                 place = with(&place, effect.id);
-                self.fit_set(place.clone(), &hypothesis, &parent.columns, &parent.actions);
+                self.fit_set(place.clone(), &hypothesis, &parent.columns);
             }
             self.reshape(&place);
             tried.push(place);
@@ -263,11 +300,9 @@ impl<'a, 'p> Search<'a, 'p> {
         }
         let Some(from) = self.fits.get(larger) else { return };
         let all = self.problem.members(&from.hypothesis, &from.values);
-        let (members, actions): (Vec<Member>, Vec<Vec<f64>>) =
-            all.into_iter().zip(from.actions.clone()).filter(|(m, _)| set.contains(&m.effect.id)).unzip();
+        let members: Vec<Member> = all.into_iter().filter(|m| set.contains(&m.effect.id)).collect();
         let (hypothesis, columns) = self.problem.recompose(from, &members);
-        let fit = self.problem.settle(&hypothesis, &columns, &actions, ITERATIONS);
-        self.keep(set.clone(), fit);
+        self.fit_set(set.clone(), &hypothesis, &columns);
     }
 
     fn keep(&mut self, set: Set, fit: Fit) {

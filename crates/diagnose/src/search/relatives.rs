@@ -2,6 +2,7 @@
 
 use kort_identify::fit::Fit;
 use kort_identify::hypothesis::Member;
+use kort_identify::noise::Floor;
 use kort_thruster::effects::Descriptor;
 use rayon::prelude::*;
 
@@ -35,7 +36,7 @@ impl Search<'_, '_> {
                     continue;
                 }
                 let Some(parent) = self.fits.get(&rest).cloned() else { break };
-                if let Some(fit) = self.best_of_every_start(&parent, effect) {
+                if let Some(fit) = self.best_of_every_start(&parent, effect, &self.floor_of(&place)) {
                     self.keep(place.clone(), fit);
                     tried.push(place);
                 }
@@ -46,19 +47,17 @@ impl Search<'_, '_> {
 
     /// The best fit with one more effect of those that begin at each of its starts, beside the parent's values and
     /// beside the stated ones, which the parent had to bend.
-    fn best_of_every_start(&self, parent: &Fit, effect: &'static Descriptor) -> Option<Fit> {
+    fn best_of_every_start(&self, parent: &Fit, effect: &'static Descriptor, floor: &Floor) -> Option<Fit> {
         let scale = &self.problem.scale;
         let whole = Member::new(effect, scale);
         let starts = whole.starts(scale);
-        let mut actions = parent.actions.clone();
-        actions.push(vec![0.0; self.problem.spectrum.bands.len()]);
         let stated: Vec<f64> = (parent.hypothesis.free.iter().zip(&parent.values))
             .map(|(free, value)| if free.stated { free.mean } else { *value })
             .collect();
         let merit = |fit: &Fit| fit.noise.misfit + fit.penalty;
         let stand = |(start, values): (&Vec<f64>, &[f64])| {
             let hypothesis = parent.hypothesis.with(values, whole.clone().at(start.clone()), scale);
-            self.problem.fit(&hypothesis, &Vec::new(), &actions, 0)
+            self.problem.fit(&hypothesis, &Vec::new(), floor, 0)
         };
         let begun: Vec<(&Vec<f64>, &[f64])> =
             starts.iter().flat_map(|s| [(s, &parent.values[..]), (s, &stated[..])]).collect();
@@ -67,8 +66,8 @@ impl Search<'_, '_> {
         begun.truncate(MOST_BEGUN);
         let best = begun
             .par_iter()
-            .map(|fit| self.problem.fit(&fit.hypothesis, &Vec::new(), &actions, FIRST_STEPS))
+            .map(|fit| self.problem.fit(&fit.hypothesis, &Vec::new(), floor, FIRST_STEPS))
             .min_by(|a, b| merit(a).total_cmp(&merit(b)))?;
-        Some(self.problem.settle(&best.resume(), &best.columns, &actions, ITERATIONS))
+        Some(self.problem.settle(&best.resume(), &best.columns, floor, ITERATIONS))
     }
 }
