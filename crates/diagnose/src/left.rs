@@ -102,7 +102,10 @@ pub fn steady(problem: &Problem, fit: &Fit, actions: &[Vec<f64>]) -> Vec<&'stati
         let whole: f64 = (0..bands.len()).map(power).sum();
         (0..bands.len()).filter(|b| first(*b)).map(power).sum::<f64>() > STEADY * whole
     };
-    sized(problem, fit, actions).filter(|(_, action)| shifts(action)).map(|(member, _)| member.effect.id).collect()
+    sized(problem, fit, actions)
+        .filter(|(_, action)| shifts(action))
+        .map(|(member, _)| member.effect.id)
+        .collect()
 }
 
 /// Largest error of good sensors over their full scale, beyond the noise from one sample to the next.

@@ -27,7 +27,7 @@ pub fn left<R>(error: impl Fn(f64, f64, f64) -> f64, look: impl FnOnce(&Problem,
     let series = [Series { name: "log".into(), time_s, columns }];
     let rig = Rig::from_toml(RIG).unwrap();
     let setup = Setup::new(&series, &rig, ModelName::Model2, Constants::built_in().criterion).unwrap();
-    let fit = setup.problem.fit(&setup.baseline, &Vec::new(), &[], 0);
+    let fit = setup.problem.fit(&setup.baseline, &Vec::new(), &setup.problem.floor, 0);
     let speed: Vec<f64> =
         setup.problem.rows(&fit.hypothesis, &fit.values)[0].iter().map(|s| s.true_speed_rad_s).collect();
     let usual = (speed.iter().map(|s| s * s).sum::<f64>() / ROWS as f64).sqrt();

@@ -68,13 +68,7 @@ impl Fit {
 impl Problem<'_> {
     /// Fits a hypothesis from its start, held to noise no less than `floor`. `known` holds derivatives from a nearby fit; they serve until a step falls short of what they
     /// promise, which saves most simulations while hypotheses are compared.
-    pub fn fit(
-        &self,
-        hypothesis: &Hypothesis,
-        known: &Columns,
-        floor: &Floor,
-        iterations: usize,
-    ) -> Fit {
+    pub fn fit(&self, hypothesis: &Hypothesis, known: &Columns, floor: &Floor, iterations: usize) -> Fit {
         let free = &hypothesis.free;
         let n = free.len();
         let mut values = hypothesis.start.clone();
@@ -158,13 +152,7 @@ impl Problem<'_> {
     }
 
     /// A fit to a finish: from its start, with the steps of the command placed for it, and its price known.
-    pub fn settle(
-        &self,
-        hypothesis: &Hypothesis,
-        known: &Columns,
-        floor: &Floor,
-        iterations: usize,
-    ) -> Fit {
+    pub fn settle(&self, hypothesis: &Hypothesis, known: &Columns, floor: &Floor, iterations: usize) -> Fit {
         let mut fit = self.fit(hypothesis, known, floor, iterations);
         for _ in 0..PLACINGS {
             let Some(inputs) = self.place_edges(&fit) else { break };
