@@ -82,9 +82,13 @@ impl Serving {
             let done = done.and_then(|mut port| self.serve(&mut port));
             if let Err(error) = done {
                 let port = self.wire.port.display();
-                self.complain(format!(
-                    "{port}: {error}\nhint: is it plugged in, powered, free, and may this user read and write it?"
-                ));
+                let hint = match self.wire.can_node {
+                    Some(_) => {
+                        format!("is it there and up? as root: ip link set {port} up type can bitrate 1000000")
+                    }
+                    None => "is it plugged in, powered, free, and may this user read and write it?".into(),
+                };
+                self.complain(format!("{port}: {error}\nhint: {hint}"));
                 self.lost();
                 std::thread::sleep(AGAIN);
             }
