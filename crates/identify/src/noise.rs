@@ -1,8 +1,8 @@
 //! The noise that a hypothesis leaves, and what its residual costs under it.
 //!
 //! A tempered profile Whittle likelihood. Each band's noise level is what the residual leaves there, but
-//! never below the *form error*: our equations are not exact, and a few percent of a signal, or of an
-//! effect's own action, must not count against a good name. A band of one structural error holds many
+//! never below the *form error*: our equations are not exact, and a few percent of a signal, or a share of
+//! the mismatch that is to be explained, must not count against a good name. A band of one structural error holds many
 //! lines and few facts: it counts as at most so many. The lowest bands may not explain a constant away:
 //! noise rises towards low frequency no faster than a random walk does.
 //!
@@ -18,7 +18,7 @@ use crate::spectrum::Band;
 pub struct Criterion {
     /// Error of our equations as a share of the signal at and below a frequency.
     pub form_error: f64,
-    /// Error of an effect's equation as a share of what the effect itself does.
+    /// Error of the equations that explain a mismatch, as a share of it.
     pub own_form_error: f64,
     /// Most independent facts in a band.
     pub facts_a_band: f64,
@@ -175,6 +175,32 @@ mod tests {
         assert!(floor.0[2] < 1e-12, "{:?}", floor.0);
         assert!((floor.0[3] / 1e-4 - 1.0).abs() < 0.01);
         assert!((floor.0[5] / floor.0[3] * 1.585_f64.powi(4) - 1.0).abs() < 0.01);
+    }
+
+    #[test]
+    fn what_is_left_of_a_mismatch_below_a_share_hardly_counts_and_the_rest_does() {
+        let bands = bands();
+        let (mut mismatch, facts) = (vec![1e-6; 12], CRITERION.facts(&bands[5]));
+        mismatch[5] = 1.0;
+        let floor = Floor::of_signal(&bands, &CRITERION).explaining(&mismatch, &CRITERION);
+        let misfit = |left: f64| {
+            let mut powers = vec![1e-6; 12];
+            powers[5] = left;
+            Noise::of(&bands, &powers, &floor, &CRITERION).misfit
+        };
+        let share = CRITERION.own_form_error.powi(2);
+        assert!(misfit(1.0) - misfit(share) > facts * (0.9 / share).ln());
+        assert!(misfit(share) - misfit(0.01 * share) < 1.01 * facts);
+        assert!(misfit(0.01 * share) < misfit(share), "less error never costs more");
+    }
+
+    #[test]
+    fn the_lower_of_two_floors_holds_band_by_band() {
+        let floor = Floor::of_signal(&bands(), &CRITERION);
+        let (low, high): (Vec<f64>, Vec<f64>) =
+            (0..12).map(|k| if k < 6 { (0.0, 1.0) } else { (1.0, 0.0) }).unzip();
+        let (a, b) = (floor.explaining(&low, &CRITERION), floor.explaining(&high, &CRITERION));
+        assert_eq!(a.or_lower(&b), floor);
     }
 
     #[test]
