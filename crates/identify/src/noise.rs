@@ -107,10 +107,11 @@ impl Floor {
     }
 
     /// With the form error of what is to explain a mismatch (mean square by band): its equations are as good as a share
-    /// of it.
-    pub fn explaining(&self, mismatch: &[f64], criterion: &Criterion) -> Self {
+    /// of it. No more than the signal is to be explained: a model that runs away leaves more than none at all.
+    pub fn explaining(&self, bands: &[Band], mismatch: &[f64], criterion: &Criterion) -> Self {
         let share = criterion.own_form_error.powi(2);
-        Self(self.0.iter().zip(mismatch).map(|(f, m)| f + share * m).collect())
+        let of_band = |((floor, band), left): ((&f64, &Band), &f64)| floor + share * left.min(band.signal);
+        Self(self.0.iter().zip(bands).zip(mismatch).map(of_band).collect())
     }
 
     /// The lower of two, band by band.
@@ -179,10 +180,11 @@ mod tests {
 
     #[test]
     fn what_is_left_of_a_mismatch_below_a_share_hardly_counts_and_the_rest_does() {
-        let bands = bands();
+        let mut bands = bands();
+        bands[5].signal = 1.0;
         let (mut mismatch, facts) = (vec![1e-6; 12], CRITERION.facts(&bands[5]));
         mismatch[5] = 1.0;
-        let floor = Floor::of_signal(&bands, &CRITERION).explaining(&mismatch, &CRITERION);
+        let floor = Floor::of_signal(&bands, &CRITERION).explaining(&bands, &mismatch, &CRITERION);
         let misfit = |left: f64| {
             let mut powers = vec![1e-6; 12];
             powers[5] = left;
@@ -192,15 +194,19 @@ mod tests {
         assert!(misfit(1.0) - misfit(share) > facts * (0.9 / share).ln());
         assert!(misfit(share) - misfit(0.01 * share) < 1.01 * facts);
         assert!(misfit(0.01 * share) < misfit(share), "less error never costs more");
+        let away = vec![1e3; 12];
+        let most = Floor::of_signal(&bands, &CRITERION).explaining(&bands, &away, &CRITERION);
+        assert!((most.0[5] - floor.0[5]).abs() < 1e-12, "no more than the signal is to be explained");
     }
 
     #[test]
     fn the_lower_of_two_floors_holds_band_by_band() {
-        let floor = Floor::of_signal(&bands(), &CRITERION);
+        let signal: Vec<Band> = bands().into_iter().map(|band| Band { signal: 1.0, ..band }).collect();
+        let floor = Floor::of_signal(&signal, &CRITERION);
         let (low, high): (Vec<f64>, Vec<f64>) =
             (0..12).map(|k| if k < 6 { (0.0, 1.0) } else { (1.0, 0.0) }).unzip();
-        let (a, b) = (floor.explaining(&low, &CRITERION), floor.explaining(&high, &CRITERION));
-        assert_eq!(a.or_lower(&b), floor);
+        let held = |mismatch: &[f64]| floor.explaining(&signal, mismatch, &CRITERION);
+        assert_eq!(held(&low).or_lower(&held(&high)), floor);
     }
 
     #[test]

@@ -159,8 +159,9 @@ impl<'a, 'p> Search<'a, 'p> {
     /// Holds a set, and whatever explains its mismatch, to the form error of what would explain it.
     fn hold(&mut self, set: &Set, under: &'static str) {
         let Some(mut fit) = self.fits.remove(set) else { return };
-        let mismatch = self.problem.spectrum.powers(&fit.lines);
-        let floor = self.problem.floor.explaining(&mismatch, &self.problem.criterion);
+        let spectrum = &self.problem.spectrum;
+        let mismatch = spectrum.powers(&fit.lines);
+        let floor = self.problem.floor.explaining(&spectrum.bands, &mismatch, &self.problem.criterion);
         fit.floor = floor.clone();
         self.fits.insert(set.clone(), self.problem.finish(fit));
         self.floors.insert(under, floor);
