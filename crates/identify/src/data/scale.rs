@@ -46,8 +46,8 @@ pub fn scale(all: &[Prepared], rig: &Rig) -> Scale {
         // ... or what brings it to speed within a second.
         inertia_kg_m2 * speed
     };
-    // Under a recorded power, the current that makes the torque: effects in amperes need a size.
-    let current = if driven_by(Driving::Power.column()) { torque / kt } else { current };
+    // Where no current is known, the one that makes the torque: effects in amperes need a size.
+    let current = if current > 0.0 { current } else { torque / kt };
     Scale {
         shaft_speed_rad_s: speed.max(1e-6),
         torque_n_m: torque.max(1e-9),
@@ -89,5 +89,49 @@ pub fn available(model: ModelName, series: &[Series], all: &[Prepared]) -> Avail
             .map(|s| crate::checks::supply_sag(s).map(|sag| sag.share()))
             .collect::<Option<Vec<f64>>>()
             .map(|shares| shares.into_iter().fold(0.0, f64::max)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::noise::Criterion;
+    use crate::setup::Setup;
+    use kort_thruster::rig::Rig;
+
+    use super::*;
+
+    const CRITERION: Criterion =
+        Criterion { form_error: 0.005, own_form_error: 0.2, facts_a_band: 10.0, timing_s: 0.001 };
+
+    fn of(rig: &str, command: &str, size: f64) -> Scale {
+        let wave = |k: usize| (k as f64 * 0.1).sin();
+        let series = [Series {
+            name: "log".into(),
+            time_s: (0..400).map(|k| 0.01 * k as f64).collect(),
+            columns: vec![
+                (command.into(), (0..400).map(|k| size * wave(k)).collect()),
+                ("shaft_speed_rad_s".into(), (0..400).map(|k| 40.0 * wave(k + 3)).collect()),
+            ],
+        }];
+        let rig = Rig::from_toml(rig).unwrap();
+        Setup::new(&series, &rig, ModelName::Model2, CRITERION).unwrap().problem.scale
+    }
+
+    #[test]
+    fn a_drive_whose_current_nobody_logs_has_the_current_that_makes_its_torque() {
+        let dry = "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = 0.01\ntorque_constant_nm_a = 0.1\n\
+                   winding_resistance_ohm = 0.5\n[amplifier]\nkind = \"voltage\"\nsupply_v = 12\n";
+        let dry = of(dry, "voltage_cmd_v", 10.0);
+        let stall_a = 10.0 / 0.5;
+        assert!((dry.current_a / stall_a - 1.0).abs() < 1e-3, "{}", dry.current_a);
+        let wet = include_str!("../../../../config/thrusters/whitcomb-yoerger-1999.toml");
+        let wet = of(&wet.replace("kind = \"current\"", "kind = \"speed\""), "speed_cmd_rad_s", 40.0);
+        let kt = Rig::from_toml(include_str!("../../../../config/thrusters/whitcomb-yoerger-1999.toml"))
+            .unwrap()
+            .motor
+            .torque_constant_nm_a
+            .value;
+        assert!((wet.current_a * kt / wet.torque_n_m - 1.0).abs() < 1e-9);
+        assert!(wet.current_a > 0.1, "{}", wet.current_a);
     }
 }
