@@ -23,6 +23,10 @@ pub fn scale(all: &[Prepared], rig: &Rig) -> Scale {
     let current =
         if driven_by("current_cmd_a") || driven_by("current_a") { command } else { full(Response::Current) };
     let mut speed = full(Response::ShaftSpeed);
+    if speed == 0.0 {
+        // The rate of an angle that is recorded alone.
+        speed = full(Response::ShaftAngle);
+    }
     if driven_by("shaft_speed_rad_s") || driven_by("speed_cmd_rad_s") {
         speed = speed.max(command);
     }
@@ -103,14 +107,14 @@ mod tests {
     const CRITERION: Criterion =
         Criterion { form_error: 0.005, own_form_error: 0.2, facts_a_band: 10.0, timing_s: 0.001 };
 
-    fn of(rig: &str, command: &str, size: f64) -> Scale {
+    fn of(rig: &str, command: &str, size: f64, response: &str) -> Scale {
         let wave = |k: usize| (k as f64 * 0.1).sin();
         let series = [Series {
             name: "log".into(),
             time_s: (0..400).map(|k| 0.01 * k as f64).collect(),
             columns: vec![
                 (command.into(), (0..400).map(|k| size * wave(k)).collect()),
-                ("shaft_speed_rad_s".into(), (0..400).map(|k| 40.0 * wave(k + 3)).collect()),
+                (response.into(), (0..400).map(|k| 40.0 * wave(k + 3)).collect()),
             ],
         }];
         let rig = Rig::from_toml(rig).unwrap();
@@ -121,11 +125,16 @@ mod tests {
     fn a_drive_whose_current_nobody_logs_has_the_current_that_makes_its_torque() {
         let dry = "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = 0.01\ntorque_constant_nm_a = 0.1\n\
                    winding_resistance_ohm = 0.5\n[amplifier]\nkind = \"voltage\"\nsupply_v = 12\n";
-        let dry = of(dry, "voltage_cmd_v", 10.0);
+        let dry = of(dry, "voltage_cmd_v", 10.0, "shaft_speed_rad_s");
         let stall_a = 10.0 / 0.5;
         assert!((dry.current_a / stall_a - 1.0).abs() < 1e-3, "{}", dry.current_a);
         let wet = include_str!("../../../../config/thrusters/whitcomb-yoerger-1999.toml");
-        let wet = of(&wet.replace("kind = \"current\"", "kind = \"speed\""), "speed_cmd_rad_s", 40.0);
+        let wet = of(
+            &wet.replace("kind = \"current\"", "kind = \"speed\""),
+            "speed_cmd_rad_s",
+            40.0,
+            "shaft_speed_rad_s",
+        );
         let kt = Rig::from_toml(include_str!("../../../../config/thrusters/whitcomb-yoerger-1999.toml"))
             .unwrap()
             .motor
@@ -133,5 +142,13 @@ mod tests {
             .value;
         assert!((wet.current_a * kt / wet.torque_n_m - 1.0).abs() < 1e-9);
         assert!(wet.current_a > 0.1, "{}", wet.current_a);
+    }
+
+    #[test]
+    fn a_shaft_of_which_the_angle_alone_is_logged_has_the_speed_of_its_rate() {
+        let rig = "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = 0.01\ntorque_constant_nm_a = 0.1\n";
+        // The wave of 10 rad/s: 40 rad turn at 400 rad/s.
+        let speed = of(rig, "current_cmd_a", 2.0, "shaft_angle_rad").shaft_speed_rad_s;
+        assert!((speed / 400.0 - 1.0).abs() < 0.02, "{speed}");
     }
 }
