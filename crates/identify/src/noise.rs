@@ -3,7 +3,7 @@
 //! A tempered profile Whittle likelihood. Each band's noise level is what the residual leaves there, but
 //! never below the *form error*: our equations are not exact, and a few percent of a signal, or a share of
 //! the mismatch that is to be explained, must not count against a good name. A band of one structural error holds many
-//! lines and few facts: it counts as at most so many. The lowest bands may not explain a constant away:
+//! lines and few facts, in however many recordings: it counts as at most so many. The lowest bands may not explain a constant away:
 //! noise rises towards low frequency no faster than a random walk does.
 //!
 //! Whittle 1953 (Ark. Mat. 2:423); tempering after Gruenwald & van Ommen 2017 (Bayesian Anal. 12:1069).
@@ -20,17 +20,16 @@ pub struct Criterion {
     pub form_error: f64,
     /// Error of the equations that explain a mismatch, as a share of it.
     pub own_form_error: f64,
-    /// Most independent facts in a band.
+    /// Most independent facts about a frequency of a channel, in all recordings.
     pub facts_a_band: f64,
     /// Standard deviation of time stamps, s.
     pub timing_s: f64,
 }
 
 impl Criterion {
-    /// Independent facts in a band.
+    /// Independent facts in a band: its share of those about its frequency in all recordings.
     fn facts(&self, band: &Band) -> f64 {
-        let n = band.lines.len() as f64;
-        n * self.facts_a_band / (n + self.facts_a_band)
+        band.lines.len() as f64 * self.facts_a_band / (band.alike as f64 + self.facts_a_band)
     }
 }
 
@@ -162,6 +161,7 @@ mod tests {
             .map(|k| Band {
                 lines: 10 * k..10 * k + 10,
                 hz: 0.01 * 1.585_f64.powi(k as i32),
+                alike: 10,
                 signal: if k == 3 { 1.0 } else { 1e-12 },
                 quantisation: 0.0,
                 stale_s: 0.0,
@@ -247,13 +247,17 @@ mod tests {
     }
 
     #[test]
-    fn many_lines_count_as_few_facts() {
+    fn many_lines_count_as_few_facts_in_however_many_recordings() {
         let mut wide = bands();
         wide.truncate(1);
-        wide[0].continues = false;
-        wide[0].lines = 0..100_000;
-        let floor = Floor::of_signal(&wide, &CRITERION);
-        let misfit = |power| Noise::of(&wide, &[power], &floor, &CRITERION).misfit;
-        assert!((misfit(1e-2) - misfit(1e-4) - 30.0 * 100.0_f64.ln()).abs() < 0.1);
+        wide[0] = Band { continues: false, lines: 0..100_000, alike: 100_000, ..wide[0].clone() };
+        let told = |bands: &[Band]| {
+            let floor = Floor::of_signal(bands, &CRITERION);
+            let misfit = |power| Noise::of(bands, &vec![power; bands.len()], &floor, &CRITERION).misfit;
+            misfit(1e-2) - misfit(1e-4)
+        };
+        assert!((told(&wide) - 30.0 * 100.0_f64.ln()).abs() < 0.1);
+        let one_of_four = Band { alike: 400_000, ..wide[0].clone() };
+        assert!((told(&vec![one_of_four; 4]) - told(&wide)).abs() < 0.1);
     }
 }

@@ -23,6 +23,8 @@ pub struct Band {
     pub lines: Range<usize>,
     /// Mean frequency, Hz.
     pub hz: f64,
+    /// Lines of this channel about this frequency in all recordings: one structural error is in all of them.
+    pub alike: usize,
     /// Mean square of the measured signal there, in full scales.
     pub signal: f64,
     /// Variance of the channel's quantisation, in full scales.
@@ -62,7 +64,8 @@ impl Spectrum {
     pub fn new(recordings: &[Prepared], masked: &[Vec<bool>]) -> Self {
         let mut planner = DctPlanner::new();
         let (mut frames, mut bands, mut lines) = (Vec::new(), Vec::new(), 0);
-        for (recording, masked) in recordings.iter().zip(masked) {
+        let mut places = Vec::new();
+        for (nth, (recording, masked)) in recordings.iter().zip(masked).enumerate() {
             let mut own = Vec::new();
             for channel in &recording.channels {
                 let picks: Vec<usize> =
@@ -98,17 +101,20 @@ impl Spectrum {
                     bands.push(Band {
                         lines: lines + range.start..lines + range.end,
                         hz: middle / (2.0 * n as f64 * interval_s),
+                        alike: range.len(),
                         signal: power / range.len() as f64,
                         quantisation,
                         stale_s,
                         continues: i + 1 < ranges.len(),
                     });
+                    places.push(Place { recording: nth, response: channel.response, constant: i == 0 });
                 }
                 lines += n;
                 own.push(frame);
             }
             frames.push(own);
         }
+        count_alike(&mut bands, &places);
         Self { frames, bands, lines }
     }
 
@@ -165,6 +171,29 @@ impl Frame {
     }
 }
 
+/// Whose lines a band holds.
+struct Place {
+    recording: usize,
+    response: Response,
+    /// Whether it is the constant.
+    constant: bool,
+}
+
+/// Counts the lines about each band's frequency in all recordings of the same channel.
+fn count_alike(bands: &mut [Band], places: &[Place]) {
+    let half_a_band = 0.5 / BANDS_A_DECADE;
+    let own: Vec<(f64, usize)> = bands.iter().map(|band| (band.hz.log10(), band.lines.len())).collect();
+    for ((band, place), (at, _)) in bands.iter_mut().zip(places).zip(&own) {
+        let others = places.iter().zip(&own).filter(|(other, (hz, _))| {
+            other.recording != place.recording
+                && other.response == place.response
+                && other.constant == place.constant
+                && (place.constant || (hz - at).abs() < half_a_band)
+        });
+        band.alike += others.map(|(_, (_, lines))| lines).sum::<usize>();
+    }
+}
+
 /// Lines of each band: the constant, then five bands a decade.
 fn band_ranges(lines: usize) -> Vec<Range<usize>> {
     let mut ranges = Vec::new();
@@ -216,6 +245,34 @@ mod tests {
         }
         let ranges = band_ranges(6500);
         assert!(ranges.len() < 22, "{}", ranges.len());
+    }
+
+    #[test]
+    fn lines_about_a_frequency_count_together_over_recordings_of_one_channel() {
+        let band = |hz: f64, lines: usize| Band {
+            lines: 0..lines,
+            hz,
+            alike: lines,
+            signal: 0.0,
+            quantisation: 0.0,
+            stale_s: 0.0,
+            continues: true,
+        };
+        let place = |recording, response, constant| Place { recording, response, constant };
+        let (speed, thrust) = (Response::ShaftSpeed, Response::Thrust);
+        let mut bands =
+            vec![band(0.01, 1), band(1.0, 20), band(0.05, 1), band(1.1, 30), band(1.0, 20), band(1.4, 5)];
+        let places = [
+            place(0, speed, true),
+            place(0, speed, false),
+            place(1, speed, true),
+            place(1, speed, false),
+            place(1, thrust, false),
+            place(0, speed, false),
+        ];
+        count_alike(&mut bands, &places);
+        let alike: Vec<usize> = bands.iter().map(|band| band.alike).collect();
+        assert_eq!(alike, [2, 50, 2, 50, 20, 5]);
     }
 
     #[test]
