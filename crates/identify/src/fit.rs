@@ -148,7 +148,19 @@ impl Problem<'_> {
             let Some(inputs) = self.place_edges(&stated) else { break };
             placed.inputs = Arc::new(inputs);
         }
-        self.settle(&placed, &Vec::new(), &self.floor, iterations)
+        let mut best = self.settle(&placed, &Vec::new(), &self.floor, iterations);
+        // Steps are placed one by one for the instants at which the sensors are taken to be read; all of both may
+        // be a tick off together, which would pass for a delay of physics.
+        for earlier in [true, false] {
+            while let Some(moved) = self.a_tick_off(&best, earlier) {
+                let next = self.settle(&moved, &best.columns, &best.floor, iterations);
+                if next.cost() > best.cost() - ENOUGH {
+                    break;
+                }
+                best = next;
+            }
+        }
+        best
     }
 
     /// A fit to a finish: from its start, with the steps of the command placed for it, and its price known.
