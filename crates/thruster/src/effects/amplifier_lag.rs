@@ -11,7 +11,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     path: Path::Drive,
     what: "the current loop, or a speed controller's firmware, follows the command with a longer first-order lag than stated",
     equation: "im' = (sat(i*) - im)/(ta + e); ta stated, e [s]: the current loop; or u' = (u* - u)/tc, tc [s]: the command \
-               itself, ahead of what the amplifier makes of it",
+               itself, ahead of what the amplifier makes of it; or one after the other, a lag of second order",
     signature: "every response to a command is late and rounded by a fixed time, at all amplitudes and speeds; \
                 a recorded current shows the lag itself",
     confused_with: &["transport_delay", "encoder_filter_lag", "entrained_water_inertia", "clock_skew"],
@@ -21,7 +21,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     shifts_time: false,
     nonparametric: false,
     same_as: &[],
-    forms: &[&[0], &[1]],
+    forms: &[&[0], &[1], &[0, 1]],
     parameters,
     starts: |scale| {
         [0.005_f64, 0.015, 0.05].map(|lag| lag.max(scale.tick_s)).map(|lag| vec![lag, lag]).to_vec()
