@@ -109,7 +109,7 @@ impl Member {
     /// Whether it has a size, or is there or not: other equations in the place of the model's, as exact as they are,
     /// and no addition that is known to a share of itself.
     pub fn has_size(&self, scale: &Scale) -> bool {
-        (self.effect.parameters)(scale).iter().any(|spec| !spec.shape)
+        (self.effect.parameters)(scale).iter().any(|spec| !spec.shape && !spec.held)
     }
 }
 

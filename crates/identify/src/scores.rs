@@ -86,15 +86,16 @@ pub fn parameters(fit: &Fit, std_errors: &[f64], effect: Option<usize>) -> Vec<P
 }
 
 /// Values of an effect that are not fitted and without which those that are mean nothing: the order of a ripple, the
-/// command at which a curve ends.
+/// command at which a curve ends; and that which is there or not.
 fn taken_as_given(member: &Member) -> Vec<ParameterReport> {
     let specs = (member.effect.parameters)(&Scale::ANY);
     let belongs = |place: usize| {
         let group = specs[place + 1..].iter().take_while(|s| !(s.held && s.shape)).count();
         group == 0 || (place + 1..=place + group).any(|k| !member.held.contains(&k))
     };
+    let switched_on = |place: usize| member.held.contains(&place) && member.values[place] != 0.0;
     (0..specs.len())
-        .filter(|j| specs[*j].held && specs[*j].shape && belongs(*j))
+        .filter(|j| specs[*j].held && if specs[*j].shape { belongs(*j) } else { switched_on(*j) })
         .map(|j| ParameterReport {
             name: specs[j].name.into(),
             value: member.values[j],

@@ -15,25 +15,32 @@ const ENOUGH: f64 = 1.0;
 impl Search<'_, '_> {
     /// Screens all effects on top of a set and fits exactly those that may come near a cost; the sets fitted.
     pub(super) fn expand(&mut self, set: &Set, bar: f64) -> Vec<Set> {
-        let Some(parent) = self.fits.get(set) else { return Vec::new() };
+        if !self.fits.contains_key(set) {
+            return Vec::new();
+        }
+        let equations = self.equations(set);
+        if !self.probes.contains_key(&equations) {
+            let of = if self.fits.contains_key(&equations) { &equations } else { set };
+            self.probes.insert(equations.clone(), self.probe_all(of));
+        }
+        let (problem, effects, parent) = (self.problem, &self.effects, &self.fits[set]);
+        let Some(probes) = self.probes.get_mut(&equations) else { return Vec::new() };
         if !self.screens.contains_key(set) && !set.is_empty() {
-            // What did nothing to the baseline may act on a larger set.
-            let (problem, effects) = (self.problem, &self.effects);
-            self.probes.par_iter_mut().zip(effects).for_each(|(probes, effect)| {
+            // What did nothing to the equations alone may act on a larger set.
+            probes.par_iter_mut().zip(effects).for_each(|(probes, effect)| {
                 if probes.iter().all(Probe::inert) && !set.contains(&effect.id) {
                     *probes = probe(problem, parent, effect);
                 }
             });
         }
         if !self.screens.contains_key(set) {
-            let rest: Vec<&[Probe]> = self
-                .effects
+            let rest: Vec<&[Probe]> = effects
                 .iter()
-                .zip(&self.probes)
+                .zip(probes.iter())
                 .filter(|(e, _)| !set.contains(&e.id))
                 .map(|(_, p)| p.as_slice())
                 .collect();
-            let screened = screen(self.problem, parent, &rest);
+            let screened = screen(problem, parent, &rest);
             self.screens.insert(set.clone(), screened);
         }
         let mut effects = Vec::new();

@@ -40,7 +40,8 @@ pub struct Search<'a, 'p> {
     screens: BTreeMap<Set, Vec<Screened>>,
     dropped: BTreeSet<(Set, Set)>,
     reshaped: BTreeSet<(Set, u64)>,
-    probes: Vec<Vec<Probe>>,
+    /// What each effect does to the model, and to other equations in its place: by members without a size.
+    probes: BTreeMap<Set, Vec<Vec<Probe>>>,
     /// In how many ways each effect may act here.
     ways: Vec<usize>,
     /// Least noise that a set is held to: of all sets under no name, lower ones under effects without a size.
@@ -59,7 +60,7 @@ impl<'a, 'p> Search<'a, 'p> {
             screens: BTreeMap::new(),
             dropped: BTreeSet::new(),
             reshaped: BTreeSet::new(),
-            probes: Vec::new(),
+            probes: BTreeMap::new(),
             ways: Vec::new(),
             floors: BTreeMap::new(),
             constants: constants.search,
@@ -132,12 +133,27 @@ impl<'a, 'p> Search<'a, 'p> {
             return best;
         }
         progress("trying every effect");
-        self.probes = self.effects.par_iter().map(|e| probe(self.problem, baseline, e)).collect();
+        let probes = self.probe_all(&best);
         let ways = |(e, probes): (&&Descriptor, &Vec<Probe>)| ways(e, &self.problem.scale, probes);
-        self.ways = self.effects.iter().zip(&self.probes).map(ways).collect();
+        self.ways = self.effects.iter().zip(&probes).map(ways).collect();
+        self.probes.insert(best.clone(), probes);
         self.hold(&best, "");
         self.fit_what_has_no_size();
         self.climb(best, progress)
+    }
+
+    /// Members of a set that are other equations in the place of the model's.
+    fn equations(&self, set: &Set) -> Set {
+        set.iter().copied().filter(|id| self.floors.contains_key(id)).collect()
+    }
+
+    /// What each effect does to a set that is fitted; nothing for its members.
+    fn probe_all(&self, set: &Set) -> Vec<Vec<Probe>> {
+        let fit = &self.fits[set];
+        let of = |e: &&'static Descriptor| {
+            if set.contains(&e.id) { Vec::new() } else { probe(self.problem, fit, e) }
+        };
+        self.effects.par_iter().map(of).collect()
     }
 
     /// What has no size is there or not: other equations in the place of the model's, as exact as they are. What else

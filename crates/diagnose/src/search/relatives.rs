@@ -22,10 +22,11 @@ impl Search<'_, '_> {
             let Some(named) = self.descriptor(member) else { continue };
             let related =
                 |e: &Descriptor| named.confused_with.contains(&e.id) || e.confused_with.contains(member);
+            let Some(probes) = self.probes.get(&self.equations(&rest)) else { continue };
             let others: Vec<&'static Descriptor> = self
                 .effects
                 .iter()
-                .zip(&self.probes)
+                .zip(probes)
                 .filter(|(e, probes)| related(e) && bends(probes) && !rest.contains(&e.id))
                 .map(|(e, _)| *e)
                 .collect();
