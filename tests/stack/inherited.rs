@@ -1,7 +1,7 @@
 //! What a service finds latched that an earlier one left: two checkouts of one user share their shared memory, and
 //! with it what stands latched, but not the event log.
 
-use std::time::Duration;
+use std::time::{Duration, Instant, SystemTime};
 
 use serde_json::Value;
 
@@ -57,5 +57,54 @@ fn a_fault_that_an_earlier_service_left_is_told_as_old_as_it_is() {
         stack.thrust(60.0, LEASE_MS);
         again(&mut stack);
         assert_eq!(stack.state().unwrap()["faults"], serde_json::json!([]), "cleared is cleared");
+    });
+}
+
+fn named(state: &Value, name: &str) -> Option<Value> {
+    state["faults"].as_array()?.iter().find(|fault| fault["name"] == name).cloned()
+}
+
+#[test]
+fn a_fault_is_never_shown_with_the_time_of_an_earlier_one() {
+    common::in_real_time(|| {
+        let mut stack = Stack::start();
+        for _ in 0..4 {
+            stack.thrust(80.0, LEASE_MS);
+            let servo = stack.process_of("servo");
+            let killed = SystemTime::now();
+            kill(servo, "STOP");
+            // Every state from the first on that shows the fault, without a pause, until it says when it came.
+            let patience = Instant::now() + Duration::from_secs(10);
+            let since = loop {
+                assert!(Instant::now() < patience, "no time is told: {:?}", stack.state());
+                let fault = stack.state().and_then(|state| named(&state, "servo_lost"));
+                if let Some(since) = fault.as_ref().and_then(|fault| fault["since"].as_str()) {
+                    break humantime::parse_rfc3339(since).unwrap();
+                }
+            };
+            assert!(since >= killed, "came {since:?}, killed {killed:?}");
+            wait("a successor", || named(&stack.state()?, "servo_restarted"));
+        }
+    });
+}
+
+#[test]
+fn a_fault_that_came_while_no_gateway_looked_is_told_as_old_as_it_is() {
+    common::in_real_time(|| {
+        let mut stack = Stack::start();
+        stack.thrust(80.0, LEASE_MS);
+        let gateway = stack.process_of("gateway");
+        let mut watch = stack.watch();
+        kill(gateway, "STOP");
+        watch.until("zero", |telemetry| telemetry.armed == 0);
+        let latched = SystemTime::now();
+        let fault = wait("the fault by the successor", || {
+            stack.process("gateway").filter(|pid| *pid != gateway)?;
+            named(&stack.state()?, "gateway_lost").filter(|fault| !fault["since"].is_null())
+        });
+        let since = humantime::parse_rfc3339(fault["since"].as_str().unwrap()).unwrap();
+        // The gateway's successor comes more than a second later.
+        assert!(since < latched + Duration::from_millis(500), "{fault}, latched {latched:?}");
+        assert!(fault["before"]["shaft_speed_rad_s"].is_number(), "{fault}");
     });
 }

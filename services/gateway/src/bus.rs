@@ -7,6 +7,7 @@
 mod held;
 mod pulse;
 
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, mpsc};
 use std::time::{Duration, Instant};
@@ -16,7 +17,9 @@ use kort_proto::faults::Fault;
 use kort_proto::messages::{
     ControllerState, Reply, Setpoint as SetpointMessage, SetpointKind, Telemetry, Trip,
 };
-use kort_proto::transport::{Deployment, GatewayPorts, Ticker, TransportError, monotonic_ns, realtime};
+use kort_proto::transport::{
+    Deployment, GatewayPorts, Latched, Ticker, TransportError, Watched, monotonic_ns, realtime,
+};
 
 use crate::events::Events;
 use crate::record::Recorder;
@@ -68,7 +71,7 @@ pub fn run(
         tracing::warn!("{warning}");
     }
     let period = links.iter().map(|link| link.heartbeat).min().unwrap_or(Duration::from_millis(4));
-    let mut bridges: Vec<Bridge> = links.into_iter().map(Bridge::new).collect();
+    let mut bridges: Vec<Bridge> = links.into_iter().map(|link| Bridge::new(link, deployment)).collect();
     let mut ticker = Ticker::new(period.as_nanos() as u64);
     while !stop.load(Ordering::Relaxed) {
         let woke_ns = monotonic_ns();
@@ -100,6 +103,8 @@ fn run_errands(bridges: &mut [Bridge], recorder: &Recorder, until_ns: u64) {
 
 struct Bridge {
     link: Link,
+    /// What the supervisor writes down.
+    watched: PathBuf,
     ports: Option<GatewayPorts>,
     checked: Option<Instant>,
     complaint: String,
@@ -125,9 +130,10 @@ struct Pending {
 }
 
 impl Bridge {
-    fn new(link: Link) -> Bridge {
+    fn new(link: Link, deployment: &Deployment) -> Bridge {
         Bridge {
             link,
+            watched: deployment.watched_file(),
             ports: None,
             checked: None,
             complaint: String::new(),
@@ -228,30 +234,28 @@ impl Bridge {
         let known = self.latched[who].replace(faults);
         let id = &self.link.thruster.id;
         for fault in Fault::in_set(faults & !known.unwrap_or(0)) {
-            let of_fault = |event: &Event| match event.kind {
-                kind if kind.latches() => event.fault == Some(fault.code()),
-                kind => kind == EventKind::FaultsCleared,
-            };
-            let told = self.link.events.latest(id, of_fault).is_some_and(|event| event.kind.latches());
-            if known.is_none() && told {
+            if known.is_none() && self.link.events.latched(id, fault).is_some() {
                 continue;
             }
             let process = ["servo", "controller"][who];
             let detail = format!("{} (code {}): {}", fault.name(), fault.code(), fault.help());
             let event = Event::now(EventKind::Tripped, Some(id), process, detail).fault(fault);
-            let before = self.before.or_else(|| {
-                tripped
-                    .filter(|trip| trip.at_ns != 0)
-                    .map(|trip| Before::of(trip.thrust_n, trip.shaft_speed_rad_s))
-            });
-            self.link.events.note(match before {
-                Some(before) => event.before(before),
-                None => event,
-            });
+            let trip = tripped.filter(|trip| trip.at_ns != 0);
+            let before = self.before.or(trip.map(|trip| Before::of(trip.thrust_n, trip.shaft_speed_rad_s)));
+            // What came while no gateway looked, the supervisor saw come.
+            let seen = known.is_none().then(|| self.seen_by_supervisor(fault)).flatten();
+            let (since, before) = seen.map_or((None, before), |s| (Some(s.since), s.before.or(before)));
+            self.link.events.note(Event { since, before, ..event });
         }
         if faults == 0 && known.is_some_and(|known| known != 0) {
             self.before = None;
         }
+    }
+
+    /// How a fault came, by what the supervisor wrote down.
+    fn seen_by_supervisor(&self, fault: Fault) -> Option<Latched> {
+        let stood = Watched::read(&self.watched).thrusters.remove(&self.link.thruster.id)?;
+        stood.latched.into_iter().find(|latched| latched.code == fault.code())
     }
 
     /// A path that is off, and that all is well again.

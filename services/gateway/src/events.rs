@@ -8,6 +8,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use kort_proto::events::{Event, EventKind, EventLog, Mark};
+use kort_proto::faults::Fault;
 
 use crate::record::Recorder;
 use crate::thruster::lock;
@@ -83,6 +84,16 @@ impl Events {
             .rev()
             .find(|event| event.thruster.as_deref() == Some(thruster) && wanted(event))
             .cloned()
+    }
+
+    /// How a fault of a thruster came that stands now; none if it was cleared since, for then the log speaks of an
+    /// earlier time.
+    pub fn latched(&self, thruster: &str, fault: Fault) -> Option<Event> {
+        let of_fault = |event: &Event| match event.kind {
+            kind if kind.latches() => event.fault == Some(fault.code()),
+            kind => kind == EventKind::FaultsCleared,
+        };
+        self.latest(thruster, of_fault).filter(|event| event.kind.latches())
     }
 
     /// Takes over what is new, in the order of ids.

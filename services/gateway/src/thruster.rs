@@ -292,8 +292,7 @@ impl Thruster {
 
     /// A fault with what the event log knows of how it came.
     fn fault_view(&self, fault: Fault) -> FaultView {
-        let came =
-            self.events.latest(&self.id, |event| event.kind.latches() && event.fault == Some(fault.code()));
+        let came = self.events.latched(&self.id, fault);
         FaultView {
             code: fault.code(),
             name: fault.name(),
