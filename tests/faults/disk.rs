@@ -119,6 +119,10 @@ pub fn full(table: &mut Table) {
     // What the disk took is readable.
     let kept = kort_recording::Recording::read(&file, None).expect("it reads");
     assert!(kept.rows() > 500, "{} rows", kept.rows());
+    let (listed, lost) =
+        (info["rows"].as_u64().expect("rows"), info["lost_samples"].as_u64().expect("samples"));
+    assert_eq!(listed as usize, kept.rows(), "the list says what the disk has: {info}");
+    assert!(lost > 0, "what the disk did not take is counted: {info}");
     let t = stack.watch().next();
     assert!(t.armed == 1 && t.faults == 0, "the thrust is untouched: {t:?}");
     table.row(

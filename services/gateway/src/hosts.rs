@@ -25,10 +25,12 @@ impl Hosts {
     /// Is the request meant for this gateway, and does it come from a page of its own?
     pub fn check(&self, uri: &Uri, headers: &HeaderMap) -> Result<(), Problem> {
         let mut named = headers.get_all(header::HOST).iter();
+        // A target that names a host itself goes before the header (RFC 9112, 3.2.2).
         let authority = match (named.next(), named.next()) {
             (Some(_), Some(_)) => None,
-            (Some(one), None) => one.to_str().ok(),
-            (None, _) => uri.authority().map(|authority| authority.as_str()),
+            (one, _) => {
+                uri.authority().map(|target| target.as_str()).or(one.and_then(|host| host.to_str().ok()))
+            }
         };
         let Some(authority) = authority.filter(|authority| self.knows(host(authority))) else {
             let said = authority
@@ -101,6 +103,17 @@ mod tests {
             assert!(asked(host, None).is_ok(), "{host}");
             assert!(asked(host, Some(&format!("http://{host}"))).is_ok(), "{host}");
         }
+    }
+
+    #[test]
+    fn a_target_that_names_another_host_is_foreign_whatever_the_header_says() {
+        let hosts = Hosts::new(SocketAddr::from(([127, 0, 0, 1], 8080)), &[]);
+        let mut headers = HeaderMap::new();
+        headers.insert(header::HOST, "localhost:8080".parse().unwrap());
+        let asked = |target: &'static str| hosts.check(&Uri::from_static(target), &headers);
+        assert!(asked("http://evil.example/v1/stop").is_err());
+        assert!(asked("http://127.0.0.1:8080/v1/stop").is_ok());
+        assert!(asked("/v1/stop").is_ok());
     }
 
     #[test]

@@ -58,7 +58,7 @@ pub struct RecordingInfo {
     pub started: String,
     /// Largest rate of rows, Hz.
     pub rate_hz: f64,
-    /// Rows written.
+    /// Rows on the disk: of what is under way, since the last flush (every half second).
     pub rows: u64,
     /// From the first row to the last, s.
     pub duration_s: f64,
@@ -112,7 +112,7 @@ pub struct Recorder {
 pub struct Totals {
     /// Recordings that run.
     pub running: u64,
-    /// Rows written.
+    /// Rows on the disk: of what is under way, since the last flush (every half second).
     pub rows: u64,
     /// Samples lost.
     pub lost: u64,

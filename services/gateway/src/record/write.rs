@@ -59,6 +59,8 @@ pub struct Job {
     part: u32,
     base: String,
     first_ns: Option<u64>,
+    /// Rows and duration that were given to the file; the list tells what the disk has of them.
+    given: (u64, f64),
     thin: Thin,
     state_s: f64,
     law_s: f64,
@@ -103,6 +105,7 @@ impl Job {
             file,
             part: 1,
             first_ns: None,
+            given: (0, 0.0),
             thin: Thin::new(now.rate_hz),
             state_s: f64::NEG_INFINITY,
             law_s: f64::NEG_INFINITY,
@@ -115,10 +118,14 @@ impl Job {
         let finished = self.file.finish();
         let info = {
             let mut info = lock(&self.info);
+            if finished.is_ok() {
+                (info.rows, info.duration_s) = self.given;
+            }
             (info.state, info.cause) = match (ended, finished) {
                 (Ok(()), Ok(())) => (RecordingState::Complete, None),
                 (Err(End::Limit(why)), Ok(())) => (RecordingState::Complete, Some(why)),
                 (Err(End::Disk(error)), _) | (_, Err(error)) => {
+                    info.lost_samples += self.given.0.saturating_sub(info.rows);
                     (RecordingState::Failed, Some(error.to_string()))
                 }
             };
@@ -143,7 +150,11 @@ impl Job {
                 flushed = Instant::now();
                 self.file.flush()?;
                 // Not under the lock: a slow disk must not hold up the bus, which counts losses in it.
-                let info = lock(&self.info).clone();
+                let info = {
+                    let mut info = lock(&self.info);
+                    (info.rows, info.duration_s) = self.given;
+                    info.clone()
+                };
                 recorder.note_info(&info);
                 guard_space(&self.folder, &self.limits)?;
                 self.rotate(recorder)?;
@@ -158,9 +169,7 @@ impl Job {
         let values: Vec<f64> = SIGNALS.iter().map(|signal| (signal.get)(&row)).collect();
         self.file.row(time_s, &values)?;
         self.beside(time_s)?;
-        let mut info = lock(&self.info);
-        info.rows += 1;
-        info.duration_s = time_s;
+        self.given = (self.given.0 + 1, time_s);
         if time_s > self.limits.time_max_s {
             let most = self.limits.time_max_s;
             return Err(End::Limit(format!("gateway.recording.time_max_s = {most} is reached")));
@@ -212,7 +221,8 @@ impl Job {
         std::mem::replace(&mut self.file, file).finish()?;
         recorder.note_info(&RecordingInfo { state: RecordingState::Complete, ..now });
         *lock(&self.info) = next;
-        (self.first_ns, self.state_s, self.law_s) = (None, f64::NEG_INFINITY, f64::NEG_INFINITY);
+        (self.first_ns, self.given) = (None, (0, 0.0));
+        (self.state_s, self.law_s) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
         Ok(())
     }
 }
