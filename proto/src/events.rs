@@ -91,7 +91,7 @@ pub enum EventKind {
 
 impl EventKind {
     /// Does it tell of a fault that is latched since?
-    pub fn latches(self) -> bool {
+    fn latches(self) -> bool {
         matches!(self, Self::Tripped | Self::FaultInherited)
     }
 }
@@ -140,6 +140,22 @@ impl Before {
         let there = |value: f64| Some(value).filter(|v| v.is_finite());
         Self { thrust_n: there(thrust_n), shaft_speed_rad_s: there(shaft_speed_rad_s) }
     }
+}
+
+/// How a fault of a thruster came that stands now, from a log's events, oldest first; none if it was cleared since, for
+/// then the log speaks of an earlier time.
+pub fn latched<'a>(
+    log: impl DoubleEndedIterator<Item = &'a Event>,
+    thruster: &str,
+    fault: Fault,
+) -> Option<&'a Event> {
+    log.rev()
+        .filter(|event| event.thruster.as_deref() == Some(thruster))
+        .find(|event| match event.kind {
+            kind if kind.latches() => event.fault == Some(fault.code()),
+            kind => kind == EventKind::FaultsCleared,
+        })
+        .filter(|event| event.kind.latches())
 }
 
 impl Event {

@@ -66,8 +66,9 @@ impl Fit {
 }
 
 impl Problem<'_> {
-    /// Fits a hypothesis from its start, held to noise no less than `floor`. `known` holds derivatives from a nearby fit; they serve until a step falls short of what they
-    /// promise, which saves most simulations while hypotheses are compared.
+    /// Fits a hypothesis from its start, held to noise no less than `floor`. `known` holds derivatives from a nearby
+    /// fit; they serve until a step falls short of what they promise, which saves most simulations while hypotheses are
+    /// compared.
     pub fn fit(&self, hypothesis: &Hypothesis, known: &Columns, floor: &Floor, iterations: usize) -> Fit {
         let free = &hypothesis.free;
         let n = free.len();

@@ -77,23 +77,9 @@ impl Events {
         newer.skip(skip).cloned().collect()
     }
 
-    /// The newest event of a thruster for which `wanted` holds.
-    pub fn latest(&self, thruster: &str, wanted: impl Fn(&Event) -> bool) -> Option<Event> {
-        lock(&self.at_hand)
-            .iter()
-            .rev()
-            .find(|event| event.thruster.as_deref() == Some(thruster) && wanted(event))
-            .cloned()
-    }
-
-    /// How a fault of a thruster came that stands now; none if it was cleared since, for then the log speaks of an
-    /// earlier time.
+    /// How a fault of a thruster came that stands now; none if it was cleared since.
     pub fn latched(&self, thruster: &str, fault: Fault) -> Option<Event> {
-        let of_fault = |event: &Event| match event.kind {
-            kind if kind.latches() => event.fault == Some(fault.code()),
-            kind => kind == EventKind::FaultsCleared,
-        };
-        self.latest(thruster, of_fault).filter(|event| event.kind.latches())
+        kort_proto::events::latched(lock(&self.at_hand).iter(), thruster, fault).cloned()
     }
 
     /// Takes over what is new, in the order of ids.

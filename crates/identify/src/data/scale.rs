@@ -128,18 +128,10 @@ mod tests {
         let dry = of(dry, "voltage_cmd_v", 10.0, "shaft_speed_rad_s");
         let stall_a = 10.0 / 0.5;
         assert!((dry.current_a / stall_a - 1.0).abs() < 1e-3, "{}", dry.current_a);
-        let wet = include_str!("../../../../config/thrusters/whitcomb-yoerger-1999.toml");
-        let wet = of(
-            &wet.replace("kind = \"current\"", "kind = \"speed\""),
-            "speed_cmd_rad_s",
-            40.0,
-            "shaft_speed_rad_s",
-        );
-        let kt = Rig::from_toml(include_str!("../../../../config/thrusters/whitcomb-yoerger-1999.toml"))
-            .unwrap()
-            .motor
-            .torque_constant_nm_a
-            .value;
+        let stand = include_str!("../../../../config/thrusters/whitcomb-yoerger-1999.toml");
+        let speed_drive = stand.replace("kind = \"current\"", "kind = \"speed\"");
+        let wet = of(&speed_drive, "speed_cmd_rad_s", 40.0, "shaft_speed_rad_s");
+        let kt = Rig::from_toml(stand).unwrap().motor.torque_constant_nm_a.value;
         assert!((wet.current_a * kt / wet.torque_n_m - 1.0).abs() < 1e-9);
         assert!(wet.current_a > 0.1, "{}", wet.current_a);
     }
