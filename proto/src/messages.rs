@@ -47,10 +47,12 @@ macro_rules! enumeration {
     };
 }
 
+mod answered;
 mod freshness;
 mod kinds;
 mod parameters;
 mod timing;
+pub use answered::Answered;
 pub use freshness::{Fresh, Freshness};
 pub use kinds::{DriveKind, Outcome, Process, RequestKind, SetpointKind};
 pub use parameters::{LAW_PARAMETERS, PARAMETERS, Parameter, ParameterTable};
@@ -231,11 +233,12 @@ pub const PATHS: [&str; 5] = ["drive", "shaft", "blade", "flow", "sensor"];
 
 message! { "kort.Request",
     /// Gateway (or supervisor) to servo and controller. Whom the kind concerns answers with one [`Reply`]: arm, servo;
-    /// disarm and clear-faults, both; the rest, controller. One older than [`REQUEST_LIFE_NS`] is not acted upon.
+    /// disarm and clear-faults, both; the rest, controller. One older than [`REQUEST_LIFE_NS`] is not acted upon, but for
+    /// a disarming; one that was answered is answered again, see [`Answered`].
     Request {
         /// Sequence, stamp, session of the sender.
         header: Header,
-        /// Chosen by the sender, comes back in the reply.
+        /// Chosen by the sender, comes back in the reply; one that asks no answer has 0.
         id: u64,
         /// Revision of the rig description to go on with.
         rig_revision: u64,

@@ -113,6 +113,10 @@ fn a_wrong_configuration_is_refused_with_the_nearest_key() {
             vec!["thrusters.t1.limits.temperature_c", "-300", "hint:"],
         ),
         (
+            text.replace("full_drive_s = 0.005", "speed_rad_s = 5000"),
+            vec!["thrusters.t1.limits.speed_rad_s", "5000", "195", "amplifier.supply_v", "hint:"],
+        ),
+        (
             text.replace("limits = {", "checks = { frozen_s = 1e9 }\nlimits = {"),
             vec!["thrusters.t1.checks.frozen_s", "hint:"],
         ),

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use kort_control::{ControllerConfig, LawKind, ModelError};
 use kort_proto::config::{Config, ConfigError, Thruster};
-use kort_proto::messages::{Command, Reply, RequestKind, Timing};
+use kort_proto::messages::{Answered, Command, Reply, RequestKind, Timing};
 use kort_proto::revision;
 use kort_proto::transport::{ControllerPorts, Deployment, TransportError, keep_on, monotonic_ns, realtime};
 use kort_thruster::rig::Rig;
@@ -168,6 +168,7 @@ fn serve(
     let mut timing = Timing { period_ns, ..Timing::default() };
     let mut last_ns = monotonic_ns();
     let mut looked_ns = last_ns;
+    let mut answered = Answered::default();
     loop {
         let woken = ports.ticks.wait(Duration::from_nanos(period_ns + slack_ns));
         let woke_ns = monotonic_ns();
@@ -192,10 +193,10 @@ fn serve(
         let mut replies: [Option<Reply>; REQUESTS] = [const { None }; REQUESTS];
         for reply in &mut replies {
             let Some(request) = ports.request.next() else { break };
-            *reply = match RequestKind::from_u32(request.kind) {
+            *reply = answered.to(&request).or_else(|| match RequestKind::from_u32(request.kind) {
                 Some(RequestKind::SetRig) if tick.is_for_now(&request, woke_ns) => workshop.order(request),
                 _ => tick.request(&request, woke_ns),
-            };
+            });
         }
         let fitted = workshop.fit(&mut tick);
         let command = tick.tick(woke_ns);
@@ -204,6 +205,8 @@ fn serve(
         let _ = ports.command.send(command);
         // Answers come behind the command that follows from what was asked: whoever has one may build on it.
         for reply in replies.into_iter().flatten().chain(fitted) {
+            answered.keep(&reply);
+            // One that is lost is asked for again.
             let _ = ports.reply.send(reply);
         }
         let mut state = tick.state();

@@ -5,6 +5,7 @@
 //! then goes to zero by itself.
 
 mod held;
+mod pending;
 mod pulse;
 
 use std::path::PathBuf;
@@ -14,9 +15,7 @@ use std::time::{Duration, Instant};
 
 use kort_proto::events::{Before, Event, EventKind};
 use kort_proto::faults::Fault;
-use kort_proto::messages::{
-    ControllerState, Reply, Setpoint as SetpointMessage, SetpointKind, Telemetry, Trip,
-};
+use kort_proto::messages::{ControllerState, Setpoint as SetpointMessage, SetpointKind, Telemetry, Trip};
 use kort_proto::transport::{
     Deployment, GatewayPorts, Latched, Ticker, TransportError, Watched, monotonic_ns, realtime,
 };
@@ -28,6 +27,7 @@ use crate::tally::Tally;
 use crate::thruster::{Ask, Thruster};
 use crate::view::{MismatchView, Setpoint};
 use held::Held;
+use pending::Pending;
 pub use pulse::{Bell, Pulse};
 
 /// Ports that cannot be opened, or that belong to a past generation, are tried again this often.
@@ -119,14 +119,6 @@ struct Bridge {
     before: Option<Before>,
     /// Until when answers are looked for between two ticks.
     errands_until: Option<Instant>,
-}
-
-/// A request that waits for its answers.
-struct Pending {
-    id: u64,
-    since: Instant,
-    ask: Ask,
-    replies: Vec<Reply>,
 }
 
 impl Bridge {
@@ -316,10 +308,8 @@ impl Bridge {
             });
         }
         while let Some(reply) = ports.reply.next() {
-            if reply.to_session == ports.request.session()
-                && let Some(pending) = self.pending.iter_mut().find(|pending| pending.id == reply.id)
-            {
-                pending.replies.push(reply);
+            if reply.to_session == ports.request.session() {
+                let _ = self.pending.iter_mut().any(|pending| pending.take(&reply));
             }
         }
         let (complete, waiting) = std::mem::take(&mut self.pending).into_iter().partition(Pending::complete);
@@ -333,8 +323,15 @@ impl Bridge {
             self.next_ask += 1;
             self.errands_until = Some(now + ask.within.min(ERRANDS_FOR));
             let request = ask.request;
-            self.pending.push(Pending { id: request.id, since: now, ask, replies: Vec::new() });
+            self.pending.push(Pending::new(ask, now));
             ports.request.send(request)?;
+        }
+        for pending in &mut self.pending {
+            if let Some((request, silent)) = pending.again(now) {
+                let (thruster, id) = (&self.link.thruster.id, request.id);
+                tracing::warn!(thruster, "no answer by the {} to request {id}: sent again", silent.name());
+                ports.request.send(request)?;
+            }
         }
         Ok(())
     }
@@ -345,9 +342,8 @@ impl Bridge {
                 let _ = ask.answer.send(Vec::new());
             }
         }
-        let (over, waiting) = std::mem::take(&mut self.pending)
-            .into_iter()
-            .partition(|pending| now.duration_since(pending.since) >= pending.ask.within);
+        let (over, waiting) =
+            std::mem::take(&mut self.pending).into_iter().partition(|pending| pending.overdue(now));
         self.pending = waiting;
         over.into_iter().for_each(Pending::finish);
     }
@@ -381,15 +377,5 @@ impl Bridge {
             value,
             ..SetpointMessage::default()
         }
-    }
-}
-
-impl Pending {
-    fn complete(&self) -> bool {
-        self.ask.expects.iter().all(|process| self.replies.iter().any(|reply| reply.from == *process as u32))
-    }
-
-    fn finish(self) {
-        let _ = self.ask.answer.send(self.replies);
     }
 }

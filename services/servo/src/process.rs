@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use kort_proto::config::{Config, ConfigError};
-use kort_proto::messages::{Request, Trip};
+use kort_proto::messages::{Answered, Request, Trip};
 use kort_proto::transport::{
     Deployment, ServoPorts, Ticker, TransportError, keep_on, monotonic_ns, ordinary, realtime,
 };
@@ -141,6 +141,7 @@ fn tick_until_stopped(
 ) {
     let mut ticker = Ticker::new(period_ns);
     let life_ns = devices.reading_life_ns();
+    let mut answered = Answered::default();
     loop {
         let (deadline_ns, missed) = ticker.wait();
         let woke_ns = monotonic_ns();
@@ -156,7 +157,9 @@ fn tick_until_stopped(
         let inputs =
             Inputs { now_ns: woke_ns, ticks: 1 + missed, measured: &shown.signals, devices: shown.faults };
         for request in requests.iter().flatten() {
-            if let Some(reply) = servo.request(request, woke_ns) {
+            if let Some(reply) = answered.to(request).or_else(|| servo.request(request, woke_ns)) {
+                answered.keep(&reply);
+                // One that is lost is asked for again.
                 let _ = ports.reply.send(reply);
             }
         }

@@ -125,6 +125,13 @@ impl Settings {
         let checks: CheckKeys = config.section(&section("checks"), &thruster.checks)?;
         let rig_current_a = Some(rig.amplifier.current_limit_a).filter(|a| a.is_finite()).unwrap_or(10_000.0);
         let rig_supply_v = rig.amplifier.supply_v.filter(|v| v.is_finite()).unwrap_or(10_000.0);
+        // Twice the speed at which the back EMF is all of the supply: a stream may drive the shaft beyond that speed.
+        let rig_speed_rad_s = rig
+            .amplifier
+            .supply_v
+            .map(|v| 2.0 * v / rig.motor.torque_constant_nm_a.value)
+            .filter(|v| (0.1..10_000.0).contains(v))
+            .unwrap_or(10_000.0);
         // Beyond what rig and physics know a limit protects nothing; one that is not a number never trips.
         let bounds: [(&str, Option<f64>, f64, f64, &str); 13] = [
             (
@@ -149,8 +156,20 @@ impl Settings {
                 36_000.0,
                 "60 for a small motor",
             ),
-            ("limits.speed_rad_s", keys.speed_rad_s, 0.1, 10_000.0, "what propeller and gear bear"),
-            ("limits.trip_speed_rad_s", keys.trip_speed_rad_s, 0.1, 20_000.0, "1.15 times speed_rad_s"),
+            (
+                "limits.speed_rad_s",
+                keys.speed_rad_s,
+                0.1,
+                rig_speed_rad_s,
+                "what propeller and gear bear; the most is twice amplifier.supply_v over motor.torque_constant_nm_a of the rig",
+            ),
+            (
+                "limits.trip_speed_rad_s",
+                keys.trip_speed_rad_s,
+                0.1,
+                2.0 * rig_speed_rad_s,
+                "1.15 times speed_rad_s",
+            ),
             ("limits.full_drive_s", keys.full_drive_s, 1e-9, 60.0, "0.005 for a stiff drive"),
             (
                 "limits.supply_low_v",
@@ -179,7 +198,7 @@ impl Settings {
                 "checks.spike_rad_s",
                 checks.spike_rad_s,
                 1e-3,
-                1e5,
+                4.0 * rig_speed_rad_s,
                 "leave the key out: it follows from the rig",
             ),
         ];

@@ -160,15 +160,20 @@ impl Servo {
         if sender == Fresh::NewSession && self.armed { Fault::ControllerRestarted.bit() } else { 0 }
     }
 
-    /// Acts on a request; `None` if it is not for the servo, or too old to be meant for now.
+    /// Acts on a request; `None` if it is not for the servo. One that is too old to be meant for now is refused, but
+    /// for a disarming: that is always meant.
     pub fn request(&mut self, request: &Request, now_ns: u64) -> Option<Reply> {
         let sent = request.header.stamp_ns;
-        if sent < self.started_ns || now_ns.saturating_sub(sent) > REQUEST_LIFE_NS {
-            return None;
-        }
+        let old = sent < self.started_ns || now_ns.saturating_sub(sent) > REQUEST_LIFE_NS;
         let answer =
             |outcome, words: std::fmt::Arguments| Some(Reply::to(request, Process::Servo, outcome, words));
         match RequestKind::from_u32(request.kind)? {
+            RequestKind::SetController | RequestKind::SetRig | RequestKind::Rest => None,
+            RequestKind::Disarm => {
+                self.stop();
+                answer(Outcome::Done, format_args!("disarmed"))
+            }
+            _ if old => answer(Outcome::Refused, format_args!("it was given too long ago; hint: ask again")),
             RequestKind::Arm if self.armed => answer(Outcome::Done, format_args!("armed already")),
             RequestKind::Arm if self.latched != 0 => answer(
                 Outcome::Refused,
@@ -199,10 +204,6 @@ impl Servo {
                 self.before = Trip { thrust_n: f64::NAN, shaft_speed_rad_s: f64::NAN, ..Trip::default() };
                 answer(Outcome::Done, format_args!("armed"))
             }
-            RequestKind::Disarm => {
-                self.stop();
-                answer(Outcome::Done, format_args!("disarmed"))
-            }
             RequestKind::ClearFaults => {
                 // What is latched and still there stays.
                 self.latched &= self.guard.active() | self.devices;
@@ -215,7 +216,6 @@ impl Servo {
                     )
                 }
             }
-            RequestKind::SetController | RequestKind::SetRig | RequestKind::Rest => None,
         }
     }
 

@@ -12,25 +12,27 @@ impl Tick {
         sent >= self.started_ns && now_ns.saturating_sub(sent) <= REQUEST_LIFE_NS
     }
 
-    /// Acts on a request; `None` if it is not for the controller, or too old to be meant for now. Another revision of
-    /// the rig is designed beside the tick, and comes by [`Tick::adopt`].
+    /// Acts on a request; `None` if it is not for the controller. One that is too old to be meant for now is refused, but
+    /// for a disarming: that is always meant. Another revision of the rig is designed beside the tick, and comes by
+    /// [`Tick::adopt`].
     pub fn request(&mut self, request: &Request, now_ns: u64) -> Option<Reply> {
-        if !self.is_for_now(request, now_ns) {
-            return None;
-        }
         let answer = |outcome, words: std::fmt::Arguments| {
             Some(Reply::to(request, Process::Controller, outcome, words))
         };
         match RequestKind::from_u32(request.kind)? {
-            RequestKind::Arm | RequestKind::SetRig => None,
+            RequestKind::Arm => None,
+            RequestKind::Disarm => {
+                self.forget();
+                answer(Outcome::Done, format_args!("setpoint forgotten"))
+            }
+            _ if !self.is_for_now(request, now_ns) => {
+                answer(Outcome::Refused, format_args!("it was given too long ago; hint: ask again"))
+            }
+            RequestKind::SetRig => None,
             RequestKind::Rest => {
                 let since_ns = self.ending.map_or(now_ns, |ending| ending.since_ns);
                 self.ending = Some(Ending { since_ns, cause: None, hold: true });
                 answer(Outcome::Done, format_args!("going to zero"))
-            }
-            RequestKind::Disarm => {
-                self.forget();
-                answer(Outcome::Done, format_args!("setpoint forgotten"))
             }
             RequestKind::ClearFaults => {
                 self.latched = 0;

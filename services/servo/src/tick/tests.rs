@@ -175,8 +175,19 @@ fn an_old_request_is_not_acted_upon() {
     for stamp_ns in [999 * MS, bench.now_ns - REQUEST_LIFE_NS - 1] {
         let header = Header { sequence: 1, stamp_ns, session: 1 };
         let request = Request { header, kind: RequestKind::Arm as u32, ..Request::default() };
-        assert!(bench.servo.request(&request, bench.now_ns).is_none());
+        let reply = bench.servo.request(&request, bench.now_ns).expect("it is told so");
+        assert_eq!(reply.outcome, Outcome::Refused as u32);
     }
+    assert!(!bench.servo.armed());
+}
+
+#[test]
+fn an_old_disarming_is_acted_upon() {
+    let mut bench = Bench::armed();
+    let header = Header { sequence: 9, stamp_ns: bench.now_ns - REQUEST_LIFE_NS - 1, session: 1 };
+    let request = Request { header, kind: RequestKind::Disarm as u32, ..Request::default() };
+    let reply = bench.servo.request(&request, bench.now_ns).expect("an answer");
+    assert_eq!(reply.outcome, Outcome::Done as u32);
     assert!(!bench.servo.armed());
 }
 
