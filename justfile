@@ -32,6 +32,10 @@ faults KILLS="1000" MINUTES="60" LANES="12":
 slow-sockets ROUNDS="90" WINDOW_MS="1000":
     KORT_SLOW_ROUNDS={{ROUNDS}} KORT_SLOW_MS={{WINDOW_MS}} cargo test --test access slow_sockets -- --nocapture
 
+# eight signals at 50 Hz in the console's plots, ten minutes in view: rows and pictures lost
+console-load SECONDS="600":
+    KORT_CONSOLE_S={{SECONDS}} cargo test --test console eight_signals -- --nocapture
+
 # fuzz an entry point: csv, mcap, toml, deployment, bodies, messages or wires (nightly, cargo-fuzz)
 fuzz TARGET SECONDS="60":
     mkdir -p fuzz/corpus/{{TARGET}}

@@ -118,6 +118,15 @@ impl Browser {
         self.eval(&format!("document.getElementById('{id}').click()"));
     }
 
+    /// A theme, and a width in pixels, tall enough for the whole page.
+    pub fn show_as(&mut self, theme: &str, width: u64) {
+        let features = json!([{"name": "prefers-color-scheme", "value": theme}]);
+        self.call("Emulation.setEmulatedMedia", json!({ "features": features }));
+        let size = json!({"width": width, "height": 3200, "deviceScaleFactor": 1, "mobile": false});
+        self.call("Emulation.setDeviceMetricsOverride", size);
+        std::thread::sleep(Duration::from_millis(400));
+    }
+
     pub fn picture(&mut self, path: &str) {
         let answer = self.call("Page.captureScreenshot", json!({"format": "png"}));
         let encoded = answer["data"].as_str().unwrap();

@@ -117,6 +117,26 @@ impl ControllerConfig {
         Ok(config)
     }
 
+    /// The configuration as a file of `config/controllers/` that [`ControllerConfig::from_toml`] reads back, every key
+    /// written out, so that other defaults of a later version do not change it.
+    ///
+    /// # Errors
+    /// [`ConfigError::Syntax`] if a value has no form in TOML; no configuration that was read or set has one.
+    pub fn to_toml(&self) -> Result<String, ConfigError> {
+        toml::to_string(self).map_err(|e| ConfigError::Syntax { message: e.to_string(), laws: String::new() })
+    }
+
+    /// The same with every [`Tunable`] of another configuration: what is left differs in what cannot change while
+    /// running.
+    #[must_use]
+    pub fn tuned_as(mut self, other: &Self) -> Self {
+        (self.law, self.observer, self.estimator) = (other.law, other.observer, other.estimator);
+        for tunable in TUNABLES {
+            (tunable.set)(&mut self, (tunable.get)(other));
+        }
+        self
+    }
+
     /// Changes one parameter by name.
     ///
     /// # Errors
@@ -237,8 +257,18 @@ mod tests {
     #[test]
     fn defaults_lie_in_their_ranges_and_come_back_from_toml() {
         assert_eq!(ControllerConfig::from_toml("").unwrap(), ControllerConfig::default());
-        let text = toml::to_string(&ControllerConfig::default()).unwrap();
+        let text = ControllerConfig::default().to_toml().unwrap();
         assert_eq!(ControllerConfig::from_toml(&text).unwrap(), ControllerConfig::default());
+    }
+
+    #[test]
+    fn what_cannot_change_while_running_is_what_tuning_leaves() {
+        let other = "law = \"look_ahead\"\nobserver = \"luenberger\"\n[laws.servo]\nphase_margin_deg = 51\n";
+        let tuned = ControllerConfig::from_toml(other).unwrap();
+        assert_eq!(ControllerConfig::default().tuned_as(&tuned), tuned);
+        let fixed = ControllerConfig::from_toml(&format!("{other}[observers]\nuse_flow = false\n")).unwrap();
+        assert_ne!(ControllerConfig::default().tuned_as(&fixed), fixed);
+        assert_eq!(ControllerConfig::from_toml(&fixed.to_toml().unwrap()).unwrap(), fixed);
     }
 
     #[test]

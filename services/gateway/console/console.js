@@ -1,7 +1,7 @@
 "use strict";
 const $ = (id) => document.getElementById(id);
-const RENEW_EVERY_MS = 500, STREAM_HZ = 25, DRAW_EVERY_MS = 50, STALE_MS = 700, WAIT_MS = 4000;
-let lease_ttl_ms = 3000, thruster = null, lease = null, socket = null, state = null, heard_ms = 0, paused_s = null, limitsOf = {}, recording = null, taken_ms = 0, drawn_ms = 0;
+const RENEW_EVERY_MS = 500, STREAM_HZ = 50, DRAW_EVERY_MS = 50, STALE_MS = 700, WAIT_MS = 4000;
+let lease_ttl_ms = 3000, thruster = null, lease = null, socket = null, state = null, heard_ms = 0, paused_s = null, limitsOf = {}, taken_ms = 0, drawn_ms = 0;
 
 const TILES = [
   ["thrust", "N", (s) => s.measured.thrust_n, 1], ["thrust, estimated", "N", (s) => s.estimated.thrust_n, 1],
@@ -25,10 +25,10 @@ function log(message, bad) {
 }
 
 // One request; a problem document becomes a line in the log (unless it is told elsewhere) and a thrown error.
-async function call(method, path, body, quiet) {
+async function call(method, path, body, quiet, leaseId = lease) {
   const headers = {};
   if (body !== undefined) headers["Content-Type"] = "application/json";
-  if (lease) headers["Lease-Id"] = lease;
+  if (leaseId) headers["Lease-Id"] = leaseId;
   if (token) headers.Authorization = `Bearer ${token}`;
   let answer;
   try {
@@ -55,11 +55,14 @@ const base = () => `/v1/thrusters/${encodeURIComponent(thruster)}`;
 // A click whose failure is already in the log.
 const click = (id, action) => $(id).addEventListener("click", () => action().catch(() => {}));
 
-function connect() {
-  if (socket) { socket.onclose = null; socket.close(); }
+// A browser sends no Authorization with a WebSocket: the token goes as a subprotocol.
+function streamOf(id, hz) {
   const scheme = location.protocol === "https:" ? "wss" : "ws";
-  // A browser sends no Authorization with a WebSocket: the token goes as a subprotocol.
-  socket = new WebSocket(`${scheme}://${location.host}${base()}/stream?hz=${STREAM_HZ}`, token ? ["kort", `bearer.${token}`] : ["kort"]);
+  return new WebSocket(`${scheme}://${location.host}/v1/thrusters/${encodeURIComponent(id)}/stream?hz=${hz}`, token ? ["kort", `bearer.${token}`] : ["kort"]);
+}
+function connect() {
+  if (socket) { socket.onclose = null; socket.onmessage = null; socket.close(); }
+  socket = streamOf(thruster, STREAM_HZ);
   socket.onmessage = (message) => {
     const next = JSON.parse(message.data);
     if (next.stopped) { stopConfirmed(`the stream: ${next.stopped.join(", ")}`); return; }
@@ -214,46 +217,37 @@ function showKind() {
 async function loadController() {
   const answer = await call("GET", `${base()}/controller`);
   $("controller").dataset.running = answer.controller;
-  $("controller").replaceChildren(...answer.available.map((name) => new Option(name, name, false, name === answer.controller)));
+  for (const [id, names, chosen] of [["controller", answer.available, answer.controller], ["observer", answer.observers, answer.observer], ["estimator", answer.estimators, answer.estimator]]) {
+    $(id).replaceChildren(...names.map((name) => new Option(name, name, false, name === chosen)));
+  }
   $("law-parameters").replaceChildren(...answer.parameters.map((p) => {
-    const entry = Object.assign(document.createElement("input"), { type: "number", step: "any", value: p.value, min: p.low, max: p.high, ariaLabel: `${p.name} in ${p.unit}`, title: `${p.low} to ${p.high} ${p.unit}` });
+    const range = `${p.low} to ${p.high}`;
+    const entry = Object.assign(document.createElement("input"), { type: "number", step: "any", value: p.value, min: p.low, max: p.high, ariaLabel: `${p.name} in ${p.unit}, ${range}` });
     entry.addEventListener("change", () => call("PUT", `${base()}/controller`, { parameters: { [p.name]: Number(entry.value) } })
       .then(() => log(`${p.name} = ${entry.value} ${p.unit}`)).catch(() => { entry.value = p.value; }));
-    return cells([p.name, entry, p.unit]);
+    const small = Object.assign(document.createElement("small"), { textContent: range });
+    return cells([[p.name, document.createElement("br"), small], entry, p.unit]);
   }));
 }
 click("switch", async () => {
-  const answer = await call("PUT", `${base()}/controller`, { controller: $("controller").value });
-  log(`control law ${answer.controller}`);
+  const answer = await call("PUT", `${base()}/controller`, { controller: $("controller").value, observer: $("observer").value, estimator: $("estimator").value });
+  log(`control law ${answer.controller}, observer ${answer.observer}, estimator ${answer.estimator}`);
 });
-
-// Recordings ---------------------------------------------------------------------------------------------
-async function loadRecordings() {
-  const list = await call("GET", "/v1/recordings");
-  recording = list.find((item) => item.state === "recording") ?? null;
-  $("record").textContent = recording ? "Stop" : "Start";
-  $("recording-text").textContent = recording ? `recording ${recording.name}: ${recording.rows} rows` : "";
-  const shown = JSON.stringify(list);
-  if ($("recordings").dataset.shown === shown) return; // a button is not taken away from under the finger
-  $("recordings").dataset.shown = shown;
-  $("recordings").replaceChildren(...list.map((item) => cells([item.name, String(item.rows), `${item.duration_s.toFixed(1)} s`, item.state === "recording" ? "" : [["show", replay], ["compare", compare]].map(([words, action]) =>
-      Object.assign(document.createElement("button"), { textContent: words, ariaLabel: `${words} ${item.name}`, onclick: () => action(item.name).catch(() => {}) })),
-    ["csv", "mcap"].map((format) => {
-      const link = Object.assign(document.createElement("a"),
-        { href: `/v1/recordings/${encodeURIComponent(item.name)}?format=${format}`, textContent: format, download: `${item.name}.${format}` });
-      link.addEventListener("click", (event) => download(event, link));
-      return link;
-    })])));
-}
-click("record", async () => {
-  if (recording) { const done = await call("DELETE", "/v1/recordings"); log(`recording ${done.name} stopped, ${done.rows} rows`); } else {
-    const name = $("recording-name").value.trim();
-    const started = await call("POST", "/v1/recordings", name ? { thruster, name } : { thruster });
-    log(`recording ${started.name} started`);
-  }
-  await loadRecordings();
+// Tuned values go to a file and come from one: the same that kort.toml and kort soak take.
+click("controller-save", async () => {
+  const answer = await fetch(`${base()}/controller/file`, { headers: token ? { Authorization: `Bearer ${token}` } : {} });
+  if (!answer.ok) { log(`controller file: ${(await answer.json()).detail ?? answer.status}`, true); return; }
+  const name = /filename="([^"]+)"/.exec(answer.headers.get("content-disposition") ?? "")?.[1] ?? `${thruster}-controller.toml`;
+  save(name, await answer.blob()); log(`controller saved as ${name}`);
 });
-setInterval(() => { if (!document.hidden) loadRecordings().catch(() => {}); }, 2000);
+$("controller-load").addEventListener("click", () => $("controller-file").click());
+$("controller-file").addEventListener("change", async () => {
+  const file = $("controller-file").files[0];
+  if (!file) return;
+  $("controller-file").value = "";
+  await call("PUT", `${base()}/controller/file`, { toml: await file.text() })
+    .then((answer) => { log(`${file.name} is in force: ${answer.controller}`); setTimeout(() => loadController().catch(() => {}), 500); }).catch(() => {});
+});
 
 // Event log ------------------------------------------------------------------------------------------------
 let lastEvent = 0;
@@ -276,8 +270,10 @@ click("pause", async () => {
 });
 $("thruster").addEventListener("change", () => choose($("thruster").value));
 async function choose(id) {
-  thruster = id; lease = null; state = null; live.clear();
-  limitsOf = (await call("GET", base())).range; showKind();
+  if (lease) held.set(thruster, lease); // what one commands goes on while one looks at another
+  thruster = id; lease = held.get(id) ?? null; taken_ms = performance.now(); held.delete(id);
+  state = null; live.clear();
+  limitsOf = (await call("GET", base())).range; showKind(); showFields();
   connect(); loadHistory().catch(() => {}); await loadController();
 }
 $("login").addEventListener("submit", (event) => {
@@ -286,16 +282,6 @@ $("login").addEventListener("submit", (event) => {
   sessionStorage.setItem("kort-token", token);
   location.reload();
 });
-// A link cannot carry the token: with one, the file is fetched and handed over.
-async function download(event, link) {
-  if (!token) return;
-  event.preventDefault();
-  const answer = await fetch(link.href, { headers: { Authorization: `Bearer ${token}` } });
-  if (!answer.ok) { log(`${link.download}: ${answer.status}`, true); return; }
-  const url = URL.createObjectURL(await answer.blob());
-  Object.assign(document.createElement("a"), { href: url, download: link.download }).click();
-  URL.revokeObjectURL(url);
-}
 async function start() {
   $("tiles").replaceChildren(...TILES.map(([name, unit]) => {
     const tile = document.createElement("div");
@@ -305,11 +291,8 @@ async function start() {
   }));
   const list = await call("GET", "/v1/thrusters");
   $("thruster").replaceChildren(...list.map((item) => new Option(item.id, item.id)));
+  showFleet(list.map((item) => item.id));
   loadRecordings().catch(() => {});
   await choose(list[0].id);
   show();
 }
-start().catch((error) => {
-  log(`cannot start: ${error.message}`, true);
-  if ($("login").hidden) setTimeout(() => location.reload(), 3000);
-});

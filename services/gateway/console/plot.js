@@ -1,6 +1,6 @@
 "use strict";
 // Plots: a chart per unit, drawn by uPlot, over one source of columns: the live signals, or one or two runs.
-const LIVE_POINTS = 20000; // more than ten minutes of the stream
+const LIVE_POINTS = 33000; // more than ten minutes of the stream
 // name, chart, label, colour, dash, shown at first; the names are the recording's columns
 const SIGNALS = [
   ["thrust_cmd_n", "N", "commanded", "--quiet", [5, 4], true], ["thrust_n", "N", "measured", "--blue", [], true],
@@ -61,6 +61,30 @@ function at(times, from, values) {
     if (values[i + 1] === null) return t === from[i] ? values[i] : null;
     return values[i] + (values[i + 1] - values[i]) * (t - from[i]) / (from[i + 1] - from[i]);
   });
+}
+
+// Columns between two rows for a plot so many pixels wide: of more rows than it can show the least and the largest value of
+// each stretch, so that no peak is lost. Stretches begin at whole multiples of their length: a curve that moves does not shimmer.
+function thin(t, columns, first, last, width) {
+  let each = 1;
+  while ((last - first) / each > width) each *= 2;
+  if (each <= 2) return [t.slice(first, last), columns.map((values) => values.slice(first, last))];
+  const times = [], thinned = columns.map(() => []), half = each / 2, end = Math.min(last, t.length);
+  for (let i = Math.floor(first / each) * each; i < end; i += each) {
+    const to = Math.min(i + each, end);
+    times.push(t[i], t[Math.min(i + half, to - 1)]);
+    columns.forEach((values, k) => {
+      let low = null, high = null, low_at = i, high_at = i;
+      for (let j = i; j < to; j += 1) {
+        const v = values[j];
+        if (v === null) continue;
+        if (low === null || v < low) { low = v; low_at = j; }
+        if (high === null || v > high) { high = v; high_at = j; }
+      }
+      if (low_at <= high_at) thinned[k].push(low, high); else thinned[k].push(high, low);
+    });
+  }
+  return [times, thinned];
 }
 
 class Chart {
@@ -125,13 +149,14 @@ class Chart {
       this.shown = shown;
     }
     const first = Math.max(0, lowerBound(a.t, from_s) - 1), last = lowerBound(a.t, to_s) + 1;
-    const t = a.t.slice(first, last), mine = this.signals.map(([name]) => (shownSignals.has(name) ? a.c[name].slice(first, last) : []));
+    const [t, drawn] = thin(a.t, names.map((name) => a.c[name]), first, last, both ? Infinity : this.plot.width);
+    const mine = this.signals.map(([name]) => (shownSignals.has(name) ? drawn[names.indexOf(name)] : []));
     const theirs = this.signals.map(([name], i) => {
       if (!both || !shownSignals.has(name)) return [];
       const other = at(t, b.t, b.c[name]);
       return difference ? other.map((v, k) => (v === null || mine[i][k] === null ? null : v - mine[i][k])) : other;
     });
-    this.last = mine.map((values) => values[values.length - 1] ?? null);
+    this.last = this.signals.map(([name]) => a.c[name][Math.min(last, a.t.length) - 1] ?? null);
     const pad = (columns) => columns.map((values) => (values.length ? values : t.map(() => null)));
     this.plot.batch(() => {
       this.plot.setData([t, ...pad(mine), ...pad(theirs)], false);

@@ -11,16 +11,20 @@ const KINDS = { // kind: [words, fields with their first values, segments made o
   reversals: ["reversals", { amplitude: 40, each_s: 3, count: 3 }],
 };
 const unitOf = (field) => (field.endsWith("_s") ? "s" : field.endsWith("_hz") ? "Hz" : ["levels", "count", "tones", "order"].includes(field) ? "" : $("signal-of").value === "thrust_n" ? "N" : "rad/s");
+// First values are for a thruster that gives 60 N or 60 rad/s; one that does not begins with three fifths of its range.
+const scale = () => { const bound = limitsOf[$("signal-of").value] ?? 60; return bound < 60 ? 0.6 * bound / 60 : 1; };
+const firstOf = (name, first) => (["N", "rad/s"].includes(unitOf(name)) ? Number((first * scale()).toPrecision(3)) : first);
 let previewPlot = null, previewed = 0, scenarioText = null;
 
 function showFields() {
   const kind = $("signal-kind").value, fields = KINDS[kind]?.[1] ?? {};
   $("signal-fields").replaceChildren(...Object.entries(fields).map(([name, first]) => {
-    const label = document.createElement("label"), entry = Object.assign(document.createElement("input"), { type: "number", step: "any", value: first, id: `signal-${name}` });
+    const label = document.createElement("label"), entry = Object.assign(document.createElement("input"), { type: "number", step: "any", value: firstOf(name, first), id: `signal-${name}` });
     entry.addEventListener("input", preview);
     label.append(`${name.replace(/_(s|hz)$/, "").replaceAll("_", " ")} `, entry, ` ${unitOf(name)}`);
     return label;
   }));
+  $("signal-limit").value = firstOf("limit", 60);
   $("signal-file").hidden = kind !== "file"; $("signal-of").disabled = kind === "experiment" || kind === "file";
   preview();
 }
@@ -81,5 +85,4 @@ $("signal-kind").addEventListener("change", showFields);
 $("signal-of").addEventListener("change", showFields);
 $("signal-limit").addEventListener("input", preview);
 $("signal-file").addEventListener("change", async () => { scenarioText = (await $("signal-file").files[0]?.text()) ?? null; preview(); });
-$("thruster").addEventListener("change", preview);
 setTimeout(showFields, 300);

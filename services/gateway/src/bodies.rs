@@ -3,8 +3,8 @@
 use crate::extract::{Json, OptionalJson};
 use crate::problem::Problem;
 use crate::routes::bodies::{
-    ControllerRequest, DiagnosisRequest, ExcitationRequest, LeaseRequest, RecordingRequest, RigRequest,
-    incoming,
+    ControllerFile, ControllerRequest, DiagnosisRequest, ExcitationRequest, LeaseRequest, RecordingRequest,
+    RigRequest, TagsRequest, incoming,
 };
 use crate::view::Setpoint;
 
@@ -17,6 +17,8 @@ pub enum Body {
     Lease,
     /// `PUT …/controller`
     Controller,
+    /// `PUT …/controller/file`
+    ControllerFile,
     /// `POST …/excitation`
     Excitation,
     /// `POST …/rig`
@@ -25,20 +27,24 @@ pub enum Body {
     Diagnosis,
     /// `POST /v1/recordings`
     Recording,
+    /// `PATCH /v1/recordings/{name}`
+    Tags,
     /// A text message of the stream.
     Message,
 }
 
 impl Body {
     /// Every kind.
-    pub const ALL: [Body; 8] = [
+    pub const ALL: [Body; 10] = [
         Body::Setpoint,
         Body::Lease,
         Body::Controller,
+        Body::ControllerFile,
         Body::Excitation,
         Body::Rig,
         Body::Diagnosis,
         Body::Recording,
+        Body::Tags,
         Body::Message,
     ];
 
@@ -51,10 +57,12 @@ impl Body {
             Body::Setpoint => Json::<Setpoint>::from_bytes(bytes).map(drop),
             Body::Lease => Json::<LeaseRequest>::from_bytes(bytes).map(drop),
             Body::Controller => Json::<ControllerRequest>::from_bytes(bytes).map(drop),
+            Body::ControllerFile => Json::<ControllerFile>::from_bytes(bytes).map(drop),
             Body::Excitation => Json::<ExcitationRequest>::from_bytes(bytes).map(drop),
             Body::Rig => Json::<RigRequest>::from_bytes(bytes).map(drop),
             Body::Diagnosis => OptionalJson::<DiagnosisRequest>::from_bytes(bytes).map(drop),
             Body::Recording => OptionalJson::<RecordingRequest>::from_bytes(bytes).map(drop),
+            Body::Tags => Json::<TagsRequest>::from_bytes(bytes).map(drop),
             // A message that is not UTF-8 is no message of the stream: the connection is closed before.
             Body::Message => std::str::from_utf8(bytes).map_or(Ok(()), |text| incoming(text).map(drop)),
         };

@@ -46,6 +46,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 use axum::body::Bytes;
+use kort_control::ControllerConfig;
 use kort_proto::config::Config;
 use kort_proto::transport::{Deployment, Watched};
 use tokio::signal::unix::{SignalKind, signal};
@@ -79,6 +80,7 @@ const BODY_BYTES_MAX: usize = 16 * 1024;
 pub(crate) struct App {
     thrusters: Vec<Arc<Thruster>>,
     rigs: Vec<Arc<RigDesk>>,
+    controllers: Vec<ControllerConfig>,
     rings: Vec<Ring>,
     diagnoses: Arc<Diagnoses>,
     tallies: Vec<Arc<Tally>>,
@@ -118,6 +120,11 @@ impl App {
     /// The rig description of this thruster.
     fn rig(&self, id: &str) -> Result<&Arc<RigDesk>, Problem> {
         Ok(&self.rigs[self.place(id)?])
+    }
+
+    /// Its controller as the deployment states it.
+    fn stated_controller(&self, id: &str) -> Result<&ControllerConfig, Problem> {
+        Ok(&self.controllers[self.place(id)?])
     }
 
     /// The last minutes of this thruster.
@@ -346,6 +353,7 @@ async fn serve(
     let mut app = App {
         thrusters: Vec::new(),
         rigs: Vec::new(),
+        controllers: Vec::new(),
         rings: Vec::new(),
         diagnoses: Arc::clone(&diagnoses),
         tallies: Vec::new(),
@@ -369,6 +377,7 @@ async fn serve(
         let Deployed { id, range, heartbeat, servo_silence, .. } = &deployed;
         let (thruster, asks) =
             Thruster::new(id, *range, *servo_silence, Arc::clone(&bell), Arc::clone(&events));
+        app.controllers.push(deployed.controller);
         let (thruster, tally, heartbeat) = (Arc::new(thruster), Arc::new(Tally::new()), *heartbeat);
         let rig = RigDesk::open(
             &settings.rigs,

@@ -4,6 +4,7 @@
 //! that reads up to its last second; it is listed as `torn`. One that the disk refuses ends by itself, `failed`,
 //! with the cause; what was written stays readable.
 
+mod kept;
 mod write;
 
 use std::collections::BTreeMap;
@@ -28,6 +29,7 @@ use crate::rig::RigDesk;
 use crate::settings::RecordingLimits;
 use crate::thruster::{Thruster, lock};
 use crate::token::{Identity, Role};
+pub use kept::{TAGS_MAX, check_tags};
 use write::{Item, Job};
 
 /// Rows that may wait for the disk: two seconds at the fastest servo.
@@ -49,6 +51,10 @@ pub struct RecordingInfo {
     /// Who started it: name of the token, `local` where none is asked for.
     #[serde(default)]
     pub owner: String,
+    /// Words to find it by, in the order given.
+    #[serde(default)]
+    #[schema(example = json!(["bollard", "new-propeller"]))]
+    pub tags: Vec<String>,
     /// Is it running, complete, torn or failed?
     pub state: RecordingState,
     /// Why it ended by itself; null if it runs or was stopped.
@@ -164,6 +170,7 @@ impl Recorder {
         subject: Subject,
         who: &Identity,
         name: Option<String>,
+        tags: Vec<String>,
         rate_hz: f64,
     ) -> Result<RecordingInfo, Problem> {
         let now = SystemTime::now();
@@ -194,6 +201,7 @@ impl Recorder {
             name: name.clone(),
             thruster: thruster.clone(),
             owner: who.name.clone(),
+            tags,
             state: RecordingState::Recording,
             cause: None,
             started: humantime::format_rfc3339_millis(now).to_string(),
@@ -262,31 +270,6 @@ impl Recorder {
     pub fn stop_all(&self) {
         let running = std::mem::take(&mut *lock(&self.running));
         running.into_iter().for_each(|running| drop(self.settle(running)));
-    }
-
-    /// Deletes a recording that is done.
-    pub fn delete(&self, name: &str, who: &Identity) -> Result<(), Problem> {
-        let info =
-            self.list().into_iter().find(|info| info.name == name).ok_or_else(|| {
-                Problem::new(Kind::UnknownRecording, format!("there is no recording {name:?}"))
-            })?;
-        may(who, &info.owner, name)?;
-        for ending in [ENDING, "csv", "json"] {
-            match fs::remove_file(self.file(name, ending)) {
-                Err(error) if error.kind() != io::ErrorKind::NotFound => {
-                    return Err(self.failed(name, &error));
-                }
-                _ => (),
-            }
-        }
-        lock(&self.unwritten).remove(name);
-        self.tell(
-            EventKind::RecordingDeleted,
-            &info,
-            &who.name,
-            format!("{} deleted recording {name}", who.name),
-        );
-        Ok(())
     }
 
     /// Takes a sample of the bus; never waits for the disk.

@@ -1,11 +1,12 @@
 //! What `kort.toml` says to the gateway.
 
 use std::net::SocketAddr;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use kort_control::model::ControlModel;
-use kort_proto::config::{Config, ConfigError};
+use kort_control::{ControllerConfig, LawKind};
+use kort_proto::config::{Config, ConfigError, Thruster};
 use kort_thruster::rig::{AmplifierKind, Rig};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer};
@@ -223,6 +224,8 @@ pub struct Deployed {
     pub servo_silence: Duration,
     /// Largest setpoints: what the rig can give, and what the limits allow.
     pub range: SetpointRange,
+    /// Its controller as the deployment states it.
+    pub controller: ControllerConfig,
     /// Period at which its setpoint is sent anew: the controller's.
     pub heartbeat: Duration,
     /// Kind of its drive.
@@ -274,12 +277,27 @@ pub fn thrusters(config: &Config) -> Result<Vec<Deployed>, ConfigError> {
                 rig: (file, text),
                 servo_silence,
                 range,
+                controller: controller(config, id, thruster)?,
                 heartbeat,
                 drive,
                 speed_limit_rad_s,
             })
         })
         .collect()
+}
+
+/// The file of law, observer and estimator; the deployment's law goes before its own.
+fn controller(config: &Config, id: &str, thruster: &Thruster) -> Result<ControllerConfig, ConfigError> {
+    let keys = &thruster.controller;
+    let mut stated = ControllerConfig::default();
+    if keys.file != Path::new("") {
+        let (file, text) = config.text_of(&format!("thrusters.{id}.controller.file"), &keys.file, &[])?;
+        stated = ControllerConfig::from_toml(&text)
+            .map_err(|error| ConfigError { file, message: error.to_string() })?;
+    }
+    // The controller's process refuses another law in its own words.
+    stated.law = LawKind::from_name(&keys.law).unwrap_or(stated.law);
+    Ok(stated)
 }
 
 /// Rounded towards zero, so that a message can print it and it can still be asked for.

@@ -220,7 +220,10 @@ impl Job {
         let file = create(&self.folder, &next, &self.subject, self.began)?;
         std::mem::replace(&mut self.file, file).finish()?;
         recorder.note_info(&RecordingInfo { state: RecordingState::Complete, ..now });
-        *lock(&self.info) = next;
+        // Tags may have come meanwhile.
+        let mut info = lock(&self.info);
+        *info = RecordingInfo { tags: info.tags.clone(), ..next };
+        drop(info);
         (self.first_ns, self.given) = (None, (0, 0.0));
         (self.state_s, self.law_s) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
         Ok(())

@@ -14,13 +14,15 @@ use crate::App;
 struct Parts;
 
 /// What the page is put together from, each in its place. uPlot is other people's: MIT, its licence goes along.
-const PARTS: [&str; 9] = [
+const PARTS: [&str; 11] = [
     "vendor/uplot/LICENSE",
     "vendor/uplot/uPlot.min.css",
     "vendor/uplot/uPlot.iife.min.js",
     "style.css",
     "plot.js",
+    "fleet.js",
     "console.js",
+    "library.js",
     "signal.js",
     "recordings.js",
     "diagnosis.js",

@@ -34,6 +34,10 @@ pub struct ControllerView {
     pub parameters: Vec<LawParameter>,
     /// Every law that can be chosen.
     pub available: Vec<String>,
+    /// Every observer that can be chosen.
+    pub observers: Vec<&'static str>,
+    /// Every estimator that can be chosen.
+    pub estimators: Vec<&'static str>,
 }
 
 /// A parameter of a control law.

@@ -3,6 +3,7 @@
 mod arming;
 mod console;
 mod controller;
+mod controller_file;
 mod diagnoses;
 mod docs;
 mod events;
@@ -24,10 +25,11 @@ pub use controller::{ControllerRequest, ControllerView, LawParameter};
 /// What clients send, for [`crate::bodies`].
 pub mod bodies {
     pub use super::controller::ControllerRequest;
+    pub use super::controller_file::ControllerFile;
     pub use super::diagnoses::DiagnosisRequest;
     pub use super::excitation::ExcitationRequest;
     pub use super::lease::LeaseRequest;
-    pub use super::recordings::RecordingRequest;
+    pub use super::recordings::{RecordingRequest, TagsRequest};
     pub use super::rig::RigRequest;
     pub use super::stream::parse as incoming;
 }
@@ -57,6 +59,7 @@ pub fn router(app: Arc<App>) -> Router {
         .merge(stop::routes())
         .merge(events::routes())
         .merge(controller::routes())
+        .merge(controller_file::routes())
         .merge(rig::routes())
         .merge(diagnoses::routes())
         .merge(stream::routes())

@@ -9,15 +9,16 @@ use axum::response::IntoResponse;
 use serde::Deserialize;
 use tokio::io::AsyncReadExt;
 use tokio_util::io::ReaderStream;
+use utoipa::openapi::schema::{ArrayBuilder, ObjectBuilder, Schema, Type};
 use utoipa::{IntoParams, ToSchema};
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 mod text;
 
 use crate::App;
-use crate::extract::{OptionalJson, Path, Query};
+use crate::extract::{Json, OptionalJson, Path, Query};
 use crate::problem::{Kind, Problem};
-use crate::record::{ENDING, RecordingInfo, check_new_name};
+use crate::record::{ENDING, RecordingInfo, TAGS_MAX, check_new_name, check_tags};
 use crate::token::Identity;
 
 /// Rows a second when the request names no rate.
@@ -25,7 +26,7 @@ const RATE_DEFAULT_HZ: f64 = 100.0;
 const RATE_MAX_HZ: f64 = 5000.0;
 
 pub fn routes() -> OpenApiRouter<Arc<App>> {
-    OpenApiRouter::new().routes(routes!(list, start, stop)).routes(routes!(fetch, remove))
+    OpenApiRouter::new().routes(routes!(list, start, stop)).routes(routes!(fetch, tag, remove))
 }
 
 /// What to record. Every field may be left out, and so may the whole body.
@@ -45,6 +46,38 @@ pub struct RecordingRequest {
     #[serde(default)]
     #[schema(minimum = 0.1, maximum = 5000, default = 100)]
     rate_hz: Option<f64>,
+    /// Words to find it by.
+    #[serde(default)]
+    #[schema(schema_with = tags_schema)]
+    tags: Vec<String>,
+}
+
+/// What a recording is found by, instead of what it had.
+#[derive(Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, expecting = "an object")]
+#[schema(example = json!({"tags": ["bollard", "new-propeller"]}))]
+pub struct TagsRequest {
+    /// All its tags; an empty list takes them away.
+    #[schema(schema_with = tags_schema)]
+    tags: Vec<String>,
+}
+
+fn tags_schema() -> Schema {
+    let tag =
+        ObjectBuilder::new().schema_type(Type::String).pattern(Some("^[A-Za-z0-9][A-Za-z0-9._-]{0,31}$"));
+    let words =
+        "1 to 32 letters, digits, dots, underscores or hyphens each; one that stands twice is kept once";
+    ArrayBuilder::new().items(tag).max_items(Some(TAGS_MAX)).description(Some(words)).build().into()
+}
+
+/// Which recordings.
+#[derive(Deserialize, IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+struct Which {
+    /// Only those with this tag.
+    #[param(example = "bollard")]
+    tag: Option<String>,
 }
 
 /// Format of a recording's file.
@@ -65,12 +98,19 @@ enum FileFormat {
     Mcap,
 }
 
-/// Every recording, oldest first.
-#[utoipa::path(get, path = "/v1/recordings", tag = "recordings",
-    responses((status = 200, description = "Every recording", body = [RecordingInfo])))]
-async fn list(State(app): State<Arc<App>>) -> Result<axum::Json<Vec<RecordingInfo>>, Problem> {
+/// Every recording, or those with a tag; oldest first.
+#[utoipa::path(get, path = "/v1/recordings", tag = "recordings", params(Which),
+    responses(
+        (status = 200, description = "The recordings", body = [RecordingInfo]),
+        (status = 400, description = "`malformed-query`", body = Problem, content_type = "application/problem+json")))]
+async fn list(
+    State(app): State<Arc<App>>,
+    Query(Which { tag }): Query<Which>,
+) -> Result<axum::Json<Vec<RecordingInfo>>, Problem> {
     let recorder = Arc::clone(app.recorder());
-    blocking(move || recorder.list()).await.map(axum::Json)
+    let mut list = blocking(move || recorder.list()).await?;
+    list.retain(|info| tag.as_ref().is_none_or(|tag| info.tags.contains(tag)));
+    Ok(axum::Json(list))
 }
 
 /// Starts a recording; several may run at once, each under its name.
@@ -93,6 +133,7 @@ async fn start(
     if let Some(name) = &request.name {
         check_new_name("name", name)?;
     }
+    let tags = check_tags(request.tags)?;
     let rate_hz = request.rate_hz.unwrap_or(RATE_DEFAULT_HZ);
     if !(0.1..=RATE_MAX_HZ).contains(&rate_hz) {
         return Err(Problem::new(
@@ -104,7 +145,7 @@ async fn start(
     let first = || app.thrusters().first().map(|thruster| thruster.id.clone()).unwrap_or_default();
     let subject = app.subject(&request.thruster.unwrap_or_else(first))?;
     let recorder = Arc::clone(app.recorder());
-    let info = blocking(move || recorder.start(subject, &who, request.name, rate_hz)).await??;
+    let info = blocking(move || recorder.start(subject, &who, request.name, tags, rate_hz)).await??;
     Ok((StatusCode::CREATED, axum::Json(info)))
 }
 
@@ -130,6 +171,28 @@ async fn stop(
                 .allowed(several.iter().cloned())),
         });
     stopped.await?.map(axum::Json)
+}
+
+/// Gives a recording its tags, also while it runs. Its owner may, or an admin.
+#[utoipa::path(patch, path = "/v1/recordings/{name}", tag = "recordings", request_body = TagsRequest,
+    params(("name" = String, Path, description = "Name of the recording", example = "t1-20260101T120000Z")),
+    responses(
+        (status = 200, description = "It has them now", body = RecordingInfo),
+        (status = 400, description = "`malformed-path`, `malformed-json`", body = Problem, content_type = "application/problem+json"),
+        (status = 403, description = "`role-too-low`: it belongs to another", body = Problem, content_type = "application/problem+json"),
+        (status = 404, description = "`unknown-recording`", body = Problem, content_type = "application/problem+json"),
+        (status = 413, description = "`body-too-large`", body = Problem, content_type = "application/problem+json"),
+        (status = 415, description = "`unsupported-media-type`", body = Problem, content_type = "application/problem+json"),
+        (status = 422, description = "`invalid-field`, `out-of-range`", body = Problem, content_type = "application/problem+json")))]
+async fn tag(
+    State(app): State<Arc<App>>,
+    Extension(who): Extension<Identity>,
+    Path(name): Path<String>,
+    Json(request): Json<TagsRequest>,
+) -> Result<axum::Json<RecordingInfo>, Problem> {
+    let tags = check_tags(request.tags)?;
+    let recorder = Arc::clone(app.recorder());
+    blocking(move || recorder.tag(&name, &who, tags)).await?.map(axum::Json)
 }
 
 /// Stops a recording that runs; deletes one that is done. Its owner may, or an admin.

@@ -2,6 +2,7 @@
 
 use std::time::Instant;
 
+use kort_control::{EstimatorKind, ObserverKind};
 use kort_proto::events::EventKind;
 use kort_proto::messages::{PARAMETERS, Parameter, Process, RequestKind};
 use kort_proto::text::Text;
@@ -37,6 +38,8 @@ impl Thruster {
                 .take(state.law_count as usize)
                 .map(|law| law.as_str().to_owned())
                 .collect(),
+            observers: ObserverKind::ALL.map(ObserverKind::name).to_vec(),
+            estimators: EstimatorKind::ALL.map(EstimatorKind::name).to_vec(),
         })
     }
 

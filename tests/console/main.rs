@@ -2,9 +2,12 @@
 //!
 //! Needs `chromium` (tests/run.sh installs it). The last picture is left in `target/console.png`.
 
-#[path = "common/browser.rs"]
+#[path = "../common/browser.rs"]
 mod browser;
+#[path = "../common/mod.rs"]
 mod common;
+mod desk;
+mod load;
 
 use std::time::Duration;
 
@@ -161,11 +164,7 @@ fn a_bench_engineer_plays_signals_and_compares_runs() {
         page.until("(pictureOf().then((blob) => { window.pictured = blob.size; }), window.pictured > 2000)");
         page.click("zoom-out");
         for (theme, width) in [("light", 1280), ("dark", 1280), ("light", 390), ("dark", 390)] {
-            let features = json!([{"name": "prefers-color-scheme", "value": theme}]);
-            page.call("Emulation.setEmulatedMedia", json!({ "features": features }));
-            let size = json!({"width": width, "height": 2600, "deviceScaleFactor": 1, "mobile": false});
-            page.call("Emulation.setDeviceMetricsOverride", size);
-            std::thread::sleep(Duration::from_millis(400));
+            page.show_as(theme, width);
             let wide = page.eval("document.documentElement.scrollWidth").as_u64().unwrap();
             assert!(wide <= width, "{theme} at {width} px: the page is {wide} px wide");
             page.picture(&format!("{}/target/console-{theme}-{width}.png", env!("CARGO_MANIFEST_DIR")));
@@ -335,7 +334,7 @@ fn an_operator_diagnoses_and_goes_back() {
             "document.getElementById('diagnosis-text').textContent.length > 10 && state.diagnosis === null",
         );
         assert_eq!(page.eval("document.getElementById('use').disabled"), json!(true), "nothing was found");
-        let rig = include_str!("../config/thrusters/whitcomb-yoerger-1999.toml");
+        let rig = include_str!("../../config/thrusters/whitcomb-yoerger-1999.toml");
         stack.expect("POST", "/rig", Some(json!({"toml": format!("{rig}\n# revised\n")})));
         page.until(&text_is("rig-text", "revision 2"));
         page.click("back");
@@ -367,7 +366,7 @@ fn an_operator_is_told_of_a_worse_revision_and_goes_back() {
         );
         // Ten seconds of like command are compared, at the least.
         std::thread::sleep(Duration::from_secs(12));
-        let rig = include_str!("../config/thrusters/whitcomb-yoerger-1999.toml");
+        let rig = include_str!("../../config/thrusters/whitcomb-yoerger-1999.toml");
         let worse = rig.replace("lift_max = 0.542", "lift_max = 1.0");
         assert_ne!(rig, worse);
         page.eval(&format!("void call('POST', `${{base()}}/rig`, {})", json!({ "toml": worse })));

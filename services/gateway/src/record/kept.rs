@@ -1,0 +1,95 @@
+//! What becomes of recordings that are there: they are tagged and deleted.
+
+use std::fs;
+use std::io;
+use std::time::Duration;
+
+use kort_proto::events::EventKind;
+
+use super::{ENDING, Recorder, RecordingInfo, RecordingState, is_name, may};
+use crate::problem::{Kind, Problem};
+use crate::thruster::lock;
+use crate::token::Identity;
+
+/// Tags that a recording may have.
+pub const TAGS_MAX: usize = 16;
+/// Length of a tag at most, bytes.
+const TAG_BYTES_MAX: usize = 32;
+
+/// May a recording have these tags? Those that stand twice are kept once.
+pub fn check_tags(tags: Vec<String>) -> Result<Vec<String>, Problem> {
+    if tags.len() > TAGS_MAX {
+        return Err(Problem::new(
+            Kind::OutOfRange,
+            format!("tags has {} entries; at most {TAGS_MAX} are allowed", tags.len()),
+        ));
+    }
+    let mut kept: Vec<String> = Vec::new();
+    for tag in tags {
+        if !is_name(&tag) || tag.len() > TAG_BYTES_MAX {
+            return Err(Problem::new(Kind::OutOfRange, format!("tags: {tag:?} is not allowed"))
+                .hint("1 to 32 letters, digits, dots, underscores or hyphens; the first a letter or digit"));
+        }
+        if !kept.contains(&tag) {
+            kept.push(tag);
+        }
+    }
+    Ok(kept)
+}
+
+impl Recorder {
+    /// Gives a recording other tags, also while it runs.
+    pub fn tag(&self, name: &str, who: &Identity, tags: Vec<String>) -> Result<RecordingInfo, Problem> {
+        let _one_at_a_time = lock(&self.starting);
+        loop {
+            self.reap();
+            let running =
+                lock(&self.running).iter().find(|running| running.name == name).map(|r| r.info.clone());
+            let Some(shared) = running else { break };
+            let mut info = lock(&shared);
+            // Its thread writes them with the next flush; one that is about to end is waited for.
+            if info.state == RecordingState::Recording {
+                may(who, &info.owner, name)?;
+                info.tags = tags;
+                return Ok(self.sized(info.clone()));
+            }
+            drop(info);
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        let mut info = self.known(name)?;
+        may(who, &info.owner, name)?;
+        info.tags = tags;
+        self.note_info(&info);
+        Ok(info)
+    }
+
+    /// Deletes a recording that is done.
+    pub fn delete(&self, name: &str, who: &Identity) -> Result<(), Problem> {
+        let _one_at_a_time = lock(&self.starting);
+        let info = self.known(name)?;
+        may(who, &info.owner, name)?;
+        for ending in [ENDING, "csv", "json"] {
+            match fs::remove_file(self.file(name, ending)) {
+                Err(error) if error.kind() != io::ErrorKind::NotFound => {
+                    return Err(self.failed(name, &error));
+                }
+                _ => (),
+            }
+        }
+        lock(&self.unwritten).remove(name);
+        self.tell(
+            EventKind::RecordingDeleted,
+            &info,
+            &who.name,
+            format!("{} deleted recording {name}", who.name),
+        );
+        Ok(())
+    }
+
+    fn known(&self, name: &str) -> Result<RecordingInfo, Problem> {
+        self.list().into_iter().find(|info| info.name == name).ok_or_else(|| {
+            Problem::new(Kind::UnknownRecording, format!("there is no recording {name:?}"))
+                .hint("GET /v1/recordings lists them")
+        })
+    }
+}
