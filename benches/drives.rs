@@ -18,15 +18,29 @@ use std::time::{Duration, Instant};
 use common::Site;
 use common::bench::Bench;
 use kort_emulators::vesc::Make;
-use kort_emulators::{Adapter, Bench as Emulator, Cia402, Moteus, ODrive, Vesc, cia402, moteus};
-use kort_proto::messages::{Command, Outcome, RequestKind, Telemetry};
+use kort_emulators::{
+    Adapter, ArduSub, Bench as Emulator, Cia402, Moteus, ODrive, Vesc, ardusub, cia402, moteus,
+};
+use kort_proto::messages::{Command, DriveKind, Outcome, RequestKind, Telemetry};
 use kort_proto::transport::{Ticker, monotonic_ns};
 use kort_thruster::rig::Rig;
 
 const COMMAND_NS: u64 = 4_000_000;
-/// Smallest step of the drive that every protocol carries, A, and how many there are until it begins anew.
-const STEP_A: f64 = 0.01;
+/// Steps of the drive until it begins anew.
 const STEPS: u64 = 100;
+
+/// The drives that are commanded, one after the other.
+#[derive(Clone, Copy)]
+struct Stairs {
+    kind: DriveKind,
+    first: f64,
+    /// Smallest step that the protocol carries.
+    step: f64,
+}
+
+const AMPERES: Stairs = Stairs { kind: DriveKind::Current, first: 0.5, step: 0.01 };
+/// A microsecond of pulse width on 16 V.
+const VOLTS: Stairs = Stairs { kind: DriveKind::Voltage, first: 2.0, step: 0.04 };
 
 fn main() {
     let seconds: u64 = std::env::args().find_map(|a| a.parse().ok()).unwrap_or(10);
@@ -37,23 +51,31 @@ fn main() {
         let keys = format!("port = {:?}, rate_hz = 500, reading_life_ms = 200, {keys}", emulator.port());
         (Site::new().with_drive(kind, &keys), emulator)
     };
-    measure("simulated", Site::new(), None, seconds);
+    measure("simulated", Site::new(), None, AMPERES, seconds);
     let vesc = Emulator::start(Vesc::new(Make::default(), &rig)).expect("a pseudo terminal");
     let (site, emulator) = wired("vesc", "pole_pairs = 7", vesc);
-    measure("vesc", site, Some(emulator), seconds);
+    measure("vesc", site, Some(emulator), AMPERES, seconds);
     let odrive = Emulator::start(ODrive::new(&rig, false)).expect("a pseudo terminal");
     let (site, emulator) = wired("odrive", "timeout_ms = 100", odrive);
-    measure("odrive", site, Some(emulator), seconds);
+    measure("odrive", site, Some(emulator), AMPERES, seconds);
     let moteus = Emulator::start(Moteus::new(moteus::Make::default(), &rig)).expect("a pseudo terminal");
     let (site, emulator) = wired("moteus", "timeout_ms = 100", moteus);
-    measure("moteus", site, Some(emulator), seconds);
+    measure("moteus", site, Some(emulator), AMPERES, seconds);
     let cia402 = Adapter::new(Cia402::new(cia402::Make::default(), &rig));
     let cia402 = Emulator::start(cia402).expect("a pseudo terminal");
     let (site, emulator) = wired("cia402", "timeout_ms = 100, units_per_turn = 4096", cia402);
-    measure("cia402", site, Some(emulator), seconds);
+    measure("cia402", site, Some(emulator), AMPERES, seconds);
+    let vehicle = Rig::from_toml(include_str!("../config/thrusters/t200-vehicle.toml")).expect("a sound rig");
+    let vehicle = ArduSub::new(ardusub::Make::default(), &vehicle);
+    let (site, emulator) =
+        wired("mavlink", "timeout_ms = 510, motor = 3", Emulator::start(vehicle).expect("a pseudo terminal"));
+    let text = std::fs::read_to_string(site.config()).expect("a configuration");
+    let text = text.replace("whitcomb-yoerger-1999", "t200-vehicle");
+    std::fs::write(site.config(), text).expect("a configuration");
+    measure("mavlink", site, Some(emulator), VOLTS, seconds);
 }
 
-fn measure(name: &str, site: Site, emulator: Option<Emulator>, seconds: u64) {
+fn measure(name: &str, site: Site, emulator: Option<Emulator>, stairs: Stairs, seconds: u64) {
     // As it is run: at 1 kHz, with the real-time rights that there are.
     site.add("[thrusters.t1]", "servo = { rate_hz = 1000 }");
     let text = std::fs::read_to_string(site.config()).expect("a configuration");
@@ -61,6 +83,8 @@ fn measure(name: &str, site: Site, emulator: Option<Emulator>, seconds: u64) {
         text.replacen("servo = { rate_hz = 500 }\n", "", 1).replacen("rate_hz = 10,", "rate_hz = 250,", 1);
     std::fs::write(site.config(), text).expect("a configuration");
     let mut bench = Bench::start_at(site);
+    let command = Command { kind: stairs.kind as u32, ..Command::default() };
+    bench.zero = command;
     let mut ticker = Ticker::new(COMMAND_NS);
     let end = Instant::now() + Duration::from_secs(seconds);
     let (mut sent, mut rows): (Vec<(u64, f64)>, Vec<Telemetry>) = (Vec::new(), Vec::new());
@@ -74,9 +98,9 @@ fn measure(name: &str, site: Site, emulator: Option<Emulator>, seconds: u64) {
             bench.ask(RequestKind::ClearFaults);
             armed = bench.ask(RequestKind::Arm).0 == Outcome::Done;
         }
-        let drive = 0.5 + (n % STEPS) as f64 * STEP_A;
+        let drive = stairs.first + (n % STEPS) as f64 * stairs.step;
         let now_ns = monotonic_ns();
-        bench.controller.command.send(Command { drive, ..Command::default() }).expect("sent");
+        bench.controller.command.send(Command { drive, ..command }).expect("sent");
         sent.push((now_ns, drive));
         while let Some(row) = bench.gateway.telemetry.next() {
             armed = row.armed != 0;
@@ -94,14 +118,14 @@ fn measure(name: &str, site: Site, emulator: Option<Emulator>, seconds: u64) {
             rows.iter().map(|row| (row.time_ns + row.timing.lateness_ns, row.signals.current_cmd_a)).collect()
         }
     };
-    print_row(name, "command", latencies(&sent, &arrived));
+    print_row(name, "command", latencies(&sent, &arrived, stairs.step));
     let overruns = rows.last().map_or(0, |row| row.timing.overruns);
     println!("{name:>10}  ticks left out: {overruns} of {}\n", rows.len());
     let _ = bench.servo.kill();
 }
 
 /// For every command that arrived, how long it took. A drive slower than the controller leaves some out.
-fn latencies(sent: &[(u64, f64)], arrived: &[(u64, f64)]) -> Vec<u64> {
+fn latencies(sent: &[(u64, f64)], arrived: &[(u64, f64)], step: f64) -> Vec<u64> {
     let mut took = Vec::new();
     let (mut from, mut last) = (0, f64::NAN);
     for (at_ns, drive) in arrived {
@@ -109,7 +133,7 @@ fn latencies(sent: &[(u64, f64)], arrived: &[(u64, f64)]) -> Vec<u64> {
             continue;
         }
         last = *drive;
-        let same = |(_, sent): &(u64, f64)| (sent - drive).abs() < 0.4 * STEP_A;
+        let same = |(_, sent): &(u64, f64)| (sent - drive).abs() < 0.4 * step;
         if let Some(place) = sent.iter().skip(from).take(STEPS as usize / 2).position(same) {
             from += place;
             took.extend(at_ns.checked_sub(sent[from].0));

@@ -9,6 +9,8 @@ use kort_proto::config::Config;
 use kort_recording::{ColumnMap, Recording};
 use kort_servo::drives::Chosen;
 use kort_thruster::rig::Rig;
+use mavlink::Message;
+use mavlink::dialects::ardupilotmega::MavMessage;
 
 const NAME: &str = "any.input";
 
@@ -22,6 +24,11 @@ const MESSAGES: &str =
 
 /// A rig for the deployments that are read.
 const RIG: &str = include_str!("../config/thrusters/whitcomb-yoerger-1999.toml");
+
+const VEHICLE: &str = include_str!("../config/thrusters/t200-vehicle.toml");
+
+/// What an autopilot says that is listened to.
+const AUTOPILOT: [u32; 11] = [0, 1, 22, 36, 77, 148, 253, 290, 291, 11030, 11031];
 
 /// A recording or a log of others, by its first bytes, plain or gzip, alone and through column maps, and what is in it.
 pub fn recording(bytes: &[u8]) -> Result<Recording, String> {
@@ -71,11 +78,11 @@ pub fn deployment(text: &str) -> Result<(), String> {
 /// What comes in on the wire of each drive: as it is, and as the content of sound frames, in pieces, at every stage of the
 /// conversation.
 pub fn wire(bytes: &[u8]) {
-    let rig = Rig::from_toml(RIG).expect("a sound rig");
     let mut vesc = bytes.to_vec();
     let mut odrive = bytes.to_vec();
     let mut moteus = bytes.to_vec();
     let mut cia402 = bytes.to_vec();
+    let mut mavlink = bytes.to_vec();
     for part in bytes.chunks(40) {
         kort_servo::drives::vesc::frame::frame(part, &mut vesc);
         kort_servo::drives::odrive::text::line(&String::from_utf8_lossy(part), &mut odrive);
@@ -86,12 +93,18 @@ pub fn wire(bytes: &[u8]) {
             cia402.extend(format!("\rt{id}{length}{}\r", hex.get(..2 * length).unwrap_or_default()).bytes());
         }
     }
+    for part in bytes.chunks(60) {
+        for id in AUTOPILOT {
+            vehicle(id, part, &mut mavlink);
+        }
+    }
     for (kind, keys, heard) in [
         ("vesc", "pole_pairs = 7", vesc),
         ("odrive", "", odrive),
         ("moteus", "", moteus),
         ("cia402", "units_per_turn = 4096", cia402),
         ("cia402", "port = \"can0\"\nunits_per_turn = 4096", bytes.to_vec()),
+        ("mavlink", "motor = 1\ntimeout_ms = 510", mavlink),
     ] {
         let port = if keys.contains("port") { "" } else { "port = \"/dev/p\"\n" };
         let text = format!(
@@ -99,6 +112,8 @@ pub fn wire(bytes: &[u8]) {
         );
         let config = Config::parse(&text, None).expect("a sound deployment");
         let thruster = config.thruster("t1").expect("it is there");
+        let rig = if kind == "mavlink" { VEHICLE } else { RIG };
+        let rig = Rig::from_toml(rig).expect("a sound rig");
         let chosen = kort_servo::drives::choose(&config, "t1", thruster, &rig).expect("a sound drive");
         let Chosen::OnWire(_, mut protocol) = chosen else { panic!("{kind} has no wire") };
         let mut out = Vec::new();
@@ -114,6 +129,16 @@ pub fn wire(bytes: &[u8]) {
         }
         assert!(!out.is_empty(), "{kind} says nothing");
     }
+}
+
+/// A frame of an autopilot's with this payload: MAVLink 2, with the message's own check sum.
+fn vehicle(id: u32, payload: &[u8], out: &mut Vec<u8>) {
+    let [a, b, c, _] = id.to_le_bytes();
+    let mut frame = vec![0xfd, payload.len() as u8, 0, 0, 0, 1, 1, a, b, c];
+    frame.extend(payload);
+    let sum = mavlink::calculate_crc(&frame[1..], MavMessage::extra_crc(id));
+    out.extend(frame);
+    out.extend(sum.to_le_bytes());
 }
 
 /// A body or a message of a client; the error is the problem document.

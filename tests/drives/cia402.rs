@@ -9,7 +9,7 @@ use kort_proto::messages::{Command, DriveKind};
 use crate::link::{Case, SILENCE, alone, rig};
 
 fn case() -> Case {
-    Case { kind: "cia402", keys: "units_per_turn = 4096", drive: 4.0, command: Command::default() }
+    Case::new("cia402", "units_per_turn = 4096")
 }
 
 fn cia402(make: Make) -> Emulator {
@@ -100,6 +100,6 @@ fn speed_is_given_to_its_own_loop() {
         let emulator =
             Emulator::start(Adapter::new(Cia402::new(Make::default(), &rig("speed-drive")))).unwrap();
         let command = Command { kind: DriveKind::Speed as u32, ..Command::default() };
-        Case { drive: 30.0, command, ..case() }.follows("speed-drive", &emulator);
+        Case { drive: 30.0, command, rig: "speed-drive", ..case() }.follows(&emulator);
     });
 }

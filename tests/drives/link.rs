@@ -20,8 +20,8 @@ const SLACK: Duration = Duration::from_nanos(2 * PERIOD_NS);
 const LIFE_MS: u64 = 300;
 /// Time-out of the drive in these tests, as long for the same reason.
 const TIMEOUT_MS: u64 = 300;
-/// After it the drive itself takes the torque away; it may look at it every 10 ms only.
-const TIMEOUT: Duration = Duration::from_millis(TIMEOUT_MS + 10);
+/// The rig of most of them, which is driven by current.
+const RIG: &str = "whitcomb-yoerger-1999";
 /// A reading's life, and some exchanges: silence is noticed.
 pub const SILENCE: Duration = Duration::from_millis(LIFE_MS + 30);
 /// `checks.frozen_s`, and an exchange: readings that repeat themselves are noticed.
@@ -57,9 +57,26 @@ pub struct Case {
     pub drive: f64,
     /// The command that carries it.
     pub command: Command,
+    /// The rig it drives.
+    pub rig: &'static str,
+    /// A thrust that the rig reaches well.
+    pub thrust_n: f64,
+    /// Its own time-out.
+    pub timeout_ms: u64,
 }
 
 impl Case {
+    /// A drive that takes current.
+    pub fn new(kind: &'static str, keys: &'static str) -> Self {
+        let command = Command::default();
+        Self { kind, keys, drive: 4.0, command, rig: RIG, thrust_n: 60.0, timeout_ms: TIMEOUT_MS }
+    }
+
+    /// After this the drive itself has taken the torque away; it may look at it every 10 ms only.
+    fn timeout(&self) -> Duration {
+        Duration::from_millis(self.timeout_ms + 10)
+    }
+
     /// A servo on this drive.
     pub fn servo(&self, emulator: &Emulator) -> Bench {
         let mut bench = Bench::start_at(self.site(emulator));
@@ -69,11 +86,20 @@ impl Case {
 
     pub fn site(&self, emulator: &Emulator) -> Site {
         let keys = format!(
-            "port = {:?}, reading_life_ms = {LIFE_MS}, timeout_ms = {TIMEOUT_MS}, {}",
+            "port = {:?}, reading_life_ms = {LIFE_MS}, timeout_ms = {}, {}",
             emulator.port(),
+            self.timeout_ms,
             self.keys
         );
-        Site::new().with_drive(self.kind, &keys)
+        let site = Site::new().with_drive(self.kind, &keys);
+        if self.rig != RIG {
+            // A speed told in whole turns a minute may well repeat itself.
+            let limits = "limits = { full_drive_s = 0.5, speed_rad_s = 500.0 }\nchecks = { frozen_s = 10.0 }";
+            let config = std::fs::read_to_string(site.config()).unwrap();
+            let config = config.replace(RIG, self.rig).replace("limits = { full_drive_s = 0.005 }", limits);
+            std::fs::write(site.config(), config).unwrap();
+        }
+        site
     }
 
     fn driving(&self) -> Command {
@@ -82,17 +108,17 @@ impl Case {
 
     /// The whole service: lease, arm, a thrust, a recording whose columns tell what is true.
     pub fn serves(&self, emulator: &Emulator) {
-        const THRUST_N: f64 = 60.0;
+        let thrust_n = self.thrust_n;
         let mut stack = Stack::start_at(self.site(emulator));
         let recordings = "/v1/recordings";
         let agent: ureq::Agent = ureq::Agent::config_builder().http_status_as_error(false).build().into();
         let url = format!("http://127.0.0.1:{}{recordings}", stack.site.port);
         let started = agent.post(&url).send_json(json!({"name": self.kind, "rate_hz": 500})).unwrap();
         assert_eq!(started.status(), 201);
-        stack.command(THRUST_N, 60_000);
+        stack.command(thrust_n, 60_000);
         wait("the thrust", || {
             let truth = emulator.truth();
-            ((truth.thrust_n - THRUST_N).abs() < 0.2 * THRUST_N).then_some(())
+            ((truth.thrust_n - thrust_n).abs() < 0.2 * thrust_n).then_some(())
         });
         std::thread::sleep(Duration::from_secs(2));
         let (truth, state) = (emulator.truth(), stack.state().expect("a state"));
@@ -209,7 +235,7 @@ impl Case {
             (Mischief::Truncated, lost, SILENCE),
             (Mischief::Flipped, flipped, SILENCE),
             (Mischief::Stale, stale, frozen),
-            (Mischief::Unplugged, lost, TIMEOUT),
+            (Mischief::Unplugged, lost, self.timeout()),
         ] {
             println!("{mischief:?}");
             self.ends_at_zero(
@@ -249,21 +275,14 @@ impl Case {
     }
 
     /// It reaches the drive asked for, on a rig of another kind; a machine that stands still trips it: then once more.
-    pub fn follows(&self, rig: &str, emulator: &Emulator) {
-        let site = self.site(emulator);
-        let config = std::fs::read_to_string(site.config()).unwrap();
-        let config = config
-            .replace("whitcomb-yoerger-1999", rig)
-            .replace("{ full_drive_s = 0.005 }", "{ full_drive_s = 0.5, speed_rad_s = 500.0 }");
-        std::fs::write(site.config(), config).unwrap();
-        let mut bench = Bench::start_at(site);
-        bench.zero = self.command;
+    pub fn follows(&self, emulator: &Emulator) {
+        let mut bench = self.servo(emulator);
         let there = (0..6).any(|_| {
             self.turn(&mut bench, emulator);
             self.drive_for(&mut bench, 500);
             (emulator.truth().command - self.drive).abs() < 0.01 * self.drive
         });
-        assert!(there, "{rig}: {:?}", emulator.truth());
+        assert!(there, "{}: {:?}", self.rig, emulator.truth());
     }
 
     /// A servo that is killed or stands still: the drive's own time-out ends it.
@@ -276,7 +295,8 @@ impl Case {
             wait("zero at the motor", || (emulator.truth().command == 0.0).then_some(()));
             let took = emulator.driven().expect("it drove").saturating_duration_since(began);
             println!("{} SIG{signal}: zero at the motor after {} ms", self.kind, took.as_millis());
-            assert!(took <= TIMEOUT + SLACK, "SIG{signal}: {took:?} beyond {TIMEOUT:?}");
+            let bound = self.timeout();
+            assert!(took <= bound + SLACK, "SIG{signal}: {took:?} beyond {bound:?}");
             kill(bench.servo.id(), "KILL");
         }
     }

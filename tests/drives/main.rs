@@ -6,6 +6,7 @@ mod cia402;
 #[path = "../common/mod.rs"]
 mod common;
 mod link;
+mod mavlink;
 mod moteus;
 mod odrive;
 mod sensors;

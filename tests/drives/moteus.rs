@@ -3,12 +3,11 @@
 use kort_emulators::moteus::Make;
 use kort_emulators::{Bench as Emulator, Mischief, Moteus};
 use kort_proto::faults::Fault;
-use kort_proto::messages::Command;
 
 use crate::link::{Case, SILENCE, alone, rig};
 
 fn case() -> Case {
-    Case { kind: "moteus", keys: "", drive: 4.0, command: Command::default() }
+    Case::new("moteus", "")
 }
 
 fn moteus(make: Make) -> Emulator {

@@ -2,12 +2,11 @@
 
 use kort_emulators::{Bench as Emulator, Mischief, ODrive};
 use kort_proto::faults::Fault;
-use kort_proto::messages::Command;
 
 use crate::link::{Case, FROZEN, alone, rig};
 
 fn case() -> Case {
-    Case { kind: "odrive", keys: "", drive: 4.0, command: Command::default() }
+    Case::new("odrive", "")
 }
 
 fn odrive(read_only: bool) -> Emulator {

@@ -11,7 +11,7 @@ use crate::common::Stack;
 use crate::link::{Case, FROZEN, SILENCE, alone, rig};
 
 fn case() -> Case {
-    Case { kind: "vesc", keys: "pole_pairs = 7", drive: 4.0, command: Command::default() }
+    Case::new("vesc", "pole_pairs = 7")
 }
 
 fn vesc(make: Make) -> Emulator {
@@ -84,7 +84,7 @@ fn volts_are_given_as_duty_and_speed_to_its_own_loop() {
         {
             let emulator = Emulator::start(Vesc::new(Make::default(), &rig(name))).unwrap();
             let command = Command { kind: kind as u32, ..Command::default() };
-            Case { drive, command, ..case() }.follows(name, &emulator);
+            Case { drive, command, rig: name, ..case() }.follows(&emulator);
         }
     });
 }

@@ -1,4 +1,4 @@
-//! Any device on a pseudo terminal, served by a thread, with a wire that can be spoiled.
+//! Any device on a pseudo terminal or behind UDP, served by a thread, with a wire that can be spoiled.
 
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use kort_proto::transport::{monotonic_ns, realtime};
 
-use crate::pty::Pty;
+use crate::far::Far;
 
 /// How often the device lives.
 const STEP: Duration = Duration::from_micros(500);
@@ -89,7 +89,9 @@ struct Shared {
 
 /// A device, running.
 pub struct Bench {
-    folder: tempfile::TempDir,
+    /// Holds the name of its port.
+    _folder: tempfile::TempDir,
+    port: PathBuf,
     shared: Arc<Mutex<Shared>>,
     thread: Option<JoinHandle<()>>,
 }
@@ -101,19 +103,30 @@ impl Bench {
     /// No pseudo terminal is to be had.
     pub fn start(device: impl Device + 'static) -> std::io::Result<Self> {
         let folder = tempfile::tempdir()?;
-        let shared = Arc::new(Mutex::new(Shared::default()));
         let link = folder.path().join(PORT);
-        let pty = Pty::new(&link)?;
-        let theirs = Arc::clone(&shared);
+        Self::start_on(device, folder, Far::terminal(&link)?)
+    }
+
+    /// The same behind UDP: an endpoint that waits for a client.
+    ///
+    /// # Errors
+    /// No socket is to be had.
+    pub fn start_udp(device: impl Device + 'static) -> std::io::Result<Self> {
+        Self::start_on(device, tempfile::tempdir()?, Far::endpoint()?)
+    }
+
+    fn start_on(device: impl Device + 'static, folder: tempfile::TempDir, far: Far) -> std::io::Result<Self> {
+        let shared = Arc::new(Mutex::new(Shared::default()));
+        let (theirs, port) = (Arc::clone(&shared), far.name());
         let thread = std::thread::Builder::new()
             .name("emulator".into())
-            .spawn(move || Serving { device, link, shared: theirs, last: Vec::new(), dice: 1 }.run(pty))?;
-        Ok(Self { folder, shared, thread: Some(thread) })
+            .spawn(move || Serving { device, shared: theirs, last: Vec::new(), dice: 1 }.run(far))?;
+        Ok(Self { _folder: folder, port, shared, thread: Some(thread) })
     }
 
     /// The device's name, which stays when it is plugged in again.
     pub fn port(&self) -> PathBuf {
-        self.folder.path().join(PORT)
+        self.port.clone()
     }
 
     /// Spoils the wire from now on, or mends it.
@@ -167,7 +180,6 @@ impl Drop for Bench {
 
 struct Serving<D> {
     device: D,
-    link: PathBuf,
     shared: Arc<Mutex<Shared>>,
     /// The last frame sent unspoiled.
     last: Vec<u8>,
@@ -175,16 +187,12 @@ struct Serving<D> {
 }
 
 impl<D: Device> Serving<D> {
-    fn run(mut self, pty: Pty) {
+    fn run(mut self, mut far: Far) {
         // A real device waits for no scheduler; where this is not permitted it is as late as the machine is busy.
         let _ = realtime(PRIORITY, false);
         let began = Instant::now();
-        let mut pty = Some(pty);
         loop {
-            match &pty {
-                Some(pty) => pty.wait(STEP),
-                None => std::thread::sleep(STEP),
-            }
+            far.wait(STEP);
             let heard_ns = monotonic_ns();
             let now_s = began.elapsed().as_secs_f64();
             let (mischief, restart, report) = {
@@ -200,20 +208,12 @@ impl<D: Device> Serving<D> {
             if let Some(code) = report {
                 self.device.report(code);
             }
-            if mischief == Mischief::Unplugged {
-                if pty.take().is_some() {
-                    let _ = std::fs::remove_file(&self.link);
-                }
-            } else if pty.is_none() {
-                pty = Pty::new(&self.link).ok();
-            }
-            let bytes = pty.as_ref().map(Pty::read).unwrap_or_default();
+            far.plug(mischief != Mischief::Unplugged);
+            let bytes = far.read();
             let mut said = self.device.hear(now_s, &bytes);
             said.extend(self.device.live(now_s));
-            if let Some(pty) = &pty {
-                for frame in said {
-                    self.send(pty, frame, mischief);
-                }
+            for frame in said {
+                self.send(&far, frame, mischief);
             }
             let mut shared = self.shared.lock().unwrap_or_else(PoisonError::into_inner);
             let before = std::mem::replace(&mut shared.truth, self.device.truth());
@@ -228,7 +228,7 @@ impl<D: Device> Serving<D> {
         }
     }
 
-    fn send(&mut self, pty: &Pty, mut frame: Vec<u8>, mischief: Mischief) {
+    fn send(&mut self, far: &Far, mut frame: Vec<u8>, mischief: Mischief) {
         match mischief {
             Mischief::Unplugged | Mischief::Silent => return,
             Mischief::Garbage => frame.iter_mut().for_each(|byte| *byte = self.dice()),
@@ -239,19 +239,19 @@ impl<D: Device> Serving<D> {
                 frame.iter_mut().skip(first).step_by(8).for_each(|byte| *byte ^= 1);
             }
             Mischief::Stale => frame.clone_from(&self.last),
-            Mischief::Noisy => pty.write(&[self.dice() | 0x80, self.dice() | 0x80]),
+            Mischief::Noisy => far.write(&[self.dice() | 0x80, self.dice() | 0x80]),
             Mischief::None | Mischief::Split => self.last.clone_from(&frame),
         }
         if mischief == Mischief::Split {
             let mut rest = frame.as_slice();
             while !rest.is_empty() {
                 let (piece, after) = rest.split_at((1 + usize::from(self.dice() % 16)).min(rest.len()));
-                pty.write(piece);
+                far.write(piece);
                 std::thread::sleep(Duration::from_micros(100));
                 rest = after;
             }
         } else {
-            pty.write(&frame);
+            far.write(&frame);
         }
     }
 

@@ -1,4 +1,4 @@
-//! Drives and instruments on pseudo terminals, for tests.
+//! Drives and instruments on pseudo terminals, or behind UDP, for tests.
 //!
 //! Each is written from the protocol's public description and shares no code with kort's drivers: its framing, its check sums
 //! and its text are its own. Behind each a simulated thruster turns in real time, with the drive's own limits, quantisation and
@@ -7,9 +7,12 @@
 //! What an emulator cannot show: the timing of USB and of a real UART (bytes arrive at once), a real power stage, and
 //! whatever a firmware does that its description does not say.
 
+pub mod ardusub;
 mod bench;
 mod canopen;
 pub mod cia402;
+mod far;
+mod mavlink;
 pub mod moteus;
 pub mod odrive;
 mod printer;
@@ -18,6 +21,7 @@ pub mod slcan;
 mod stand;
 pub mod vesc;
 
+pub use ardusub::ArduSub;
 pub use bench::{Bench, Device, Mischief, Truth};
 pub use cia402::Cia402;
 pub use moteus::Moteus;

@@ -3,7 +3,7 @@
 
 use std::time::{Duration, Instant};
 
-use kort_emulators::{Adapter, Bench, Cia402, Moteus, ODrive, Vesc, cia402, moteus, vesc};
+use kort_emulators::{Adapter, ArduSub, Bench, Cia402, Moteus, ODrive, Vesc, ardusub, cia402, moteus, vesc};
 use kort_proto::config::Config;
 use kort_proto::faults::Fault;
 use kort_proto::transport::monotonic_ns;
@@ -23,7 +23,7 @@ struct Loop {
 impl Loop {
     fn new(kind: &str, keys: &str, emulator: Bench, rig: &Rig) -> Self {
         let drive = format!(
-            "\"{kind}\"\ndrive = {{ port = {:?}, reading_life_ms = 300, timeout_ms = 300, {keys} }}",
+            "\"{kind}\"\ndrive = {{ port = {:?}, reading_life_ms = 300, timeout_ms = 510, {keys} }}",
             emulator.port()
         );
         let text = include_str!("../../../config/kort.toml")
@@ -59,14 +59,19 @@ fn a_drives_own_fault_ends_with_it_and_with_a_reset() {
     let odrive = Bench::start(ODrive::new(&rig, false)).unwrap();
     let moteus = Bench::start(Moteus::new(moteus::Make::default(), &rig)).unwrap();
     let cia402 = Bench::start(Adapter::new(Cia402::new(cia402::Make::default(), &rig))).unwrap();
+    let vehicle = Rig::from_toml(include_str!("../../../config/thrusters/t200-vehicle.toml")).unwrap();
+    let quick = ardusub::Make { cool_down_s: 0.0, ..Default::default() };
+    let mavlink = Bench::start(ArduSub::new(quick, &vehicle)).unwrap();
     let own = |faults: u64| faults & Fault::AmplifierFault.bit() != 0;
     for (kind, keys, emulator, code) in [
         ("vesc", "pole_pairs = 7", vesc, 4),
         ("odrive", "baud = 115200", odrive, 0x40),
         ("moteus", "address = 1", moteus, 33),
         ("cia402", "units_per_turn = 4096", cia402, 0x4310),
+        ("mavlink", "motor = 3", mavlink, 9),
     ] {
-        let mut servo = Loop::new(kind, keys, emulator, &rig);
+        let rig = if kind == "mavlink" { &vehicle } else { &rig };
+        let mut servo = Loop::new(kind, keys, emulator, rig);
         servo.until(&format!("{kind} to be ready"), |now, _| now == 0);
         servo.emulator.report(code);
         servo.until(&format!("the fault of {kind}"), |_, seen| own(seen));

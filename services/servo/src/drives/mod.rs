@@ -2,6 +2,7 @@
 
 pub mod cia402;
 mod lying;
+pub mod mavlink;
 pub mod moteus;
 pub mod odrive;
 pub mod simulated;
@@ -16,6 +17,7 @@ use crate::devices::{At, Shown};
 use crate::link::Protocol;
 
 use cia402::Cia402;
+use mavlink::Mavlink;
 use moteus::Moteus;
 use odrive::ODrive;
 pub use simulated::Simulated;
@@ -47,7 +49,7 @@ pub enum Chosen {
 }
 
 /// Names of the drives, as `amplifier` gives them.
-pub const ALL: [&str; 5] = ["simulated", "vesc", "odrive", "moteus", "cia402"];
+pub const ALL: [&str; 6] = ["simulated", "vesc", "odrive", "moteus", "cia402", "mavlink"];
 
 /// Reads what the configuration says of the drive.
 ///
@@ -71,6 +73,10 @@ pub fn choose(config: &Config, id: &str, thruster: &Thruster, rig: &Rig) -> Resu
         "cia402" => {
             let drive = Cia402::new(config, id, thruster, rig)?;
             Ok(Chosen::OnWire(drive.wired.clone(), Box::new(cia402::Protocol::new(drive))))
+        }
+        "mavlink" => {
+            let drive = Mavlink::new(config, id, thruster, rig)?;
+            Ok(Chosen::OnWire(drive.wired.clone(), Box::new(mavlink::Protocol::new(drive))))
         }
         other => Err(config.error(format!(
             "`thrusters.{id}.amplifier` = \"{other}\" is no drive\nhint: known are \"{}\"",

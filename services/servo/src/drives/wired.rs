@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use kort_proto::config::{Config, ConfigError, Thruster};
 use serde::Deserialize;
 
+use crate::link::Medium;
+
 /// Section `drive` as written.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -21,6 +23,7 @@ struct Keys {
     bitrate: Option<u32>,
     units_per_turn: Option<f64>,
     speed_units: Option<f64>,
+    motor: Option<u32>,
 }
 
 impl Default for Keys {
@@ -38,12 +41,13 @@ impl Default for Keys {
             bitrate: None,
             units_per_turn: None,
             speed_units: None,
+            motor: None,
         }
     }
 }
 
 /// Keys that only some drives have: why another has none, and what to do.
-const OWN: [(&str, &str, &str); 6] = [
+const OWN: [(&str, &str, &str); 7] = [
     ("pole_pairs", "this drive tells the speed of the shaft itself", "leave the key out"),
     ("address", "this drive is alone on its wire", "leave the key out"),
     (
@@ -54,15 +58,16 @@ const OWN: [(&str, &str, &str); 6] = [
     ("bitrate", "this drive is on no CAN adapter", "leave the key out; `baud` is a serial port's"),
     ("units_per_turn", "this drive tells angles in turns", "leave the key out"),
     ("speed_units", "this drive tells speed in a unit that kort knows", "leave the key out"),
+    ("motor", "this drive has one motor", "leave the key out"),
 ];
 
 /// A drive on a wire, as the configuration describes it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Wired {
-    /// The device.
+    /// The device, as it is written.
     pub port: PathBuf,
-    /// Bits a second; an USB device takes any.
-    pub baud: u32,
+    /// What that is: a serial port, unless the drive knows better.
+    pub medium: Medium,
     /// Exchanges a second: a command, and a question for the measurements.
     pub rate_hz: f64,
     /// Longest time-out of the drive itself that is accepted, and the one it is given, s.
@@ -83,8 +88,8 @@ pub struct Wired {
     pub units_per_turn: Option<f64>,
     /// Velocity units at a turn a second, likewise.
     pub speed_units: Option<f64>,
-    /// The port is a CAN interface of the system, and this the drive's node there.
-    pub can_node: Option<u8>,
+    /// Number of the motor, for drives that have several.
+    pub motor: Option<u32>,
 }
 
 impl Wired {
@@ -143,8 +148,8 @@ impl Wired {
             }
         }
         Ok(Self {
+            medium: Medium::Serial { port: keys.port.clone(), baud: keys.baud },
             port: keys.port,
-            baud: keys.baud,
             rate_hz: keys.rate_hz,
             timeout_s: keys.timeout_ms * 1e-3,
             reading_life_ns: (keys.reading_life_ms * 1e6) as u64,
@@ -155,7 +160,7 @@ impl Wired {
             bitrate: keys.bitrate,
             units_per_turn: keys.units_per_turn,
             speed_units: keys.speed_units,
-            can_node: None,
+            motor: keys.motor,
         })
     }
 
@@ -164,9 +169,7 @@ impl Wired {
     pub fn wire(self, id: &str, priority: i32) -> crate::link::Wire {
         crate::link::Wire {
             name: format!("drive of {id}"),
-            port: self.port,
-            baud: self.baud,
-            can_node: self.can_node,
+            medium: self.medium,
             rate_hz: self.rate_hz,
             reading_life_ns: self.reading_life_ns,
             priority,

@@ -15,11 +15,62 @@ mod thread;
 #[cfg(feature = "process")]
 mod wire;
 
+use std::fmt;
+use std::net::SocketAddr;
+use std::path::PathBuf;
+
 use kort_proto::signals::Signals;
 
 pub use lines::Lines;
 #[cfg(feature = "process")]
 pub use wire::{Link, Wire};
+
+/// What leads to a device.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Medium {
+    /// A serial port or an USB device that looks like one.
+    Serial {
+        /// The device.
+        port: PathBuf,
+        /// Bits a second; an USB device takes any.
+        baud: u32,
+    },
+    /// A CAN interface of the system.
+    Can {
+        /// Its name.
+        interface: PathBuf,
+        /// The device's node there; what others say is left out.
+        node: u8,
+    },
+    /// An address that is spoken to first, by UDP.
+    Udp(SocketAddr),
+}
+
+impl Medium {
+    /// What to look for when it cannot be opened.
+    pub fn hint(&self) -> String {
+        match self {
+            Self::Serial { .. } => {
+                "is it plugged in, powered, free, and may this user read and write it?".into()
+            }
+            Self::Can { interface, .. } => format!(
+                "is it there and up? as root: ip link set {} up type can bitrate 1000000",
+                interface.display()
+            ),
+            Self::Udp(_) => "is it reached (ping), and does an endpoint wait for clients there?".into(),
+        }
+    }
+}
+
+impl fmt::Display for Medium {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Self::Serial { port, .. } => port.display().fmt(f),
+            Self::Can { interface, .. } => interface.display().fmt(f),
+            Self::Udp(address) => write!(f, "udp:{address}"),
+        }
+    }
+}
 
 /// What a protocol heard.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,10 +1,11 @@
-//! A serial port, raw and exclusive, or a CAN interface of the system: never waited for.
+//! A serial port, raw and exclusive, a CAN interface of the system, or an address by UDP: never waited for.
 //!
 //! `rustix` rather than the `serialport` crate: one `poll` over the port and the tick's wake-up needs
 //! the descriptor non-blocking, which `serialport` hides behind a time-out of its own. The crate `socketcan` opens and filters
 //! the CAN socket; frames are read and written as the kernel's records ([`super::can`]).
 
 use std::io;
+use std::net::{SocketAddr, UdpSocket};
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
 use std::path::Path;
 
@@ -15,6 +16,7 @@ use rustix::termios::{
 };
 use socketcan::{CanFilter, CanSocket, Socket, SocketOptions};
 
+use super::Medium;
 use super::can::RECORD;
 
 /// Bytes that may wait to be sent; one exchange is some tens.
@@ -26,6 +28,7 @@ const NODE: u32 = 0x7f;
 enum Device {
     Serial(OwnedFd),
     Can(CanSocket),
+    Udp(UdpSocket),
 }
 
 /// An open port.
@@ -35,11 +38,21 @@ pub struct Port {
 }
 
 impl Port {
-    /// Opens a device as 8N1 without flow control, at `baud` (an USB device takes any), for this process alone.
+    /// Opens what leads to the device.
     ///
     /// # Errors
-    /// What the system says: no such device, no permission, busy, not a terminal, a rate it does not know.
-    pub fn open(path: &Path, baud: u32) -> io::Result<Self> {
+    /// What the system says.
+    pub fn open(medium: &Medium) -> io::Result<Self> {
+        match medium {
+            Medium::Serial { port, baud } => Self::open_serial(port, *baud),
+            Medium::Can { interface, node } => Self::open_can(interface, *node),
+            Medium::Udp(address) => Self::open_udp(*address),
+        }
+    }
+
+    /// Opens a device as 8N1 without flow control, at `baud` (an USB device takes any), for this process alone. Errors: no such device,
+    /// no permission, busy, not a terminal, a rate it does not know.
+    fn open_serial(path: &Path, baud: u32) -> io::Result<Self> {
         let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
         let descriptor = open(path, flags, Mode::empty())?;
         ioctl_tiocexcl(&descriptor)?;
@@ -54,11 +67,9 @@ impl Port {
         Ok(Self { device: Device::Serial(descriptor), waiting: Vec::with_capacity(WAITING_MAX) })
     }
 
-    /// Opens a CAN interface by its name; of what others say on the bus, only frames of this node come in.
-    ///
-    /// # Errors
-    /// What the system says: no such interface, it is down, the kernel has no CAN.
-    pub fn open_can(interface: &Path, node: u8) -> io::Result<Self> {
+    /// Opens a CAN interface by its name; of what others say on the bus, only frames of this node come in. Errors: no such
+    /// interface, it is down, the kernel has no CAN.
+    fn open_can(interface: &Path, node: u8) -> io::Result<Self> {
         let socket = CanSocket::open(&interface.to_string_lossy())?;
         socket.set_filters(&[CanFilter::new(u32::from(node), NODE)])?;
         Self::on_can(socket)
@@ -69,12 +80,23 @@ impl Port {
         Ok(Self { device: Device::Can(socket), waiting: Vec::with_capacity(WAITING_MAX) })
     }
 
+    /// Speaks to an address and hears nobody else. Where nobody listens the answer to the first word is an error.
+    fn open_udp(address: SocketAddr) -> io::Result<Self> {
+        let any = if address.is_ipv4() { "0.0.0.0:0" } else { "[::]:0" };
+        let socket = UdpSocket::bind(any)?;
+        socket.connect(address)?;
+        socket.set_nonblocking(true)?;
+        Ok(Self { device: Device::Udp(socket), waiting: Vec::with_capacity(WAITING_MAX) })
+    }
+
     /// Reads what is there; zero if nothing is.
     ///
     /// # Errors
     /// The device is gone.
     pub fn read(&self, into: &mut [u8]) -> io::Result<usize> {
         match rustix::io::read(self, into) {
+            // An empty datagram is nothing.
+            Ok(0) if matches!(self.device, Device::Udp(_)) => Ok(0),
             Ok(0) => Err(io::Error::new(io::ErrorKind::UnexpectedEof, "the device hung up")),
             Ok(n) => Ok(n),
             Err(Errno::AGAIN | Errno::INTR) => Ok(0),
@@ -117,6 +139,7 @@ impl AsFd for Port {
         match &self.device {
             Device::Serial(descriptor) => descriptor.as_fd(),
             Device::Can(socket) => socket.as_fd(),
+            Device::Udp(socket) => socket.as_fd(),
         }
     }
 }

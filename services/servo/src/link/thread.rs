@@ -75,20 +75,10 @@ impl Serving {
             ordinary();
         }
         while !self.ending.load(Ordering::Relaxed) {
-            let done = match self.wire.can_node {
-                Some(node) => Port::open_can(&self.wire.port, node),
-                None => Port::open(&self.wire.port, self.wire.baud),
-            };
-            let done = done.and_then(|mut port| self.serve(&mut port));
+            let done = Port::open(&self.wire.medium).and_then(|mut port| self.serve(&mut port));
             if let Err(error) = done {
-                let port = self.wire.port.display();
-                let hint = match self.wire.can_node {
-                    Some(_) => {
-                        format!("is it there and up? as root: ip link set {port} up type can bitrate 1000000")
-                    }
-                    None => "is it plugged in, powered, free, and may this user read and write it?".into(),
-                };
-                self.complain(format!("{port}: {error}\nhint: {hint}"));
+                let medium = &self.wire.medium;
+                self.complain(format!("{medium}: {error}\nhint: {}", medium.hint()));
                 self.lost();
                 std::thread::sleep(AGAIN);
             }
@@ -115,7 +105,8 @@ impl Serving {
 
     /// Talks until the port is lost or the servo ends.
     fn serve(&mut self, port: &mut Port) -> io::Result<()> {
-        let mut bytes = [0; 1024];
+        // A datagram, as long as a network carries, is read whole.
+        let mut bytes = [0; 2048];
         let mut out = Vec::with_capacity(1024);
         let period = Duration::from_secs_f64(1.0 / self.wire.rate_hz);
         let (mut next, mut ask_next) = (Instant::now(), Instant::now());

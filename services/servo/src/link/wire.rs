@@ -1,7 +1,6 @@
 //! The tick's end of a wire.
 
 use std::os::fd::OwnedFd;
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
@@ -12,7 +11,7 @@ use kort_proto::signals::Signals;
 use rustix::event::{EventfdFlags, eventfd};
 use triple_buffer::{Input, Output, triple_buffer};
 
-use super::{Protocol, thread};
+use super::{Medium, Protocol, thread};
 use crate::devices::{At, Reading, Shown};
 use crate::drives::Drive;
 use crate::sensors::Source;
@@ -26,12 +25,8 @@ const PATIENCE: Duration = Duration::from_secs(1);
 pub struct Wire {
     /// For the log, for example "drive of t1".
     pub name: String,
-    /// The device.
-    pub port: PathBuf,
-    /// Bits a second.
-    pub baud: u32,
-    /// The port is a CAN interface of the system, and this the device's node there.
-    pub can_node: Option<u8>,
+    /// What leads there.
+    pub medium: Medium,
     /// Exchanges a second.
     pub rate_hz: f64,
     /// How long a reading stands, ns.

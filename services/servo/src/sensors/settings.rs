@@ -252,15 +252,13 @@ impl Chosen {
     /// # Errors
     /// No thread or no descriptor is to be had. An instrument that is not there is a fault, not an error.
     pub fn start(self, id: &str, priority: i32) -> std::io::Result<super::Sensor> {
-        use crate::link::{Link, Wire};
+        use crate::link::{Link, Medium, Wire};
         let name = format!("sensor {} of {id}", self.name);
         let source: Box<dyn super::Source> = match self.kind {
             Kind::SerialLine(line) => {
                 let wire = Wire {
                     name,
-                    port: line.port.clone(),
-                    baud: line.baud,
-                    can_node: None,
+                    medium: Medium::Serial { port: line.port.clone(), baud: line.baud },
                     rate_hz: line.rate_hz,
                     reading_life_ns: self.life_ns,
                     priority,

@@ -40,6 +40,7 @@ use kort_thruster::rig::Rig;
 pub use protocol::Protocol;
 
 use super::{Wired, current_or_speed};
+use crate::link::Medium;
 use crate::link::can::Carrier;
 
 /// Highest node of a drive; beyond it are kort's own.
@@ -142,7 +143,9 @@ impl Cia402 {
                 ),
             );
         }
-        wired.can_node = on_interface.then_some(node);
+        if on_interface {
+            wired.medium = Medium::Can { interface: wired.port.clone(), node };
+        }
         let carrier = if on_interface { Carrier::Socket } else { Carrier::Slcan };
         Ok(Self { wired, kind, node, carrier, bitrate: digit, units_per_turn, speed_units })
     }
@@ -181,11 +184,12 @@ mod tests {
 
     #[test]
     fn a_port_without_a_folder_is_an_interface() {
-        for (port, can_node) in [("can0", Some(7)), ("/dev/ttyACM0", None)] {
+        for (port, node) in [("can0", Some(7)), ("/dev/ttyACM0", None)] {
             let Ok(Chosen::OnWire(wired, _)) = chosen(&format!("port = \"{port}\"\naddress = 7")) else {
                 panic!("{port}")
             };
-            assert_eq!(wired.can_node, can_node);
+            let found = if let Medium::Can { node, .. } = wired.medium { Some(node) } else { None };
+            assert_eq!(found, node);
         }
     }
 
