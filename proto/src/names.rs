@@ -53,7 +53,8 @@ impl Stream {
     pub const fn depth(self) -> usize {
         match self {
             Self::Setpoint | Self::Command | Self::Tick => 1,
-            Self::ControllerState => 64,
+            // Whoever reads it wants the newest.
+            Self::ControllerState => 16,
             Self::Telemetry => 1024,
             Self::Request | Self::Reply => 16,
         }

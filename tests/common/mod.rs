@@ -167,7 +167,7 @@ pub struct Stack {
     pub site: Site,
     pub supervisor: Child,
     thruster: &'static str,
-    leases: std::collections::BTreeMap<&'static str, String>,
+    pub leases: std::collections::BTreeMap<&'static str, String>,
 }
 
 impl Stack {

@@ -18,6 +18,9 @@ use crate::names::Stream;
 /// yet, and guests such as a benchmark.
 const MAX_PORTS: usize = 8;
 const MAX_NODES: usize = 24;
+/// Readers of the two streams whose samples are large or many: gateway, supervisor, controller, as many again that were killed. A
+/// sender has room for all that all of them may hold, so each costs megabytes.
+const MAX_READERS: usize = 6;
 
 type PubSub<T> = publish_subscribe::PortFactory<ipc::Service, T, ()>;
 
@@ -30,6 +33,14 @@ pub struct Services {
     _request: PubSub<Request>,
     _reply: PubSub<Reply>,
     _tick: event::PortFactory<ipc::Service>,
+}
+
+/// Receivers that a stream may have at once.
+const fn readers(stream: Stream) -> usize {
+    match stream {
+        Stream::Telemetry | Stream::ControllerState => MAX_READERS,
+        _ => MAX_PORTS,
+    }
 }
 
 fn service_name(stream: Stream, thruster: &str, generation: u64) -> Result<ServiceName, TransportError> {
@@ -56,7 +67,7 @@ pub fn create_services(
         node.service_builder(&name)
             .publish_subscribe::<T>()
             .max_publishers(MAX_PORTS)
-            .max_subscribers(MAX_PORTS)
+            .max_subscribers(readers(stream))
             .max_nodes(MAX_NODES)
             .enable_safe_overflow(true)
             .history_size(0)
@@ -112,7 +123,7 @@ impl Opener<'_> {
 
     fn outbox<T: Message + ZeroCopySend>(&self, stream: Stream) -> Result<Outbox<T>, TransportError> {
         // A sample for each place in each receiver's queue, and those in hand.
-        room::room_for((size_of::<T>() * MAX_PORTS * (stream.depth() + 4)) as u64)?;
+        room::room_for((size_of::<T>() * readers(stream) * (stream.depth() + 4)) as u64)?;
         let publisher = self
             .open::<T>(stream)?
             .publisher_builder()

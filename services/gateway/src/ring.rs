@@ -19,6 +19,26 @@ const QUEUE: usize = 2048;
 /// A row: the servo's time on CLOCK_MONOTONIC, ns, and every signal.
 pub type Row = (u64, Signals);
 
+/// A row as it is kept, in two thirds of the room. Seven digits are more than any sensor has, but for the angle, which grows with every turn.
+#[derive(Clone, Copy)]
+struct Kept {
+    time_ns: u64,
+    shaft_angle_rad: f64,
+    values: [f32; Signals::COUNT],
+}
+
+impl Kept {
+    fn new((time_ns, signals): &Row) -> Self {
+        let values = signals.values().map(|value| value as f32);
+        Self { time_ns: *time_ns, shaft_angle_rad: signals.shaft_angle_rad, values }
+    }
+
+    fn row(&self) -> Row {
+        let signals = Signals::from_values(self.values.map(f64::from));
+        (self.time_ns, Signals { shaft_angle_rad: self.shaft_angle_rad, ..signals })
+    }
+}
+
 /// What the ring's thread is given.
 enum Item {
     Row(Row),
@@ -71,23 +91,24 @@ impl Ring {
 }
 
 fn keep(inbox: &Receiver<Item>, most: usize, span_ns: u64) {
-    let mut rows: VecDeque<Row> = VecDeque::with_capacity(most);
+    let mut rows: VecDeque<Kept> = VecDeque::with_capacity(most);
     while let Ok(item) = inbox.recv() {
         match item {
             Item::Row(row) => {
                 // A servo on another clock than the one before: what was kept has no place beside it.
-                if rows.back().is_some_and(|(last_ns, _)| row.0 <= *last_ns) {
+                if rows.back().is_some_and(|last| row.0 <= last.time_ns) {
                     rows.clear();
                 }
-                while rows.len() >= most || rows.front().is_some_and(|(at, _)| row.0 - at > span_ns) {
+                while rows.len() >= most || rows.front().is_some_and(|first| row.0 - first.time_ns > span_ns)
+                {
                     rows.pop_front();
                 }
-                rows.push_back(row);
+                rows.push_back(Kept::new(&row));
             }
             Item::Take(time_ns, answer) => {
-                let from_ns = rows.back().map_or(0, |(last_ns, _)| last_ns.saturating_sub(time_ns));
-                let first = rows.partition_point(|(at, _)| *at < from_ns);
-                let _ = answer.send(rows.range(first..).copied().collect());
+                let from_ns = rows.back().map_or(0, |last| last.time_ns.saturating_sub(time_ns));
+                let first = rows.partition_point(|kept| kept.time_ns < from_ns);
+                let _ = answer.send(rows.range(first..).map(Kept::row).collect());
             }
         }
     }
@@ -96,6 +117,15 @@ fn keep(inbox: &Receiver<Item>, most: usize, span_ns: u64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_kept_row_is_the_row_but_for_what_no_sensor_sees() {
+        let told = Signals { shaft_angle_rad: 123_456_789.012_3, current_a: 3.217_9, ..Signals::UNKNOWN };
+        let (time_ns, signals) = Kept::new(&(7, told)).row();
+        assert_eq!((time_ns, signals.shaft_angle_rad), (7, told.shaft_angle_rad));
+        assert!((signals.current_a - told.current_a).abs() < 1e-6 && signals.thrust_n.is_nan());
+        assert!(size_of::<Kept>() * 3 < size_of::<Row>() * 2, "{}", size_of::<Kept>());
+    }
 
     #[tokio::test]
     async fn the_last_minutes_are_kept_and_no_more() {
