@@ -1,6 +1,8 @@
 //! Logs of others: `kort columns` says what is in them, and `--columns` brings them in. Logs under
 //! `tests/recordings/logs` are real; the others are written here, byte for byte as their format's description has it.
 
+#[path = "logs/bags.rs"]
+mod bags;
 #[path = "common/lab.rs"]
 mod lab;
 #[path = "logs/writers.rs"]

@@ -7,7 +7,7 @@ import ssl
 import time
 import urllib.error
 import urllib.request
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from types import TracebackType
@@ -150,9 +150,21 @@ class Client:
         """Who armed, commanded and switched, what tripped and restarted."""
         return self.call("GET", "/v1/events" + ("" if since is None else f"?since={quote(str(since))}"))
 
-    def record(self, thruster: str, name: str | None = None, *, rate_hz: float | None = None) -> str:
-        """Starts a recording with at most ``rate_hz`` rows a second (Hz); its name."""
-        body = {"thruster": thruster, "name": name, "rate_hz": rate_hz}
+    def controller_file(self, thruster: str) -> str:
+        """The controller that runs as a TOML file, which :meth:`Command.load_controller`, ``kort.toml`` and
+        :func:`kort.soak` take."""
+        return self.request("GET", _of(thruster, "controller/file"))[1].decode()
+
+    def record(
+        self,
+        thruster: str,
+        name: str | None = None,
+        *,
+        rate_hz: float | None = None,
+        tags: Iterable[str] = (),
+    ) -> str:
+        """Starts a recording with at most ``rate_hz`` rows a second (Hz) and words to find it by; its name."""
+        body = {"thruster": thruster, "name": name, "rate_hz": rate_hz, "tags": list(tags)}
         started = self.call("POST", "/v1/recordings", {k: v for k, v in body.items() if v is not None})
         return str(started["name"])
 
@@ -160,9 +172,13 @@ class Client:
         """Stops a running recording."""
         self.call("DELETE", f"/v1/recordings/{quote(name)}")
 
-    def recordings(self) -> Any:
-        """Every recording, oldest first."""
-        return self.call("GET", "/v1/recordings")
+    def tag(self, name: str, tags: Iterable[str]) -> None:
+        """Gives a recording other tags, also while it runs."""
+        self.call("PATCH", f"/v1/recordings/{quote(name)}", {"tags": list(tags)})
+
+    def recordings(self, tag: str | None = None) -> Any:
+        """Every recording, or those with a tag; oldest first."""
+        return self.call("GET", "/v1/recordings" + ("" if tag is None else f"?tag={quote(tag)}"))
 
     def recording(self, name: str) -> Recording:
         """Fetches a recording. It holds its rig description: :func:`kort.diagnose` needs no other."""
@@ -253,6 +269,10 @@ class Command:
         """Puts a control law with its parameters in force, without a bump."""
         return self._call("PUT", "controller", dict(controller))
 
+    def load_controller(self, toml: str) -> Any:
+        """Puts a controller file in force, without a bump: law, observer, estimator and every parameter."""
+        return self._call("PUT", "controller/file", {"toml": toml})
+
     def play(self, excitation: Mapping[str, Any]) -> Any:
         """Plays a test signal (``POST …/excitation``; /docs of the service lists the keys)."""
         return self._call("POST", "excitation", dict(excitation))
@@ -280,7 +300,7 @@ class Stream:
         headers = None if client._token is None else {"Authorization": f"Bearer {client._token}"}
         self._open = ExitStack()
         self._socket = self._open.enter_context(
-            connect(address, additional_headers=headers, ssl=client._context, open_timeout=client._timeout_s)
+            connect(address, additional_headers=headers, ssl=client._context if scheme == "wss" else None, open_timeout=client._timeout_s)
         )
 
     def __enter__(self) -> Stream:

@@ -80,7 +80,7 @@ class Recording:
         return float(self.time_s[-1] - self.time_s[0])
 
     def write(self, path: str | PathLike[str]) -> None:
-        """Writes ``.csv``, ``.csv.gz`` or ``.mcap``, by the path's ending. Raises ``ValueError`` for another ending or
+        """Writes ``.csv``, ``.csv.gz``, ``.mcap`` or ``.parquet``, by the path's ending. Raises ``ValueError`` for another ending or
         columns that are no recording, ``RuntimeError`` if the file cannot be written."""
         _kort.write(path, _Given(self))
 

@@ -128,7 +128,7 @@ pub fn decode<'py>(
     give(py, recording)
 }
 
-/// Writes a file: .csv, .csv.gz or .mcap.
+/// Writes a file: .csv, .csv.gz, .mcap or .parquet.
 #[pyfunction]
 pub fn write(py: Python<'_>, path: PathBuf, recording: Given<'_>) -> PyResult<()> {
     let format = Format::of(&path).map_err(unreadable)?;

@@ -2,6 +2,7 @@
 
 import signal
 import socket
+import ssl
 import subprocess
 import tempfile
 import time
@@ -20,20 +21,35 @@ def client(kort_program: str) -> Iterator[kort.Client]:
         yield from service_in(Path(folder), kort_program)
 
 
-def service_in(folder: Path, kort_program: str) -> Iterator[kort.Client]:
+@pytest.fixture(scope="module")
+def secured(kort_program: str) -> Iterator[tuple[kort.Client, Path]]:
+    """A service that wants TLS and a token, and its folder."""
+    with tempfile.TemporaryDirectory(prefix="kort-") as name:
+        folder = Path(name)
+        for client in service_in(folder, kort_program, secure=True):
+            yield client, folder
+
+
+def service_in(folder: Path, kort_program: str, *, secure: bool = False) -> Iterator[kort.Client]:
     """A service on the simulated stand, until the tests are done with it."""
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
     (folder / "kort.toml").write_text(
         f'[gateway]\nbind = "127.0.0.1:{port}"\nrecordings = "recordings"\nevents = "events"\ntokens = "tokens.toml"\n'
-        f'[thrusters.t1]\nrig = "{ROOT}/config/thrusters/whitcomb-yoerger-1999.toml"\namplifier = "simulated"\n'
+        + ('require_tokens = true\ntls = { certificate = "cert.pem", key = "key.pem", self_signed = true }\n' if secure else "")
+        + f'[thrusters.t1]\nrig = "{ROOT}/config/thrusters/whitcomb-yoerger-1999.toml"\namplifier = "simulated"\n'
         'servo = { rate_hz = 500 }\ncontroller = { rate_hz = 10, law = "velocity_servo" }\n'
     )
+    token = made_token(kort_program, folder, "bench", "pilot") if secure else None
     arguments = [kort_program, "up", "--config", str(folder / "kort.toml"), "--root", str(folder / "shm")]
     with open(folder / "log", "wb") as log:
         service = subprocess.Popen(arguments, cwd=folder, stdout=log, stderr=log)
-    client = kort.Client(f"http://127.0.0.1:{port}")
+    context = None
     try:
+        if secure:
+            wait((folder / "cert.pem").exists, (folder / "log").read_text)
+            context = ssl.create_default_context(cafile=folder / "cert.pem")
+        client = kort.Client(f"{'https' if secure else 'http'}://127.0.0.1:{port}", token=token, context=context)
         wait(lambda: client.state("t1").controller is not None, (folder / "log").read_text)
         yield client
     finally:
@@ -43,6 +59,12 @@ def service_in(folder: Path, kort_program: str) -> Iterator[kort.Client]:
         except subprocess.TimeoutExpired:
             service.kill()
             raise
+
+
+def made_token(kort_program: str, folder: Path, name: str, role: str) -> str:
+    """A token as an operator makes one: it is printed once."""
+    command = [kort_program, "token", "new", name, "--role", role, "--config", str(folder / "kort.toml")]
+    return subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True).stdout.split()[-1]
 
 
 def wait(done: object, said: object = str) -> None:
@@ -63,7 +85,9 @@ def wait(done: object, said: object = str) -> None:
 
 
 def test_command_record_and_read_back(client: kort.Client) -> None:
-    name = client.record("t1", "bench", rate_hz=100)
+    name = client.record("t1", "bench", rate_hz=100, tags=["dry"])
+    client.tag(name, ["bollard", "dry"])
+    assert [one["name"] for one in client.recordings("bollard")] == [name] and client.recordings("tow") == []
     with client.command("t1", "test", ttl_ms=60_000) as command:
         command.arm()
         wait(lambda: client.state("t1").armed)
@@ -73,6 +97,10 @@ def test_command_record_and_read_back(client: kort.Client) -> None:
         with pytest.raises(kort.Answer) as refused:
             client.command("t1", "another")
         assert refused.value.status == 409 and "test" in str(refused.value)
+        tuned = client.controller_file("t1").replace("phase_margin_deg = 56.0", "phase_margin_deg = 61.0")
+        assert "law = \"velocity_servo\"" in tuned and "61.0" in tuned
+        command.load_controller(tuned)
+        wait(lambda: client.controller_file("t1").split("\n", 1)[1] == tuned.split("\n", 1)[1])
         command.disarm()
     client.end_recording(name)
     recording = client.recording(name)
@@ -96,6 +124,32 @@ def test_a_refusal_is_the_problem_document(client: kort.Client) -> None:
 def test_nobody_there_is_an_oserror() -> None:
     with pytest.raises(OSError):
         kort.Client("http://127.0.0.1:9").thrusters()
+
+
+def test_tls_and_a_token(secured: tuple[kort.Client, Path], kort_program: str) -> None:
+    client, folder = secured
+    with client.command("t1", "test", ttl_ms=60_000) as command:
+        command.arm()
+        wait(lambda: client.state("t1").armed)
+        command.thrust(30.0)
+        with client.stream("t1", hz=20) as stream:
+            assert next(iter(stream)).setpoint == kort.Setpoint(thrust_n=30.0)
+        command.disarm()
+    trusted = client._context
+    with pytest.raises(kort.Answer) as nobody:
+        kort.Client(client.url, context=trusted).thrusters()
+    assert nobody.value.status == 401 and "token" in str(nobody.value)
+    with pytest.raises(kort.Answer) as wrong:
+        kort.Client(client.url, token="wrong", context=trusted).thrusters()
+    assert wrong.value.status == 401
+    viewer = kort.Client(client.url, token=made_token(kort_program, folder, "wall", "viewer"), context=trusted)
+    assert [state.id for state in viewer.thrusters()] == ["t1"]
+    with pytest.raises(kort.Answer) as refused:
+        viewer.command("t1", "wall")
+    assert refused.value.status == 403 and "viewer" in str(refused.value)
+    # A certificate that nobody vouches for is not talked to.
+    with pytest.raises(OSError, match="CERTIFICATE_VERIFY_FAILED"):
+        kort.Client(client.url, token="any").thrusters()
 
 
 def test_events_and_stop(client: kort.Client) -> None:

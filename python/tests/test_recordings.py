@@ -84,6 +84,13 @@ def test_text_and_frames_without_time_are_refused() -> None:
         kort.Recording.from_pandas(pd.DataFrame({"thrust_n": [0.0, 1.0]}))
 
 
+def test_parquet_opens_elsewhere_with_null_where_nothing_was_sampled(tmp_path: Path) -> None:
+    small().write(tmp_path / "small.parquet")
+    frame = pl.read_parquet(tmp_path / "small.parquet")
+    assert frame.equals(small().to_polars())
+    same(kort.Recording.from_polars(frame), small())
+
+
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="nowhere.csv"):
         kort.read(tmp_path / "nowhere.csv")

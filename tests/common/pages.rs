@@ -6,6 +6,37 @@ use std::process::{Command, Stdio};
 
 use super::KORT;
 
+/// Blocks that no test runs, by page and beginning, and why.
+const NOT_RUN: &[(&str, &str, &str)] = &[
+    (
+        "docs/control.md",
+        "kort soak config/scenarios/soak-{",
+        "minutes of work: tests/soak.rs runs shorter scenarios",
+    ),
+    (
+        "docs/hardware.md",
+        "kort calibrate --config",
+        "minutes of a drive in real time: tests/drives/calibrate.rs does it",
+    ),
+    (
+        "docs/measured-recordings.md",
+        "kort prove --measured DIR",
+        "writes the page itself, from sets that are not all here",
+    ),
+    ("docs/measured-recordings.md", "kort diagnose t200_static", "the whole table is not in the repository"),
+    ("docker/README.md", "docker compose", "needs docker"),
+    (
+        "python/README.md",
+        "pip install",
+        "builds in release: python/tests/run.sh builds and installs the same wheel",
+    ),
+];
+
+/// Is this block of a page run by nobody?
+fn is_left_out(page: &str, commands: &str) -> bool {
+    NOT_RUN.iter().any(|(of, start, _)| *of == page && commands.trim_start().starts_with(start))
+}
+
 /// What a page holds of both kinds, in order.
 enum Block {
     Run(String),
@@ -66,6 +97,14 @@ trap 'for job in $(jobs -p); do kill -TERM $job || true; done; wait' EXIT
 /// A line of a `text` block is not printed, the service answers with a problem, a command is not found, or it takes
 /// too long.
 pub fn follow(page: &str, port: u16) -> String {
+    follow_with(page, port, &[])
+}
+
+/// The same with files that the page takes for granted.
+///
+/// # Panics
+/// As [`follow`].
+pub fn follow_with(page: &str, port: u16, given: &[(&str, &[u8])]) -> String {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let text = std::fs::read_to_string(root.join(page)).unwrap();
     let text =
@@ -74,10 +113,14 @@ pub fn follow(page: &str, port: u16) -> String {
     for shared in ["tests", "config", "docs"] {
         std::os::unix::fs::symlink(root.join(shared), folder.path().join(shared)).unwrap();
     }
+    for (name, bytes) in given {
+        std::fs::write(folder.path().join(name), bytes).unwrap();
+    }
     let blocks = blocks(&text);
     let mut script = prelude();
     for (i, block) in blocks.iter().enumerate() {
         match block {
+            Block::Run(commands) if is_left_out(page, commands) => {}
             Block::Run(commands) => {
                 for line in commands.lines().filter(|line| !is_done(line)) {
                     script += &line.replace("127.0.0.1:8080", &format!("127.0.0.1:{port}"));
@@ -113,6 +156,34 @@ pub fn follow(page: &str, port: u16) -> String {
         rest = after;
     }
     said
+}
+
+/// Every page that shows commands, beside those that this repository's tests follow (`followed`).
+///
+/// # Panics
+/// A page shows commands that nobody runs and nobody has said why, or a block does not say what it is.
+pub fn none_is_forgotten(followed: &[&str]) {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut pages: Vec<String> =
+        ["README.md", "CONTRIBUTING.md", "docker/README.md", "python/README.md"].map(str::to_owned).to_vec();
+    for folder in ["docs", "docs/faults"] {
+        let entries = std::fs::read_dir(root.join(folder)).unwrap().map(|entry| entry.unwrap().file_name());
+        let names =
+            entries.map(|name| name.to_string_lossy().into_owned()).filter(|name| name.ends_with(".md"));
+        pages.extend(names.map(|name| format!("{folder}/{name}")));
+    }
+    for page in pages {
+        let text = std::fs::read_to_string(root.join(&page)).unwrap();
+        for block in text.split("```").skip(1).step_by(2) {
+            let (kind, commands) = block.split_once('\n').unwrap_or((block, ""));
+            assert!(
+                !kind.is_empty(),
+                "{page}: a block does not say what it is (sh, text, toml, …):\n{commands}"
+            );
+            let run = followed.contains(&page.as_str()) || is_left_out(&page, commands);
+            assert!(kind != "sh" || run, "{page}: nobody runs\n{commands}");
+        }
+    }
 }
 
 /// The number behind a word in what a page printed.

@@ -81,7 +81,7 @@ fn an_operator_takes_command_thrusts_records_and_stops() {
         page.until(&text_is("stop-text", "Stopped: confirmed"));
         page.until("!state.armed && document.getElementById('armed').textContent === 'disarmed'");
         page.click("record");
-        page.until("document.querySelectorAll('#recordings a').length === 2");
+        page.until("document.querySelectorAll('#recordings a').length === 3");
         page.eval("document.getElementById('entry').value = 1e6");
         page.click("arm");
         page.click("send");

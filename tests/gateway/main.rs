@@ -5,6 +5,7 @@ mod commands;
 #[path = "../common/mod.rs"]
 mod common;
 mod errors;
+mod followed;
 mod kept;
 mod pages;
 mod recordings;

@@ -48,7 +48,7 @@ pub enum Problem {
         message: String,
     },
     /// The name of a file to write ends in nothing kort writes.
-    #[error("file name ends in {found}; allowed: .csv, .csv.gz or .mcap")]
+    #[error("file name ends in {found}; allowed: .csv, .csv.gz, .mcap or .parquet")]
     UnknownFormat {
         /// The ending found.
         found: String,

@@ -436,8 +436,10 @@ pub fn check_new_name(field: &str, name: &str) -> Result<(), Problem> {
     if !is_name(name) {
         return refused("1 to 64 letters, digits, dots, underscores or hyphens; the first a letter or digit");
     }
-    if [".csv", ".mcap"].iter().any(|ending| name.ends_with(ending)) {
-        return refused("without the ending: a recording NAME is fetched as NAME.mcap and as NAME.csv");
+    if [".csv", ".mcap", ".parquet"].iter().any(|ending| name.ends_with(ending)) {
+        return refused(
+            "without the ending: a recording NAME is fetched as NAME.mcap, NAME.csv and NAME.parquet",
+        );
     }
     Ok(())
 }

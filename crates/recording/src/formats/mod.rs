@@ -1,10 +1,14 @@
 //! File formats, recognised by content when read and by the file's name when written.
 
+mod bag;
+mod blackbox;
 mod candump;
 mod cdr;
 mod csv;
 mod dataflash;
 mod mcap;
+mod parquet;
+mod ros;
 mod stream;
 mod ulog;
 
@@ -74,6 +78,8 @@ enum Content {
     Ulog,
     DataFlash,
     Candump,
+    Bag,
+    Blackbox,
 }
 
 impl Content {
@@ -83,6 +89,8 @@ impl Content {
             () if start.starts_with(::mcap::MAGIC) => Content::Mcap,
             () if start.starts_with(ulog::MAGIC) => Content::Ulog,
             () if start.starts_with(dataflash::MAGIC) => Content::DataFlash,
+            () if start.starts_with(bag::MAGIC) => Content::Bag,
+            () if start.starts_with(blackbox::MAGIC) => Content::Blackbox,
             () if candump::begins(start) => Content::Candump,
             () => Content::Csv,
         }
@@ -97,6 +105,8 @@ impl Content {
             Content::Ulog => "PX4 ULog",
             Content::DataFlash => "ArduPilot DataFlash",
             Content::Candump => "candump",
+            Content::Bag => "ROS 2 bag (sqlite)",
+            Content::Blackbox => "Betaflight blackbox",
         }
     }
 
@@ -108,6 +118,8 @@ impl Content {
             Content::Ulog => ulog::log(input, wanted),
             Content::DataFlash => dataflash::log(input, wanted),
             Content::Candump => candump::log(input, wanted),
+            Content::Bag => bag::log(input, wanted),
+            Content::Blackbox => blackbox::log(input, wanted),
         }
     }
 }
@@ -125,19 +137,22 @@ pub enum Format {
     CsvGz,
     /// MCAP with JSON messages.
     Mcap,
+    /// Parquet; written only.
+    Parquet,
 }
 
 impl Format {
     /// The format that a file's name asks for.
     ///
     /// # Errors
-    /// The name ends in none of `.csv`, `.csv.gz`, `.mcap`.
+    /// The name ends in none of `.csv`, `.csv.gz`, `.mcap`, `.parquet`.
     pub fn of(path: &Path) -> Result<Self, RecordingError> {
         let name = path.to_string_lossy().to_lowercase();
         match () {
             () if name.ends_with(".csv") => Ok(Format::Csv),
             () if name.ends_with(".csv.gz") => Ok(Format::CsvGz),
             () if name.ends_with(".mcap") => Ok(Format::Mcap),
+            () if name.ends_with(".parquet") => Ok(Format::Parquet),
             () => {
                 let found =
                     path.extension().map_or("nothing".into(), |e| format!("\".{}\"", e.to_string_lossy()));
@@ -148,15 +163,16 @@ impl Format {
 }
 
 /// Writes a recording row by row, so that a live recorder and a simulation need not hold it.
-pub struct Writer<W: Write + Seek>(Kind<W>);
+pub struct Writer<W: Write + Seek + Send>(Kind<W>);
 
-enum Kind<W: Write + Seek> {
+enum Kind<W: Write + Seek + Send> {
     Csv(csv::Rows<W>),
     CsvGz(Box<csv::Rows<GzEncoder<W>>>),
     Mcap(Box<mcap::Rows<W>>),
+    Parquet(Box<parquet::Rows<W>>),
 }
 
-impl<W: Write + Seek> Writer<W> {
+impl<W: Write + Seek + Send> Writer<W> {
     /// Starts a recording with these columns beside `time_s`. `topic` names the MCAP channel.
     ///
     /// # Errors
@@ -169,6 +185,7 @@ impl<W: Write + Seek> Writer<W> {
                 Kind::CsvGz(Box::new(csv::Rows::create(columns, output)?))
             }
             Format::Mcap => Kind::Mcap(Box::new(mcap::Rows::create(topic, columns, output)?)),
+            Format::Parquet => Kind::Parquet(Box::new(parquet::Rows::create(columns, output)?)),
         }))
     }
 
@@ -181,6 +198,7 @@ impl<W: Write + Seek> Writer<W> {
             Kind::Csv(rows) => rows.row(time_s, values),
             Kind::CsvGz(rows) => rows.row(time_s, values),
             Kind::Mcap(rows) => rows.row(time_s, values),
+            Kind::Parquet(rows) => rows.row(time_s, values),
         }
     }
 
@@ -193,6 +211,8 @@ impl<W: Write + Seek> Writer<W> {
             Kind::Csv(rows) => rows.flush(),
             Kind::CsvGz(rows) => rows.flush(),
             Kind::Mcap(rows) => rows.flush(),
+            // It has no end before its last row.
+            Kind::Parquet(_) => Ok(()),
         }
     }
 
@@ -205,6 +225,7 @@ impl<W: Write + Seek> Writer<W> {
             Kind::Csv(rows) => rows.finish().map(drop),
             Kind::CsvGz(rows) => rows.finish()?.finish().map(drop),
             Kind::Mcap(rows) => rows.finish(),
+            Kind::Parquet(rows) => rows.finish(),
         }
     }
 }
@@ -214,7 +235,7 @@ impl Recording {
     ///
     /// # Errors
     /// The output cannot be written.
-    pub fn write(&self, format: Format, output: impl Write + Seek) -> io::Result<()> {
+    pub fn write(&self, format: Format, output: impl Write + Seek + Send) -> io::Result<()> {
         let names: Vec<&str> = self.columns.iter().map(|c| c.name.as_str()).collect();
         let mut writer = Writer::create(format, "kort", &names, output)?;
         let mut row = vec![f64::NAN; names.len()];

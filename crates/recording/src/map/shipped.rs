@@ -12,6 +12,8 @@ shipped![
     "ardupilot",
     "ardupilot-old",
     "ardupilot-vehicle",
+    "betaflight",
+    "betaflight-vehicle",
     "canopen-402",
     "moteus",
     "motor-step-acoustic-air",

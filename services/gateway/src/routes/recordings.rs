@@ -6,6 +6,7 @@ use axum::body::Body;
 use axum::extract::{Extension, State};
 use axum::http::{StatusCode, header};
 use axum::response::IntoResponse;
+use kort_recording::Format;
 use serde::Deserialize;
 use tokio::io::AsyncReadExt;
 use tokio_util::io::ReaderStream;
@@ -85,7 +86,7 @@ struct Which {
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 struct FormatQuery {
-    /// `csv` or `mcap`; the name's ending decides if left out, else `mcap`.
+    /// `csv`, `parquet` or `mcap`; the name's ending decides if left out, else `mcap`.
     #[param(inline)]
     format: Option<FileFormat>,
 }
@@ -96,6 +97,28 @@ struct FormatQuery {
 enum FileFormat {
     Csv,
     Mcap,
+    Parquet,
+}
+
+impl FileFormat {
+    /// Those that are told by a name's ending.
+    const ALL: [FileFormat; 3] = [FileFormat::Csv, FileFormat::Mcap, FileFormat::Parquet];
+
+    fn ending(self) -> &'static str {
+        match self {
+            FileFormat::Csv => "csv",
+            FileFormat::Mcap => ENDING,
+            FileFormat::Parquet => "parquet",
+        }
+    }
+
+    fn content_type(self) -> &'static str {
+        match self {
+            FileFormat::Csv => "text/csv; charset=utf-8",
+            FileFormat::Mcap => "application/octet-stream",
+            FileFormat::Parquet => "application/vnd.apache.parquet",
+        }
+    }
 }
 
 /// Every recording, or those with a tag; oldest first.
@@ -225,42 +248,43 @@ async fn remove(
     })
 }
 
-/// Fetches a recording's file: `NAME`, `NAME.csv` or `NAME.mcap`. A running one is sent as far as it is written.
+/// Fetches a recording's file: `NAME`, `NAME.csv`, `NAME.parquet` or `NAME.mcap`. A running one is sent as far as it is written.
 #[utoipa::path(get, path = "/v1/recordings/{name}", tag = "recordings",
     params(("name" = String, Path, description = "Name of the recording, with or without the ending", example = "t1-20260101T120000Z"),
            FormatQuery),
     responses(
         (status = 200, description = "The file", headers(("content-disposition" = String, description = "Name to save it under")),
-            content((Vec<u8> = "application/octet-stream"), (String = "text/csv"))),
+            content((Vec<u8> = "application/octet-stream"), (Vec<u8> = "application/vnd.apache.parquet"), (String = "text/csv"))),
         (status = 400, description = "`malformed-path`, `malformed-query`", body = Problem, content_type = "application/problem+json"),
         (status = 404, description = "`unknown-recording`: there is none of this name, or nothing of it can be read yet", body = Problem, content_type = "application/problem+json"),
-        (status = 503, description = "`overloaded`: CSV is made and sent to one reader at a time", body = Problem, content_type = "application/problem+json")))]
+        (status = 503, description = "`overloaded`: CSV and Parquet are made and sent to one reader at a time", body = Problem, content_type = "application/problem+json")))]
 async fn fetch(
     State(app): State<Arc<App>>,
     Path(name): Path<String>,
     Query(FormatQuery { format }): Query<FormatQuery>,
 ) -> Result<axum::response::Response, Problem> {
-    let (stem, ending) = ["csv", ENDING]
+    let (stem, ending) = FileFormat::ALL
         .into_iter()
-        .find_map(|ending| Some((name.strip_suffix(&format!(".{ending}"))?, Some(ending))))
+        .find_map(|format| Some((name.strip_suffix(&format!(".{}", format.ending()))?, Some(format))))
         .unwrap_or((&name, None));
-    let csv = match format {
-        Some(format) => matches!(format, FileFormat::Csv),
-        None => ending == Some("csv"),
-    };
+    let format = format.or(ending).unwrap_or(FileFormat::Mcap);
     let found = app.recorder().find(stem).map(|path| (path, stem));
     let (path, stem) =
         found.or_else(|| Some((app.recorder().find(&name)?, name.as_str()))).ok_or_else(|| {
             Problem::new(Kind::UnknownRecording, format!("there is no recording {name:?}"))
                 .hint("GET /v1/recordings lists them")
         })?;
-    let (kind, ending) =
-        if csv { ("text/csv; charset=utf-8", "csv") } else { ("application/octet-stream", ENDING) };
-    let save_as = format!("attachment; filename=\"{stem}.{ending}\"");
-    let (length, body) = if csv { text::csv(path).await? } else { as_it_is(&path).await? };
-    let mut answer =
-        ([(header::CONTENT_TYPE, kind.to_owned()), (header::CONTENT_DISPOSITION, save_as)], body)
-            .into_response();
+    let save_as = format!("attachment; filename=\"{stem}.{}\"", format.ending());
+    let (length, body) = match format {
+        FileFormat::Csv => text::other(path, Format::Csv).await?,
+        FileFormat::Parquet => text::other(path, Format::Parquet).await?,
+        FileFormat::Mcap => as_it_is(&path).await?,
+    };
+    let mut answer = (
+        [(header::CONTENT_TYPE, format.content_type().to_owned()), (header::CONTENT_DISPOSITION, save_as)],
+        body,
+    )
+        .into_response();
     if let Some(length) = length {
         answer.headers_mut().insert(header::CONTENT_LENGTH, length.into());
     }

@@ -40,7 +40,7 @@ pub struct Calibrate {
     /// The rig description to write
     #[arg(short, long, value_name = "RIG", required_unless_present = "rehearse")]
     output: Option<PathBuf>,
-    /// The recording to write: .csv, .csv.gz or .mcap [default: beside the rig, .csv.gz]
+    /// The recording to write: .csv, .csv.gz, .mcap or .parquet [default: beside the rig, .csv.gz]
     #[arg(long, value_name = "REC")]
     recording: Option<PathBuf>,
     /// Share of the largest drive that the session goes up to

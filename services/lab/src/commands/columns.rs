@@ -22,7 +22,7 @@ Example: kort columns flight.ulg
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLE)]
 pub struct Args {
-    /// The log, plain or gzip: PX4 ULog, ArduPilot DataFlash, ROS 2 bag (MCAP), candump, MCAP with JSON, or CSV with commas,
+    /// The log, plain or gzip: PX4 ULog, ArduPilot DataFlash, ROS 2 bag (MCAP or sqlite), Betaflight blackbox, candump, MCAP with JSON, or CSV with commas,
     /// semicolons or tabs
     #[arg(value_name = "LOG")]
     log: PathBuf,

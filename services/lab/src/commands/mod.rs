@@ -2,6 +2,7 @@
 
 mod calibrate;
 mod columns;
+mod convert;
 pub mod diagnose;
 mod explain;
 pub mod fit;
@@ -22,6 +23,8 @@ pub enum Command {
     Calibrate(calibrate::Calibrate),
     /// Say what is in a log of others, and propose a column map for it
     Columns(columns::Args),
+    /// Write a recording, or a log of others through a column map, as CSV, MCAP or Parquet
+    Convert(convert::Args),
     /// Find what the model left out: where, what, how much better with it
     Diagnose(diagnose::Diagnose),
     /// Look up the physics a model may leave out: what it is, how it shows, what it is confused with
@@ -54,6 +57,7 @@ impl Command {
         match self {
             Command::Calibrate(args) => calibrate::run(&args),
             Command::Columns(args) => columns::run(&args),
+            Command::Convert(args) => convert::run(&args),
             Command::Diagnose(diagnose) => diagnose.run(),
             Command::Explain(args) => explain::run(&args),
             Command::Fit(fit) => fit.run(),

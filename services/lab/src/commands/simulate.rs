@@ -29,7 +29,7 @@ pub struct Args {
     /// What is run: a file, or the name of a shipped scenario
     #[arg(long, value_name = "FILE")]
     scenario: PathBuf,
-    /// The recording to write: .csv, .csv.gz or .mcap
+    /// The recording to write: .csv, .csv.gz, .mcap or .parquet
     #[arg(short, long, value_name = "REC")]
     output: PathBuf,
     /// Seed of noise and random signals, before the scenario's

@@ -6,22 +6,16 @@ use std::io::Read;
 use mcap::records::{MessageHeader, Record};
 use serde_json::Value;
 
-use super::super::cdr::{Found, Layout};
+use super::super::cdr::Layout;
+use super::super::ros::Topic;
 use super::{BESIDE, records};
 use crate::error::Problem;
 use crate::log::{Gather, Log};
 
-/// How a channel's messages become fields.
-enum Reader {
-    Json,
-    Cdr(Layout),
-}
-
-/// A channel.
-struct Channel {
-    topic: usize,
-    reader: Reader,
-    places: HashMap<String, usize>,
+/// A channel, by how its messages become fields.
+enum Channel {
+    Json { topic: usize, places: HashMap<String, usize> },
+    Cdr(Topic),
 }
 
 struct Messages<'w> {
@@ -90,28 +84,29 @@ impl Messages<'_> {
                 {
                     return;
                 }
-                let reader = match (channel.message_encoding.as_str(), schema) {
-                    ("json", _) => Ok(Reader::Json),
-                    ("cdr", Some((name, encoding, text))) if encoding == "ros2msg" => {
-                        Layout::parse(name, &String::from_utf8_lossy(text)).map(Reader::Cdr)
+                let name = channel.topic.trim_start_matches('/');
+                let read = match (channel.message_encoding.as_str(), schema) {
+                    ("json", _) => {
+                        Ok(Channel::Json { topic: self.gather.topic(name), places: HashMap::new() })
+                    }
+                    ("cdr", Some((kind, encoding, text))) if encoding == "ros2msg" => {
+                        Layout::parse(kind, &String::from_utf8_lossy(text))
+                            .map(|layout| Channel::Cdr(Topic::new(&mut self.gather, name, layout)))
                     }
                     (other, schema) => {
                         let described = schema.map_or("no schema", |s| s.1.as_str());
                         Err(format!("{other}, {described}"))
                     }
                 };
-                let reader = match reader {
-                    Ok(reader) => reader,
+                match read {
+                    Ok(read) => drop(self.channels.insert(channel.id, read)),
                     Err(why) => {
                         let words = format!("{} ({why})", channel.topic);
                         if !self.others.contains(&words) {
                             self.others.push(words);
                         }
-                        return;
                     }
-                };
-                let topic = self.gather.topic(channel.topic.trim_start_matches('/'));
-                self.channels.insert(channel.id, Channel { topic, reader, places: HashMap::new() });
+                }
             }
             Record::Message { header, data } => self.message(&header, &data),
             _ => {}
@@ -123,33 +118,18 @@ impl Messages<'_> {
         self.messages += 1;
         let start_ns = *self.start_ns.get_or_insert(header.log_time);
         let stamp_s = (i128::from(header.log_time) - i128::from(start_ns)) as f64 * 1e-9;
-        let Channel { topic, reader, places } = channel;
-        let topic = *topic;
-        let read = match reader {
-            Reader::Json => match serde_json::from_slice(data) {
+        let read = match channel {
+            Channel::Json { topic, places } => match serde_json::from_slice(data) {
                 Ok(Value::Object(fields)) => {
-                    self.gather.message(topic, stamp_s);
+                    self.gather.message(*topic, stamp_s);
                     for (name, value) in fields {
-                        json(&mut self.gather, topic, places, name, &value);
+                        json(&mut self.gather, *topic, places, name, &value);
                     }
                     true
                 }
                 _ => false,
             },
-            Reader::Cdr(layout) => {
-                self.gather.message(topic, stamp_s);
-                let read = layout.read(data, &mut |name: &str, found| match found {
-                    Found::Number(value) => {
-                        let field = place(&mut self.gather, topic, places, name);
-                        self.gather.set(topic, field, value);
-                    }
-                    Found::Text => {
-                        let field = place(&mut self.gather, topic, places, name);
-                        self.gather.text(topic, field);
-                    }
-                });
-                read.is_ok()
-            }
+            Channel::Cdr(topic) => topic.message(&mut self.gather, stamp_s, data),
         };
         self.bad += u64::from(!read);
     }

@@ -1,4 +1,4 @@
-//! A recording as CSV, made of its MCAP file when it is asked for.
+//! A recording as CSV or Parquet, made of its MCAP file when it is asked for.
 
 use std::future::Future;
 use std::io;
@@ -35,13 +35,13 @@ const PART: usize = 64 << 10;
 type Made = (Vec<u8>, SemaphorePermit<'static>);
 
 /// Length in bytes, where the text was made at once, and the text on its way.
-pub async fn csv(path: PathBuf) -> Result<(Option<usize>, Body), Problem> {
+pub async fn other(path: PathBuf, format: Format) -> Result<(Option<usize>, Body), Problem> {
     let turn = timeout(TURN_WITHIN, TURN.acquire()).await.ok().and_then(Result::ok).ok_or_else(|| {
-        Problem::new(Kind::Overloaded, "other recordings are being sent as CSV, one at a time")
+        Problem::new(Kind::Overloaded, "other recordings are being sent as CSV or Parquet, one at a time")
             .hint("try again, or fetch the `.mcap`, which is sent as it is")
     })?;
     // The turn goes along: whoever asked may be gone before the text is made.
-    let mut making = Box::pin(blocking(move || made(&path).map(|text| (text, turn))));
+    let mut making = Box::pin(blocking(move || made(&path, format).map(|text| (text, turn))));
     match timeout(MADE_WITHIN, &mut making).await {
         Ok(made) => {
             let made = made??;
@@ -51,10 +51,10 @@ pub async fn csv(path: PathBuf) -> Result<(Option<usize>, Body), Problem> {
     }
 }
 
-fn made(path: &Path) -> Result<Vec<u8>, Problem> {
+fn made(path: &Path, format: Format) -> Result<Vec<u8>, Problem> {
     let recording = Recording::read(path, None).map_err(nothing_yet)?;
     let mut text = std::io::Cursor::new(Vec::new());
-    recording.write(Format::Csv, &mut text).map_err(|error| unreadable(path, error))?;
+    recording.write(format, &mut text).map_err(|error| unreadable(path, error))?;
     Ok(text.into_inner())
 }
 

@@ -1,0 +1,117 @@
+//! A ROS 2 bag in sqlite (`.db3`), by SQLite itself: tables `topics`, `messages` and, from ROS 2 Iron on,
+//! `message_definitions`.
+
+use std::collections::HashMap;
+use std::io::{BufRead, Read};
+
+use rusqlite::{Connection, Row};
+
+use super::cdr::Layout;
+use super::ros::{Topic, usual};
+use crate::error::Problem;
+use crate::log::{Gather, Log};
+
+/// How a file of SQLite begins.
+pub(super) const MAGIC: &[u8] = b"SQLite format 3\0";
+const NAME: &str = "ROS 2 bag (sqlite)";
+/// Largest bag, bytes: it is held in memory whole.
+const BYTES_MAX: u64 = 4 << 30;
+/// Where a file's header says that newest changes may stand in a second file, and what says they do not.
+const JOURNAL: std::ops::Range<usize> = 18..20;
+const NO_WAL: u8 = 1;
+
+/// The messages of every topic that can be read, by their time of receipt.
+pub(super) fn log(input: impl BufRead, wanted: Option<&[String]>) -> Result<Log, Problem> {
+    let mut data = Vec::new();
+    input.take(BYTES_MAX + 1).read_to_end(&mut data).map_err(super::unreadable)?;
+    if data.len() as u64 > BYTES_MAX {
+        return Err(broken(format!(
+            "it has more than {} GiB, which kort does not hold in memory; `ros2 bag convert` with a list of topics makes a smaller one",
+            BYTES_MAX >> 30
+        )));
+    }
+    let mut gather = Gather::new(NAME, "times of receipt from the first message on", wanted);
+    for byte in data.get_mut(JOURNAL).into_iter().flatten() {
+        if *byte != NO_WAL {
+            *byte = NO_WAL;
+        }
+    }
+    read(&data, &mut gather).map_err(|error| broken(error.to_string()))?;
+    let log = gather.finish();
+    if log.topics.is_empty() {
+        return Err(Problem::NoChannel { found: log.notes.join("; ") });
+    }
+    Ok(log)
+}
+
+fn broken(message: String) -> Problem {
+    Problem::Broken { format: NAME, message }
+}
+
+fn read(data: &[u8], gather: &mut Gather<'_>) -> rusqlite::Result<()> {
+    let mut bag = Connection::open_in_memory()?;
+    bag.deserialize_read_exact("main", data, data.len(), true)?;
+    let mut topics = topics(&bag, gather)?;
+    let (mut start_ns, mut read, mut bad) = (None, 0_u64, 0_u64);
+    let mut messages = bag.prepare("SELECT topic_id, timestamp, data FROM messages ORDER BY id")?;
+    let mut rows = messages.query([])?;
+    loop {
+        let row = match rows.next() {
+            Ok(Some(row)) => row,
+            Ok(None) => break,
+            // What came before the damage is told.
+            Err(error) if read > 0 => {
+                gather.loss(format!(
+                    "the bag is damaged behind message {read} ({error}); what follows is lost"
+                ));
+                break;
+            }
+            Err(error) => return Err(error),
+        };
+        let Some(topic) = topics.get_mut(&row.get::<_, i64>(0)?) else { continue };
+        let stamp_ns: i64 = row.get(1)?;
+        let start_ns = *start_ns.get_or_insert(stamp_ns);
+        let stamp_s = (i128::from(stamp_ns) - i128::from(start_ns)) as f64 * 1e-9;
+        read += 1;
+        bad += u64::from(!topic.message(gather, stamp_s, row.get_ref(2)?.as_bytes().unwrap_or_default()));
+    }
+    if bad > 0 {
+        gather.loss(format!("{bad} message(s) do not fit their type and were skipped"));
+    }
+    Ok(())
+}
+
+/// The topics by their number; those whose messages cannot be read are named.
+fn topics(bag: &Connection, gather: &mut Gather<'_>) -> rusqlite::Result<HashMap<i64, Topic>> {
+    let mut described: HashMap<String, String> = HashMap::new();
+    if bag.table_exists(None, "message_definitions")? {
+        let mut all = bag.prepare(
+            "SELECT topic_type, encoded_message_definition FROM message_definitions WHERE encoding = 'ros2msg'",
+        )?;
+        for one in all.query_map([], |row| Ok((row.get(0)?, row.get(1)?)))? {
+            let (kind, text): (String, String) = one?;
+            described.insert(kind, text);
+        }
+    }
+    let mut all = bag.prepare("SELECT id, name, type, serialization_format FROM topics ORDER BY id")?;
+    let named = |row: &Row<'_>| Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?));
+    let (mut found, mut others) = (HashMap::new(), Vec::new());
+    for one in all.query_map([], named)? {
+        let (id, name, kind, format): (i64, String, String, String) = one?;
+        let layout = match described.get(&kind) {
+            _ if format != "cdr" => Err(format!("{format}, not cdr")),
+            Some(text) => Layout::parse(&kind, text),
+            None => usual(&kind).ok_or_else(|| format!("{kind}, which the bag does not describe")),
+        };
+        match layout {
+            Ok(layout) => {
+                found.insert(id, Topic::new(gather, &name, layout));
+            }
+            Err(why) => others.push(format!("{name} ({why})")),
+        }
+    }
+    if !others.is_empty() {
+        gather.note(format!("topics that kort does not read are left out: {}", others.join(", ")));
+    }
+    Ok(found)
+}

@@ -1,0 +1,44 @@
+//! `kort convert`: a recording, or a log of others through a column map, in another format.
+
+use std::path::PathBuf;
+
+use kort_recording::Format;
+
+use crate::failure::{Failure, Outcome, check_writable, print};
+use crate::files;
+
+const EXAMPLE: &str = "\
+Example: kort convert flight.ulg --columns px4:motor=2 -o flight.parquet
+         kort convert run.mcap -o run.csv";
+
+/// Write a recording, or a log of others through a column map, in another format
+///
+/// Columns are SI whatever the log had. Parquet and MCAP carry units and meanings; Parquet is written, not read.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLE)]
+pub struct Args {
+    /// The recording or log
+    #[arg(value_name = "REC")]
+    recording: PathBuf,
+    /// Column map of a log of others: a shipped one or a TOML file (`kort columns` proposes one)
+    #[arg(long, value_name = "MAP")]
+    columns: Option<String>,
+    /// The file to write: .csv, .csv.gz, .mcap or .parquet
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+}
+
+/// Does it.
+///
+/// # Errors
+/// The log cannot be read, or the file cannot be written.
+pub fn run(args: &Args) -> Result<Outcome, Failure> {
+    Format::of(&args.output).map_err(Failure::input)?;
+    check_writable(&args.output)?;
+    let map = files::read_columns(args.columns.as_deref())?;
+    let recording = files::read_recording(&args.recording, map.as_ref())?;
+    recording.save(&args.output).map_err(Failure::failed)?;
+    let names: Vec<&str> = recording.columns.iter().map(|column| column.name.as_str()).collect();
+    print(&format!("{}: {} rows of {}\n", args.output.display(), recording.rows(), names.join(", ")));
+    Ok(Outcome::with_loss(!recording.losses.is_empty()))
+}

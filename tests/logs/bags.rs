@@ -1,0 +1,128 @@
+//! Bags of ROS 2 in sqlite and blackboxes of Betaflight, and what is written of a log.
+
+use serde_json::Value;
+
+use crate::lab::{self, json, kort, stderr, write};
+use crate::{columns, field, near, read, samples, shipped, topic};
+
+fn unpacked(name: &str) -> Vec<u8> {
+    let mut whole = Vec::new();
+    let file = std::fs::File::open(format!("tests/recordings/logs/{name}")).unwrap();
+    std::io::Read::read_to_end(&mut flate2::read::GzDecoder::new(file), &mut whole).unwrap();
+    whole
+}
+
+/// The same messages as in the MCAP bag, by another library's writer; this file does not describe its types.
+#[test]
+fn a_bag_in_sqlite_reads_as_the_same_bag_in_mcap() {
+    let bag = "tests/recordings/logs/ros2-two-thrusters.db3.gz";
+    let found = columns(bag);
+    assert_eq!(found["format"], "ROS 2 bag (sqlite)");
+    assert_eq!(topic(&found, "joint_states")["messages"], 1000);
+    assert_eq!(shipped(&found), ["ros2:command=forward_velocity_controller/commands,joint=0"]);
+    let [sqlite, mcap] =
+        [bag, "tests/recordings/logs/ros2-two-thrusters.mcap"].map(|log| read(log, "ros2:joint=1"));
+    assert_eq!((&sqlite.time_s, sqlite.columns.len()), (&mcap.time_s, mcap.columns.len()));
+    for (a, b) in sqlite.columns.iter().zip(&mcap.columns) {
+        assert_eq!(a.name, b.name);
+        assert!(
+            a.values.iter().zip(&b.values).all(|(a, b)| a == b || (a.is_nan() && b.is_nan())),
+            "{}",
+            a.name
+        );
+    }
+    let fit = json(&kort(&["fit", bag, "--rig", "speed-drive", "--columns", "ros2", "--json"]));
+    assert!(fit["channels"]["shaft_speed_rad_s"].is_object(), "{fit}");
+    // Its newest changes might have stood in a second file: it is read all the same. Torn, what came before is read.
+    let mut whole = unpacked("ros2-two-thrusters.db3.gz");
+    whole[18..20].fill(2);
+    assert_eq!(read(&write("wal.db3", &whole), "ros2:joint=1").rows(), 1000);
+    let torn = write("torn.db3", &whole[..whole.len() / 2]);
+    let said = kort(&["columns", &torn, "--json"]);
+    assert!(matches!(said.status.code(), Some(2 | 3)), "{}", stderr(&said));
+    assert!(stderr(&said).contains("damaged") || stderr(&said).contains("malformed"), "{}", stderr(&said));
+}
+
+/// Written by ROS 2 itself (rosbag2's own test file): messages of a type that the bag describes.
+#[test]
+fn a_bag_of_ros_2_itself_reads_by_its_own_descriptions() {
+    let found = columns("tests/recordings/logs/rosbag2-cdr-test.db3.gz");
+    let basic = topic(&found, "test_topic");
+    assert_eq!(basic["messages"], 3);
+    assert!(near(basic["to_s"].as_f64().unwrap(), 0.100_350_303));
+    let value = field(basic, "test_topic.int32_value");
+    assert_eq!((&value["min"], &value["max"]), (&123.0.into(), &123.0.into()));
+    assert_eq!(topic(&found, "array_topic")["messages"], 4);
+}
+
+/// The beginning of a real flight, against the numbers that another reader (orangebox 0.5) gives for the same bytes.
+#[test]
+fn a_betaflight_log_reads_with_its_units() {
+    let log = "tests/recordings/logs/betaflight-4.2.bfl.gz";
+    let said = kort(&["columns", log, "--json"]);
+    assert_eq!(said.status.code(), Some(3), "it ends in the middle: {}", stderr(&said));
+    assert!(stderr(&said).contains("without its end"), "{}", stderr(&said));
+    let found: Value = serde_json::from_slice(&said.stdout).unwrap();
+    assert_eq!(found["format"], "Betaflight blackbox");
+    let main = topic(&found, "main");
+    assert_eq!(main["messages"], 2016);
+    assert_eq!(field(main, "main.amperageLatest")["unit"], "A");
+    assert_eq!(field(main, "main.motor[0]")["max"], 1163.0);
+    assert!(shipped(&found).iter().any(|name| name.starts_with("betaflight-vehicle")), "{found}");
+    let recording = read(log, "betaflight-vehicle:motor=3");
+    assert_eq!(recording.rows(), 2016);
+    assert!(near(recording.time_s[1000] - recording.time_s[0], 453.223_772 - 452.208_896));
+    let at = |name: &str, row: usize| recording.column(name).unwrap()[row];
+    for (row, motor, vbat, amperage, gyro, acc) in [
+        (0, 194.0, 2273.0, 0.0, -1.0, 2090.0),
+        (1000, 533.0, 2243.0, 745.0, 1.0, 2099.0),
+        (2015, 684.0, 2219.0, 2585.0, -12.0, 1833.0f64),
+    ] {
+        assert!(near(at("duty_cmd", row), (motor - 48.0) / 1999.0), "{row}");
+        assert!(
+            near(at("supply_v", row), vbat / 100.0) && near(at("battery_current_a", row), amperage / 100.0),
+            "{row}"
+        );
+        assert!((at("turn_rate_x_rad_s", row) - f64::to_radians(gyro)).abs() < 1e-7, "{row}");
+        assert!(near(at("acceleration_z_m_s2", row), acc / 2048.0 * 9.806_65), "{row}");
+    }
+    assert!(recording.notes.iter().any(|note| note.contains("Betaflight 4.2.0")), "{:?}", recording.notes);
+    // No speed is in this firmware's logs, and the map that wants it says so.
+    let refused = kort(&["fit", log, "--rig", "t200", "--columns", "betaflight:pole_pairs=7"]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(stderr(&refused).contains("main.eRPM[0]"), "{}", stderr(&refused));
+    // Two flights in one file, the clock of the second begins anew; a stretch of nonsense within.
+    let whole = unpacked("betaflight-4.2.bfl.gz");
+    let twice = kort(&["columns", &write("twice.bfl", [&whole[..], &whole[..]].concat()), "--json"]);
+    let twice: Value = serde_json::from_slice(&twice.stdout).unwrap();
+    assert_eq!((&topic(&twice, "main")["messages"], &twice["resets"]), (&4032.into(), &1.into()));
+    let mut bad = whole.clone();
+    let middle = bad.len() / 2;
+    bad[middle..middle + 500].fill(0xa5);
+    let recording = read(&write("bad.bfl", &bad), "betaflight-vehicle");
+    assert!(recording.rows() > 1500 && recording.rows() < 2016, "{}", recording.rows());
+}
+
+#[test]
+fn a_log_is_converted_by_its_map() {
+    let parquet = lab::path("flight.parquet");
+    let log = "tests/recordings/logs/px4-uavcan-escs.ulg.gz";
+    let done = kort(&["convert", log, "--columns", "px4-uavcan:bank=1,motor=3", "-o", &parquet]);
+    assert_eq!(done.status.code(), Some(0), "{}", stderr(&done));
+    assert!(String::from_utf8_lossy(&done.stdout).contains("364 rows of"), "{done:?}");
+    let bytes = std::fs::read(&parquet).unwrap();
+    assert!(bytes.starts_with(b"PAR1") && bytes.ends_with(b"PAR1"), "the format's own marks");
+    let csv = lab::path("flight.csv");
+    assert_eq!(
+        kort(&["convert", log, "--columns", "px4-uavcan:bank=1,motor=3", "-o", &csv]).status.code(),
+        Some(0)
+    );
+    let [once, again] = [
+        read(log, "px4-uavcan:bank=1,motor=3"),
+        kort_recording::Recording::read(std::path::Path::new(&csv), None).unwrap(),
+    ];
+    assert_eq!(samples(&once, "shaft_speed_rad_s"), samples(&again, "shaft_speed_rad_s"));
+    let refused = kort(&["convert", log, "--columns", "px4-uavcan:bank=1", "-o", &lab::path("flight.xlsx")]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(stderr(&refused).contains(".parquet"), "{}", stderr(&refused));
+}
