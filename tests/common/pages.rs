@@ -24,6 +24,7 @@ const NOT_RUN: &[(&str, &str, &str)] = &[
         "writes the page itself, from sets that are not all here",
     ),
     ("docs/measured-recordings.md", "kort diagnose t200_static", "the whole table is not in the repository"),
+    ("docs/index.md", "python benches/beside_pysindy.py", "fetches PySINDy and its libraries"),
     ("docker/README.md", "docker compose", "needs docker"),
     (
         "python/README.md",

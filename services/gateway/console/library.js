@@ -16,11 +16,11 @@ async function loadRecordings() {
   $("recordings").replaceChildren(...found.map((item) => cells([[item.name, tagsEntry(item)], String(item.rows), `${item.duration_s.toFixed(1)} s`,
     item.state === "recording" ? "" : [["show", replay], ["compare", compare]].map(([words, action]) =>
       Object.assign(document.createElement("button"), { textContent: words, ariaLabel: `${words} ${item.name}`, onclick: (event) => { event.target.blur(); action(item.name).catch(() => {}); } })),
-    ["csv", "mcap", "parquet"].map((format) => {
+    ["csv", "mcap", "parquet"].flatMap((format) => {
       const link = Object.assign(document.createElement("a"),
         { href: `/v1/recordings/${encodeURIComponent(item.name)}?format=${format}`, textContent: format, ariaLabel: `${item.name} as ${format}`, download: `${item.name}.${format}` });
       link.addEventListener("click", (event) => download(event, link));
-      return link;
+      return [link, " "]; // a place to begin a new line
     })])));
 }
 function tagsEntry(item) {

@@ -20,7 +20,7 @@ const shownSignals = new Set(SIGNALS.filter((signal) => signal[5]).map(([name]) 
 // Columns over time. Nothing measured is null: a gap.
 class Columns {
   constructor() { this.clear(); }
-  clear() { this.t = []; this.c = Object.fromEntries(SIGNALS.map(([name]) => [name, []])); }
+  clear() { this.t = []; this.lines = {}; this.c = Object.fromEntries(SIGNALS.map(([name]) => [name, []])); }
   push(t, row) {
     if (this.t.length && t <= this.t[this.t.length - 1]) { if (t < this.t[this.t.length - 1]) this.clear(); else return; }
     this.t.push(t);
@@ -28,6 +28,8 @@ class Columns {
     for (const name in this.c) this.c[name].push((name === "thrust_error_n" ? error : row[name]) ?? null);
     if (this.t.length > LIVE_POINTS) { this.t.splice(0, 2000); for (const name in this.c) this.c[name].splice(0, 2000); }
   }
+  // A column as it is drawn; of a recording, which grows no more, without the rows between seldom samples.
+  line(name) { return this.done ? (this.lines[name] ??= bridge(this.t, this.c[name])) : this.c[name]; }
   // The part between two instants, its time from `zero_s` on.
   cut(from_s, to_s, zero_s) {
     const part = new Columns(), a = lowerBound(this.t, from_s), b = lowerBound(this.t, to_s);
@@ -50,6 +52,21 @@ function lowerBound(list, value) {
   let low = 0, high = list.length;
   while (low < high) { const mid = (low + high) >> 1; if (list[mid] < value) low = mid + 1; else high = mid; }
   return low;
+}
+// A column of a recording as a line: what is sampled seldom has rows without a value between its samples, which are no gaps. Further
+// apart than three usual steps they are.
+function bridge(t, values) {
+  const has = [], steps = [];
+  values.forEach((v, i) => { if (v !== null) has.push(i); });
+  for (let k = 1; k < has.length; k += 1) steps.push(t[has[k]] - t[has[k - 1]]);
+  if (has.length === values.length || !steps.length) return values;
+  const most = 3 * [...steps].sort((x, y) => x - y)[steps.length >> 1], line = [...values];
+  for (let k = 1; k < has.length; k += 1) {
+    const [a, b] = [has[k - 1], has[k]];
+    if (steps[k - 1] > most) continue;
+    for (let i = a + 1; i < b; i += 1) line[i] = values[a] + (values[b] - values[a]) * (t[i] - t[a]) / (t[b] - t[a]);
+  }
+  return line;
 }
 // Values of another run at these instants, on straight lines; null outside it and beside its gaps.
 function at(times, from, values) {
@@ -149,11 +166,11 @@ class Chart {
       this.shown = shown;
     }
     const first = Math.max(0, lowerBound(a.t, from_s) - 1), last = lowerBound(a.t, to_s) + 1;
-    const [t, drawn] = thin(a.t, names.map((name) => a.c[name]), first, last, both ? Infinity : this.plot.width);
+    const [t, drawn] = thin(a.t, names.map((name) => a.line(name)), first, last, both ? Infinity : this.plot.width);
     const mine = this.signals.map(([name]) => (shownSignals.has(name) ? drawn[names.indexOf(name)] : []));
     const theirs = this.signals.map(([name], i) => {
       if (!both || !shownSignals.has(name)) return [];
-      const other = at(t, b.t, b.c[name]);
+      const other = at(t, b.t, b.line(name));
       return difference ? other.map((v, k) => (v === null || mine[i][k] === null ? null : v - mine[i][k])) : other;
     });
     this.last = this.signals.map(([name]) => a.c[name][Math.min(last, a.t.length) - 1] ?? null);
@@ -187,7 +204,7 @@ function save(name, blob) {
 }
 function tableOf(source, from_s, to_s) {
   const names = SIGNALS.map(([name]) => name).filter((name) => shownSignals.has(name)), { a, b } = source;
-  const others = b ? names.map((name) => at(a.t, b.t, b.c[name])) : [];
+  const others = b ? names.map((name) => at(a.t, b.t, b.line(name))) : [];
   const rows = [["time_s", ...names, ...(b ? names.map((name) => `b_${name}`) : [])].join(",")];
   for (let i = lowerBound(a.t, from_s); i < a.t.length && a.t[i] <= to_s; i += 1) {
     rows.push([a.t[i], ...names.map((name) => a.c[name][i]), ...others.map((values) => values[i])].map((v) => v ?? "").join(","));

@@ -85,4 +85,3 @@ $("signal-kind").addEventListener("change", showFields);
 $("signal-of").addEventListener("change", showFields);
 $("signal-limit").addEventListener("input", preview);
 $("signal-file").addEventListener("change", async () => { scenarioText = (await $("signal-file").files[0]?.text()) ?? null; preview(); });
-setTimeout(showFields, 300);
