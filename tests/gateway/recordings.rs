@@ -7,6 +7,43 @@ use serde_json::json;
 use crate::asking::{JSON, assert_problem, send};
 use crate::common::{self, Site, Stack, kill, wait};
 
+/// One word begins a recording of every thruster, on one time, and one ends them.
+#[test]
+fn a_set_records_every_thruster_on_one_time() {
+    common::in_real_time(|| {
+        let stack = Stack::start_at(Site::new().with_t2());
+        let port = stack.site.port;
+        let sets = "/v1/recording-sets";
+        let begun =
+            send(port, "POST", sets, &[JSON], br#"{"name": "dive", "rate_hz": 200, "tags": ["pool"]}"#);
+        assert_eq!((begun.status, &begun.json()["name"]), (201, &json!("dive")));
+        let again = send(port, "POST", sets, &[JSON], br#"{"name": "dive"}"#);
+        assert_problem(&again, 409, "recording-active", "the same name");
+        let long = json!({"name": "a".repeat(48)}).to_string();
+        assert_problem(&send(port, "POST", sets, &[JSON], long.as_bytes()), 422, "out-of-range", "too long");
+        std::thread::sleep(Duration::from_millis(1500));
+        let done = send(port, "DELETE", "/v1/recording-sets/dive", &[], b"");
+        assert_eq!(done.status, 200);
+        let done = done.json()["recordings"].clone();
+        for (place, thruster) in ["t1", "t2"].iter().enumerate() {
+            let info = &done[place];
+            assert_eq!((&info["thruster"], &info["set"]), (&json!(thruster), &json!("dive")), "{info}");
+            assert_eq!((&info["state"], &info["tags"]), (&json!("complete"), &json!(["pool"])), "{info}");
+            assert_eq!(info["started"], done[0]["started"], "{info}");
+            let file = send(port, "GET", &format!("/v1/recordings/dive-{thruster}"), &[], b"").body;
+            let recording = kort_recording::Recording::decode("dive", file.as_slice(), None).unwrap();
+            let (first, last) = (recording.time_s[0], recording.time_s[recording.rows() - 1]);
+            assert!(first < 0.5 && last > 1.0, "{thruster}: {first} to {last} s");
+        }
+        assert_problem(
+            &send(port, "DELETE", "/v1/recording-sets/dive", &[], b""),
+            409,
+            "no-recording",
+            "over",
+        );
+    });
+}
+
 /// What a stranger and a later diagnosis need stands in the file, and several recordings run at once.
 #[test]
 fn a_recording_holds_its_context_and_is_deleted_by_name() {

@@ -4,7 +4,7 @@ use crate::extract::{Json, OptionalJson};
 use crate::problem::Problem;
 use crate::routes::bodies::{
     ControllerFile, ControllerRequest, DiagnosisRequest, ExcitationRequest, LeaseRequest, RecordingRequest,
-    RigRequest, TagsRequest, incoming,
+    RecordingSetRequest, RigRequest, TagsRequest, incoming,
 };
 use crate::view::Setpoint;
 
@@ -27,6 +27,8 @@ pub enum Body {
     Diagnosis,
     /// `POST /v1/recordings`
     Recording,
+    /// `POST /v1/recording-sets`
+    RecordingSet,
     /// `PATCH /v1/recordings/{name}`
     Tags,
     /// A text message of the stream.
@@ -35,7 +37,7 @@ pub enum Body {
 
 impl Body {
     /// Every kind.
-    pub const ALL: [Body; 10] = [
+    pub const ALL: [Body; 11] = [
         Body::Setpoint,
         Body::Lease,
         Body::Controller,
@@ -44,6 +46,7 @@ impl Body {
         Body::Rig,
         Body::Diagnosis,
         Body::Recording,
+        Body::RecordingSet,
         Body::Tags,
         Body::Message,
     ];
@@ -62,6 +65,7 @@ impl Body {
             Body::Rig => Json::<RigRequest>::from_bytes(bytes).map(drop),
             Body::Diagnosis => OptionalJson::<DiagnosisRequest>::from_bytes(bytes).map(drop),
             Body::Recording => OptionalJson::<RecordingRequest>::from_bytes(bytes).map(drop),
+            Body::RecordingSet => OptionalJson::<RecordingSetRequest>::from_bytes(bytes).map(drop),
             Body::Tags => Json::<TagsRequest>::from_bytes(bytes).map(drop),
             // A message that is not UTF-8 is no message of the stream: the connection is closed before.
             Body::Message => std::str::from_utf8(bytes).map_or(Ok(()), |text| incoming(text).map(drop)),

@@ -5,6 +5,7 @@
 //! with the cause; what was written stays readable.
 
 mod kept;
+mod set;
 mod write;
 
 use std::collections::BTreeMap;
@@ -30,12 +31,13 @@ use crate::settings::RecordingLimits;
 use crate::thruster::{Thruster, lock};
 use crate::token::{Identity, Role};
 pub use kept::{TAGS_MAX, check_tags};
+pub use set::{RecordingSet, Together};
 use write::{Item, Job};
 
 /// Rows that may wait for the disk: two seconds at the fastest servo.
 const QUEUE_ROWS: usize = 10_000;
 /// Recordings that may run at once.
-const AT_ONCE: usize = 8;
+const AT_ONCE: usize = 40;
 /// Ending of a recording's file.
 pub const ENDING: &str = "mcap";
 
@@ -48,6 +50,9 @@ pub struct RecordingInfo {
     /// The thruster.
     #[schema(example = "t1")]
     pub thruster: String,
+    /// The set that it was started with, one recording of every thruster on one time; null if it was started alone.
+    #[serde(default)]
+    pub set: Option<String>,
     /// Who started it: name of the token, `local` where none is asked for.
     #[serde(default)]
     pub owner: String,
@@ -172,8 +177,9 @@ impl Recorder {
         name: Option<String>,
         tags: Vec<String>,
         rate_hz: f64,
+        together: Option<&Together>,
     ) -> Result<RecordingInfo, Problem> {
-        let now = SystemTime::now();
+        let now = together.map_or_else(SystemTime::now, |set| set.began);
         self.reap();
         // The list itself is not held while the disk works: the bus hands out samples by it.
         let _one_at_a_time = lock(&self.starting);
@@ -200,6 +206,7 @@ impl Recorder {
         let info = RecordingInfo {
             name: name.clone(),
             thruster: thruster.clone(),
+            set: together.map(|set| set.name.clone()),
             owner: who.name.clone(),
             tags,
             state: RecordingState::Recording,
@@ -213,8 +220,15 @@ impl Recorder {
         };
         let failed = |error: &io::Error| self.failed(&name, error);
         let shared = Arc::new(Mutex::new(info.clone()));
-        let job = Job::begin(&self.folder, subject, self.limits, Arc::clone(&shared), now)
-            .map_err(|error| failed(&error))?;
+        let job = Job::begin(
+            &self.folder,
+            subject,
+            self.limits,
+            Arc::clone(&shared),
+            now,
+            together.map(|set| set.first_ns),
+        )
+        .map_err(|error| failed(&error))?;
         let (items, inbox) = sync_channel(QUEUE_ROWS);
         let theirs = Arc::clone(self);
         let thread = std::thread::Builder::new()
@@ -258,6 +272,13 @@ impl Recorder {
             }
             _ => Ok(self.sized(info)),
         }
+    }
+
+    /// Names of what runs of a set.
+    fn names_running_of(&self, set: &str) -> Vec<String> {
+        self.reap();
+        let of = |running: &&Running| lock(&running.info).set.as_deref() == Some(set);
+        lock(&self.running).iter().filter(of).map(|running| running.name.clone()).collect()
     }
 
     /// Names of what runs.

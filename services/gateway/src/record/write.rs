@@ -88,6 +88,7 @@ impl Job {
         limits: RecordingLimits,
         info: Arc<Mutex<RecordingInfo>>,
         began: SystemTime,
+        first_ns: Option<u64>,
     ) -> io::Result<Job> {
         let now = lock(&info).clone();
         guard_space(folder, &limits).map_err(|end| match end {
@@ -104,7 +105,7 @@ impl Job {
             began,
             file,
             part: 1,
-            first_ns: None,
+            first_ns,
             given: (0, 0.0),
             thin: Thin::new(now.rate_hz),
             state_s: f64::NEG_INFINITY,
@@ -164,6 +165,10 @@ impl Job {
 
     fn sample(&mut self, time_ns: u64, signals: &Signals) -> Result<(), End> {
         let first_ns = *self.first_ns.get_or_insert(time_ns);
+        // Of a set that begins later than this sample.
+        if time_ns < first_ns {
+            return Ok(());
+        }
         let Some(row) = self.thin.take(time_ns, signals) else { return Ok(()) };
         let time_s = time_ns.saturating_sub(first_ns) as f64 * 1e-9;
         let values: Vec<f64> = SIGNALS.iter().map(|signal| (signal.get)(&row)).collect();

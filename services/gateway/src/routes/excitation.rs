@@ -131,7 +131,8 @@ async fn start(
     let recording = if diagnose || record.is_some() {
         let (recorder, subject, who) = (Arc::clone(app.recorder()), app.subject(&thruster.id)?, who.clone());
         let name = record.or_else(|| Some(format!("{}-{}", thruster.id, stamp())));
-        let begun = blocking(move || recorder.start(subject, &who, name, Vec::new(), RECORDED_AT_HZ)).await?;
+        let begun =
+            blocking(move || recorder.start(subject, &who, name, Vec::new(), RECORDED_AT_HZ, None)).await?;
         Some(begun.name)
     } else {
         None

@@ -13,6 +13,7 @@ mod health;
 mod history;
 mod lease;
 mod metrics;
+mod recording_sets;
 mod recordings;
 mod rig;
 mod setpoint;
@@ -29,6 +30,7 @@ pub mod bodies {
     pub use super::diagnoses::DiagnosisRequest;
     pub use super::excitation::ExcitationRequest;
     pub use super::lease::LeaseRequest;
+    pub use super::recording_sets::RecordingSetRequest;
     pub use super::recordings::{RecordingRequest, TagsRequest};
     pub use super::rig::RigRequest;
     pub use super::stream::parse as incoming;
@@ -65,6 +67,7 @@ pub fn router(app: Arc<App>) -> Router {
         .merge(stream::routes())
         .merge(history::routes())
         .merge(recordings::routes())
+        .merge(recording_sets::routes())
         .merge(faults::routes())
         .merge(metrics::routes())
         .merge(health::routes())

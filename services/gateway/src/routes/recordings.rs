@@ -23,7 +23,7 @@ use crate::record::{ENDING, RecordingInfo, TAGS_MAX, check_new_name, check_tags}
 use crate::token::Identity;
 
 /// Rows a second when the request names no rate.
-const RATE_DEFAULT_HZ: f64 = 100.0;
+pub const RATE_DEFAULT_HZ: f64 = 100.0;
 const RATE_MAX_HZ: f64 = 5000.0;
 
 pub fn routes() -> OpenApiRouter<Arc<App>> {
@@ -37,7 +37,6 @@ pub fn routes() -> OpenApiRouter<Arc<App>> {
 pub struct RecordingRequest {
     /// Thruster to record; the first of the configuration if left out.
     #[serde(default)]
-    #[schema(nullable = false)]
     thruster: Option<String>,
     /// Name of the recording; made of thruster and time if left out.
     #[serde(default)]
@@ -63,12 +62,21 @@ pub struct TagsRequest {
     tags: Vec<String>,
 }
 
-fn tags_schema() -> Schema {
+pub fn tags_schema() -> Schema {
     let tag =
         ObjectBuilder::new().schema_type(Type::String).pattern(Some("^[A-Za-z0-9][A-Za-z0-9._-]{0,31}$"));
     let words =
         "1 to 32 letters, digits, dots, underscores or hyphens each; one that stands twice is kept once";
     ArrayBuilder::new().items(tag).max_items(Some(TAGS_MAX)).description(Some(words)).build().into()
+}
+
+/// Rows a second that can be asked for.
+pub fn check_rate(rate_hz: f64) -> Result<(), Problem> {
+    if (0.1..=RATE_MAX_HZ).contains(&rate_hz) {
+        return Ok(());
+    }
+    Err(Problem::new(Kind::OutOfRange, format!("rate_hz = {rate_hz} is outside 0.1 to {RATE_MAX_HZ}"))
+        .hint("the servo's own rate is the most that can be recorded"))
 }
 
 /// Which recordings.
@@ -158,17 +166,11 @@ async fn start(
     }
     let tags = check_tags(request.tags)?;
     let rate_hz = request.rate_hz.unwrap_or(RATE_DEFAULT_HZ);
-    if !(0.1..=RATE_MAX_HZ).contains(&rate_hz) {
-        return Err(Problem::new(
-            Kind::OutOfRange,
-            format!("rate_hz = {rate_hz} is outside 0.1 to {RATE_MAX_HZ}"),
-        )
-        .hint("the servo's own rate is the most that can be recorded"));
-    }
+    check_rate(rate_hz)?;
     let first = || app.thrusters().first().map(|thruster| thruster.id.clone()).unwrap_or_default();
     let subject = app.subject(&request.thruster.unwrap_or_else(first))?;
     let recorder = Arc::clone(app.recorder());
-    let info = blocking(move || recorder.start(subject, &who, request.name, tags, rate_hz)).await??;
+    let info = blocking(move || recorder.start(subject, &who, request.name, tags, rate_hz, None)).await??;
     Ok((StatusCode::CREATED, axum::Json(info)))
 }
 
@@ -302,6 +304,7 @@ fn unreadable(path: &std::path::Path, error: impl std::fmt::Display) -> Problem 
     Problem::new(Kind::Internal, format!("{}: {error}", path.display()))
 }
 
-async fn blocking<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Result<T, Problem> {
+/// Work that waits for the disk.
+pub async fn blocking<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Result<T, Problem> {
     tokio::task::spawn_blocking(work).await.map_err(|error| Problem::new(Kind::Internal, error.to_string()))
 }
