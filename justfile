@@ -48,3 +48,22 @@ python:
 # undefined behaviour in what shared memory carries: messages, texts, freshness (nightly, miri)
 miri:
     cargo +nightly miri test -p kort-proto --test payloads
+
+# for the computers aboard, without the laboratory: cross-built for arm64 (Raspberry Pi 4 and 5, Jetson) with Debian's compiler
+arm64:
+    rustup target add aarch64-unknown-linux-gnu
+    command -v aarch64-linux-gnu-gcc || apt-get install -y --no-install-recommends gcc-aarch64-linux-gnu libc6-dev-arm64-cross
+    CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc CC_aarch64_unknown_linux_gnu=aarch64-linux-gnu-gcc \
+        cargo build --release --target aarch64-unknown-linux-gnu --no-default-features --features servo,controller,gateway
+    ls -l target/aarch64-unknown-linux-gnu/release/kort
+
+# the pure crates' tests on arm64, under qemu-user
+arm64-test:
+    command -v qemu-aarch64 || apt-get install -y --no-install-recommends qemu-user
+    CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc CC_aarch64_unknown_linux_gnu=aarch64-linux-gnu-gcc \
+        CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER="qemu-aarch64 -L /usr/aarch64-linux-gnu" \
+        cargo test --target aarch64-unknown-linux-gnu -p kort-thruster -p kort-control -p kort-scenario --lib
+
+# a Debian package of this machine's architecture, with its systemd unit (cargo install cargo-deb)
+deb:
+    cargo deb

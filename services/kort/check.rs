@@ -79,9 +79,21 @@ fn one(file: &Path, text: &str, problems: &mut Vec<Problem>) {
     }
     if ["thrusters", "gateway", "transport"].iter().any(|key| table.contains_key(*key)) {
         deployment(Some(file), problems);
-    } else if let Err(words) = kort_lab::check::Kind::of(&table).check(text, file) {
+    } else if let Err(words) = described(&table, text, file) {
         problems.push(problem(&name, &words));
     }
+}
+
+/// A rig, a scenario, a column map or a controller.
+#[cfg(feature = "lab")]
+fn described(table: &toml::Table, text: &str, file: &Path) -> Result<(), String> {
+    kort_lab::check::Kind::of(table).check(text, file)
+}
+
+/// Rigs are read with the deployment that names them.
+#[cfg(not(feature = "lab"))]
+fn described(_: &toml::Table, _: &str, _: &Path) -> Result<(), String> {
+    Err("this kort was built without its laboratory, and reads deployments only\nhint: check it with a whole one".into())
 }
 
 /// Everything that servo, controller and gateway would refuse.
@@ -92,10 +104,14 @@ fn deployment(file: Option<&Path>, problems: &mut Vec<Problem>) {
         Err(error) => return problems.push(problem(&name, &error.to_string())),
     };
     let mut said = Vec::new();
+    #[cfg(any(feature = "servo", feature = "controller"))]
     for id in config.thrusters.keys() {
+        #[cfg(feature = "servo")]
         said.extend(kort_servo::check(&config, id).err().map(|e| e.to_string()));
+        #[cfg(feature = "controller")]
         said.extend(kort_controller::check(&config, id).err().map(|e| e.to_string()));
     }
+    #[cfg(feature = "gateway")]
     said.extend(kort_gateway::check_config(&config).err().map(|e| e.to_string()));
     said.dedup();
     for words in said {

@@ -2,8 +2,11 @@
 
 use std::process::ExitCode;
 
+#[cfg(feature = "lab")]
 use kort_proto::transport::idle;
-use rustix::process::{Pid, Signal, getppid, nice, set_parent_process_death_signal};
+#[cfg(feature = "lab")]
+use rustix::process::nice;
+use rustix::process::{Pid, Signal, getppid, set_parent_process_death_signal};
 
 use crate::{FAILED, fail};
 
@@ -11,6 +14,7 @@ use crate::{FAILED, fail};
 ///
 /// # Errors
 /// The parent is gone already.
+#[cfg(feature = "lab")]
 pub fn begin(parent: u32) -> Result<(), ExitCode> {
     follow(parent, Signal::KILL)?;
     // Where the one is not permitted the other still helps.

@@ -1,9 +1,15 @@
 //! `kort`: thrust control for marine thrusters, and a laboratory that finds what the model left
 //! out. This file parses and dispatches; every subcommand lives in a folder of its own.
+//!
+//! Aboard the laboratory can be left out (`--no-default-features --features servo,controller,gateway`): then the service can do all but
+//! diagnose its recordings.
 
 mod check;
+#[cfg(feature = "servo")]
 mod job;
+#[cfg(feature = "gateway")]
 mod token;
+#[cfg(all(feature = "servo", feature = "controller", feature = "gateway"))]
 mod up;
 
 use std::path::PathBuf;
@@ -11,17 +17,21 @@ use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand};
 use kort_proto::config::Config;
+#[cfg(feature = "servo")]
 use kort_proto::messages::Trip;
 use kort_proto::transport::Deployment;
+#[cfg(feature = "servo")]
 use rustix::process::Signal;
 
 /// Done.
 const DONE: u8 = 0;
 /// Failed.
+#[cfg(any(feature = "servo", feature = "controller", feature = "gateway"))]
 const FAILED: u8 = 1;
 /// Wrong usage or unreadable input.
 const USAGE: u8 = 2;
 
+#[cfg(all(feature = "servo", feature = "controller", feature = "gateway"))]
 const UP_EXAMPLE: &str =
     "Example: kort up --config config/kort.toml\n\nThen: curl http://127.0.0.1:8080/v1/thrusters/t1";
 
@@ -41,9 +51,11 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     /// Start and watch servo, controller and gateway; Ctrl-C stops them, thrust at zero first
+    #[cfg(all(feature = "servo", feature = "controller", feature = "gateway"))]
     #[command(after_help = UP_EXAMPLE)]
     Up(Service),
     /// The servo alone: the loop that drives the amplifier
+    #[cfg(feature = "servo")]
     #[command(after_help = "Example: kort servo --config config/kort.toml --thruster t1")]
     Servo {
         #[command(flatten)]
@@ -63,6 +75,7 @@ enum Command {
         parent: Option<u32>,
     },
     /// The controller alone: from setpoint to drive command
+    #[cfg(feature = "controller")]
     #[command(after_help = "Example: kort controller --config config/kort.toml --thruster t1")]
     Controller {
         #[command(flatten)]
@@ -73,14 +86,17 @@ enum Command {
         latched: Latched,
     },
     /// The gateway alone: console, REST API, WebSocket, metrics, recordings
+    #[cfg(feature = "gateway")]
     #[command(after_help = "Example: kort gateway --config config/kort.toml")]
     Gateway(Service),
     /// Read configurations as the services would, and say everything that is wrong
     #[command(after_help = "Example: kort check config/kort.toml config/thrusters/t200.toml")]
     Check(check::Check),
     /// Make a token: who may read, command or administer
+    #[cfg(feature = "gateway")]
     #[command(subcommand)]
     Token(token::Token),
+    #[cfg(feature = "lab")]
     #[command(flatten)]
     Lab(kort_lab::Command),
 }
@@ -95,6 +111,7 @@ struct Service {
     root: Option<PathBuf>,
 }
 
+#[cfg(any(feature = "servo", feature = "controller"))]
 #[derive(Args)]
 struct Which {
     /// Thruster to serve
@@ -102,6 +119,7 @@ struct Which {
     thruster: String,
 }
 
+#[cfg(any(feature = "servo", feature = "controller"))]
 #[derive(Args)]
 struct Latched {
     /// Faults that the process before had latched, as a bitset: they stay until somebody clears them
@@ -110,6 +128,7 @@ struct Latched {
 }
 
 /// Reads `--tripped`.
+#[cfg(feature = "servo")]
 fn trip(text: &str) -> Result<Trip, String> {
     let words = || "three numbers, for example 1000000000,80.0,63.0".to_owned();
     let parts: Vec<&str> = text.split(',').collect();
@@ -139,16 +158,28 @@ fn main() -> ExitCode {
             return ExitCode::from(if e.use_stderr() { USAGE } else { DONE });
         }
     };
-    dispatch(cli.command.unwrap_or(Command::Up(cli.up))).unwrap_or_else(|code| code)
+    match cli.command {
+        Some(command) => dispatch(command),
+        #[cfg(all(feature = "servo", feature = "controller", feature = "gateway"))]
+        None => dispatch(Command::Up(cli.up)),
+        #[cfg(not(all(feature = "servo", feature = "controller", feature = "gateway")))]
+        None => {
+            let _ = <Cli as clap::CommandFactory>::command().print_help();
+            Ok(ExitCode::from(USAGE))
+        }
+    }
+    .unwrap_or_else(|code| code)
 }
 
 fn dispatch(command: Command) -> Result<ExitCode, ExitCode> {
     match command {
+        #[cfg(all(feature = "servo", feature = "controller", feature = "gateway"))]
         Command::Up(service) => {
             log();
             let (config, deployment) = service.load()?;
             finish(up::run(&config, &deployment))
         }
+        #[cfg(feature = "servo")]
         Command::Servo { service, which, join, latched, tripped, parent } => {
             log();
             if let Some(parent) = parent {
@@ -159,18 +190,22 @@ fn dispatch(command: Command) -> Result<ExitCode, ExitCode> {
                 kort_servo::Inherited { latched: latched.latched, tripped: tripped.unwrap_or_default() };
             finish(kort_servo::run(&config, &deployment, &which.thruster, join, inherited))
         }
+        #[cfg(feature = "controller")]
         Command::Controller { service, which, latched } => {
             log();
             let (config, deployment) = service.load()?;
             finish(kort_controller::run(&config, &deployment, &which.thruster, latched.latched))
         }
+        #[cfg(feature = "gateway")]
         Command::Gateway(service) => {
             log();
             let (config, deployment) = service.load()?;
             finish(kort_gateway::run(&config, &deployment))
         }
         Command::Check(args) => Ok(check::run(&args)),
+        #[cfg(feature = "gateway")]
         Command::Token(command) => token::run(command),
+        #[cfg(feature = "lab")]
         Command::Lab(command) => {
             if let Some(parent) = command.job_of() {
                 job::begin(parent)?;
@@ -189,6 +224,7 @@ trait Blames {
     fn blames_input(&self) -> bool;
 }
 
+#[cfg(all(feature = "servo", feature = "controller", feature = "gateway"))]
 impl Blames for up::UpError {
     fn blames_input(&self) -> bool {
         match self {
@@ -201,18 +237,21 @@ impl Blames for up::UpError {
     }
 }
 
+#[cfg(feature = "servo")]
 impl Blames for kort_servo::ServoError {
     fn blames_input(&self) -> bool {
         matches!(self, Self::Config(_) | Self::Rig { .. })
     }
 }
 
+#[cfg(feature = "controller")]
 impl Blames for kort_controller::ControllerError {
     fn blames_input(&self) -> bool {
         matches!(self, Self::Config(_) | Self::Rig { .. } | Self::Law { .. } | Self::Model { .. })
     }
 }
 
+#[cfg(feature = "gateway")]
 impl Blames for kort_gateway::GatewayError {
     fn blames_input(&self) -> bool {
         matches!(self, Self::Config(_) | Self::NoTokens { .. } | Self::Tokens(_) | Self::Tls(_))

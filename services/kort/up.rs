@@ -5,6 +5,7 @@ mod error;
 mod inherited;
 mod role;
 mod scribe;
+mod system;
 mod watch;
 
 use std::io::Write;
@@ -78,6 +79,7 @@ pub fn run(config: &Config, deployment: &Deployment) -> Result<(), UpError> {
          Ctrl-C stops all, thrust at zero first\n"
     );
     let result = service.watch_until(&stop);
+    system::stopping();
     service.end();
     result
 }
@@ -161,6 +163,7 @@ impl Service {
     /// Watches and replaces until told to stop.
     fn watch_until(&mut self, stop: &AtomicBool) -> Result<(), UpError> {
         let mut looked = Instant::now();
+        let mut system = system::System::new();
         while !stop.load(Ordering::Relaxed) {
             std::thread::sleep(LOOK_EVERY);
             if looked.elapsed() > STOOD_STILL {
@@ -179,6 +182,7 @@ impl Service {
             }
             self.replace()?;
             self.write_down();
+            system.look(self.roles.iter().all(Role::is_up));
         }
         Ok(())
     }

@@ -6,6 +6,7 @@ mod common;
 mod inherited;
 mod refusals;
 mod strangers;
+mod system;
 
 use std::time::{Duration, Instant};
 
