@@ -25,6 +25,7 @@ const NOT_RUN: &[(&str, &str, &str)] = &[
     ),
     ("docs/measured-recordings.md", "kort diagnose t200_static", "the whole table is not in the repository"),
     ("docs/index.md", "python benches/beside_pysindy.py", "fetches PySINDy and its libraries"),
+    ("docs/operations.md", "apt install ./target/debian", "installs as root: packaging/test.sh does it"),
     ("docker/README.md", "docker compose", "needs docker"),
     (
         "python/README.md",

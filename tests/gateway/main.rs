@@ -6,6 +6,7 @@ mod commands;
 mod common;
 mod errors;
 mod followed;
+mod foxglove;
 mod kept;
 mod pages;
 mod recordings;

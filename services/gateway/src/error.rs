@@ -19,6 +19,14 @@ pub enum GatewayError {
         /// The system's words.
         error: std::io::Error,
     },
+    /// The address for Foxglove cannot be listened on.
+    #[error("gateway.foxglove = {bind}: {error}\nhint: another port, or leave the key out")]
+    Foxglove {
+        /// The address.
+        bind: SocketAddr,
+        /// The system's words.
+        error: std::io::Error,
+    },
     /// The folder of the recordings cannot be used.
     #[error("gateway.recordings = {}: {error}\nhint: name a folder this user can write", folder.display())]
     Recordings {

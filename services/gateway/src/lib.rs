@@ -19,6 +19,8 @@ mod error;
 mod events;
 mod excitation;
 mod extract;
+#[cfg(feature = "foxglove")]
+mod foxglove;
 mod gate;
 mod heard;
 mod hosts;
@@ -398,6 +400,14 @@ async fn serve(
     let app = Arc::new(app);
     for rig in &app.rigs {
         tokio::spawn(Arc::clone(rig).keep_in_force());
+    }
+
+    #[cfg(feature = "foxglove")]
+    if let Some(bind) = settings.foxglove {
+        let listener = tokio::net::TcpListener::bind(bind);
+        let listener = listener.await.map_err(|error| GatewayError::Foxglove { bind, error })?;
+        tracing::info!("for Foxglove: ws://{bind}");
+        tokio::spawn(foxglove::serve(Arc::clone(&app), listener));
     }
 
     let stop_bus = Arc::new(AtomicBool::new(false));

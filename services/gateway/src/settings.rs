@@ -39,6 +39,9 @@ pub struct Settings {
     pub behind_tls_proxy: bool,
     /// TLS of its own.
     pub tls: Option<Tls>,
+    /// Address of a live server for Foxglove, read only, of this machine; none if left out.
+    #[serde(deserialize_with = "maybe_address")]
+    pub foxglove: Option<SocketAddr>,
     /// When a recording ends by itself.
     pub recording: RecordingLimits,
     /// What is kept for diagnoses, and of them.
@@ -121,6 +124,7 @@ impl Default for Settings {
             hosts: Vec::new(),
             behind_tls_proxy: false,
             tls: None,
+            foxglove: None,
             recording: RecordingLimits::default(),
             diagnosis: DiagnosisLimits::default(),
         }
@@ -134,6 +138,10 @@ fn address<'de, D: Deserializer<'de>>(deserializer: D) -> Result<SocketAddr, D::
             "{text:?} is no address; allowed is IP:PORT\nhint: \"127.0.0.1:8080\"; any address beyond this machine also needs tokens and TLS"
         ))
     })
+}
+
+fn maybe_address<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<SocketAddr>, D::Error> {
+    address(deserializer).map(Some)
 }
 
 impl Settings {
@@ -164,6 +172,16 @@ impl Settings {
             return Err(format!(
                 "`gateway.hosts` holds {odd:?}; allowed are names and addresses without scheme, port or path\nhint: \"thruster.example.org\""
             ));
+        }
+        if let Some(bind) = self.foxglove {
+            if !bind.ip().is_loopback() || self.require_tokens {
+                return Err(format!(
+                    "`gateway.foxglove` = {bind} asks nobody for a token; allowed are addresses of this machine, without require_tokens\nhint: \"127.0.0.1:8765\", and a tunnel from elsewhere"
+                ));
+            }
+            if !cfg!(feature = "foxglove") {
+                return Err("`gateway.foxglove`: this program was built without the feature `foxglove`\nhint: leave the key out".into());
+            }
         }
         let limits = &self.recording;
         for (key, value, low, high) in [

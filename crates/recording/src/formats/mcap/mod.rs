@@ -17,7 +17,7 @@ use crate::recording::Recording;
 
 pub(super) use messages::log;
 use table::Table;
-pub use write::Rows;
+pub use write::{Rows, schema};
 
 /// No record and no chunk of a sensible file is longer; a broken length must not eat the memory.
 const RECORD_LIMIT: usize = 1 << 30;

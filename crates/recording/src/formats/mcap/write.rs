@@ -155,8 +155,8 @@ fn topic_of(topic: &str) -> String {
     if topic.starts_with('/') { topic.to_string() } else { format!("/{topic}") }
 }
 
-/// JSON schema of a message, so that Foxglove lists the signals with unit and meaning.
-fn schema(columns: &[&str]) -> Value {
+/// JSON schema of a message with these columns beside `time_s`, so that Foxglove lists the signals with unit and meaning.
+pub fn schema(columns: &[&str]) -> Value {
     let about = |name: &str| match columns::find(name) {
         Some(known) => format!("{} [{}]", known.meaning, known.unit),
         None => units::of_column(name).map_or("1".into(), |u| u.symbol.to_string()),
