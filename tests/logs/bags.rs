@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use crate::lab::{self, json, kort, stderr, write};
-use crate::{columns, field, near, read, samples, shipped, topic};
+use crate::{columns, field, near, read, samples, shipped, topic, writers};
 
 fn unpacked(name: &str) -> Vec<u8> {
     let mut whole = Vec::new();
@@ -101,6 +101,25 @@ fn a_betaflight_log_reads_with_its_units() {
     bad[middle..middle + 500].fill(0xa5);
     let recording = read(&write("bad.bfl", &bad), "betaflight-vehicle");
     assert!(recording.rows() > 1500 && recording.rows() < 2016, "{}", recording.rows());
+}
+
+/// Written as the format's description has it: changed frames are predicted from whole ones, and speeds from pole pairs.
+#[test]
+fn a_betaflight_log_with_motor_speeds() {
+    let log = write("erpm.bbl", writers::blackbox(500));
+    let found = columns(&log);
+    assert_eq!(shipped(&found), ["betaflight:motor=0,pole_pairs=7"], "{found}");
+    let recording = read(&log, "betaflight:pole_pairs=7");
+    assert_eq!((recording.rows(), &recording.losses), (500, &vec![]));
+    let speed = recording.column("shaft_speed_rad_s").unwrap();
+    let duty = recording.column("duty_cmd").unwrap();
+    for k in 0..500_usize {
+        let rpm = 100.0 * writers::erpm(k as i64) as f64 / 7.0;
+        assert!(near(speed[k], rpm * std::f64::consts::TAU / 60.0), "{k}");
+        assert!(near(duty[k], (158.0 + 10.0 * (k % 50) as f64 - 48.0) / 1999.0), "{k}");
+        assert!(near(recording.column("supply_v").unwrap()[k], (2400 - k % 7) as f64 / 100.0), "{k}");
+    }
+    assert!(recording.notes.iter().any(|note| note.contains("motor_poles = 14")), "{:?}", recording.notes);
 }
 
 #[test]

@@ -54,16 +54,15 @@ fn take(
     header: &Header,
     data: &[u8],
 ) {
-    // The logs of a file may differ in their fields.
-    let places: Vec<usize> = header
-        .scales
-        .iter()
-        .zip(&header.main.names)
-        .map(|(scale, name)| {
-            names.iter().position(|known| known == name).unwrap_or_else(|| {
+    // The logs of a file may differ in their fields. Counts of the loop are not kept: changed frames do not hold them.
+    let places: Vec<Option<usize>> = (header.scales.iter().zip(&header.main.names))
+        .map(|(scale, name)| match names.iter().position(|known| known == name) {
+            _ if name == "loopIteration" => None,
+            None => {
                 names.push(name.clone());
-                gather.field(topic, name, scale.map(|(_, unit)| unit.to_owned()))
-            })
+                Some(gather.field(topic, name, scale.map(|(_, unit)| unit.to_owned())))
+            }
+            known => known,
         })
         .collect();
     let mut decoder = Decoder { header, bytes: Bytes::new(data), last: None, before: None };
@@ -74,6 +73,7 @@ fn take(
                 last_us = values[header.time];
                 gather.message(topic, last_us as f64 * 1e-6);
                 for ((value, place), scale) in values.iter().zip(&places).zip(&header.scales) {
+                    let Some(place) = place else { continue };
                     gather.set(topic, *place, *value as f64 * scale.map_or(1.0, |(factor, _)| factor));
                 }
                 frames += 1;
