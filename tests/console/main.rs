@@ -63,6 +63,8 @@ fn an_operator_takes_command_thrusts_records_and_stops() {
         ));
             assert!(colours.as_u64().unwrap() > 3, "the plot of {chart} shows curves: {colours} colours");
         }
+        // What the observer believes of the flow has its standard error on both sides.
+        page.until("(() => { const i = live.t.length - 1, [low, mid, high] = ['low', 'm_s', 'high'].map((end) => live.c[`estimated_flow_${end}`][i]); return low !== null && low < mid && mid < high; })()");
         page.eval("document.getElementById('controller').value = 'static_map'");
         page.click("switch");
         page.until("state.controller === 'static_map'");

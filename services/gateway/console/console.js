@@ -78,8 +78,12 @@ function connect() {
 }
 
 function record(s) {
-  const set = s.setpoint || {}, cmd = s.commanded || {}, est = s.estimated;
-  live.push(s.time_s, { ...s.measured, ...cmd, thrust_cmd_n: set.thrust_n ?? cmd.thrust_cmd_n, speed_cmd_rad_s: set.speed_rad_s ?? cmd.speed_cmd_rad_s,
+  const set = s.setpoint || {}, cmd = s.commanded || {}, est = s.estimated, sides = {};
+  for (const [name, of] of [["thrust_n", "thrust"], ["flow_m_s", "flow"], ["ambient_m_s", "ambient"]]) { // one standard error, where the observer has one
+    const doubt = est.parameters.find((p) => p.name === name)?.std_error ?? null;
+    if (doubt !== null && est[name] !== null) { sides[`estimated_${of}_low`] = est[name] - doubt; sides[`estimated_${of}_high`] = est[name] + doubt; }
+  }
+  live.push(s.time_s, { ...s.measured, ...cmd, ...sides, thrust_cmd_n: set.thrust_n ?? cmd.thrust_cmd_n, speed_cmd_rad_s: set.speed_rad_s ?? cmd.speed_cmd_rad_s,
     estimated_thrust_n: est.thrust_n, estimated_flow_m_s: est.flow_m_s, estimated_ambient_m_s: est.ambient_m_s });
 }
 

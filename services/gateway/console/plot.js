@@ -4,11 +4,13 @@ const LIVE_POINTS = 33000; // more than ten minutes of the stream
 // name, chart, label, colour, dash, shown at first; the names are the recording's columns
 const SIGNALS = [
   ["thrust_cmd_n", "N", "commanded", "--quiet", [5, 4], true], ["thrust_n", "N", "measured", "--blue", [], true],
-  ["estimated_thrust_n", "N", "estimated", "--orange", [], true], ["thrust_error_n", "N", "error", "--red", [], false],
+  ["estimated_thrust_n", "N", "estimated", "--orange", [], true], ["estimated_thrust_low", "N", "estimated − σ", "--orange", [1, 3], false], ["estimated_thrust_high", "N", "estimated + σ", "--orange", [1, 3], false], ["thrust_error_n", "N", "error", "--red", [], false],
   ["speed_cmd_rad_s", "rad/s", "commanded", "--quiet", [5, 4], true], ["shaft_speed_rad_s", "rad/s", "measured", "--green", [], true],
   ["current_cmd_a", "A", "commanded", "--quiet", [5, 4], true], ["current_a", "A", "measured", "--purple", [], true],
   ["flow_m_s", "m/s", "measured", "--blue", [], true], ["estimated_flow_m_s", "m/s", "estimated", "--orange", [], true],
+  ["estimated_flow_low", "m/s", "estimated − σ", "--orange", [1, 3], true], ["estimated_flow_high", "m/s", "estimated + σ", "--orange", [1, 3], true],
   ["ambient_m_s", "m/s", "ambient", "--purple", [], false], ["estimated_ambient_m_s", "m/s", "ambient, estimated", "--green", [2, 3], true],
+  ["estimated_ambient_low", "m/s", "ambient − σ", "--green", [1, 3], false], ["estimated_ambient_high", "m/s", "ambient + σ", "--green", [1, 3], false],
   ["voltage_cmd_v", "V", "motor, commanded", "--quiet", [5, 4], false], ["supply_v", "V", "supply", "--purple", [], false],
   ["torque_n_m", "N m", "blade torque", "--green", [], false], ["temperature_c", "°C", "motor", "--red", [], false],
   ["duty_cmd", "1", "duty, commanded", "--quiet", [], false], ["shaft_angle_rad", "rad", "shaft angle", "--blue", [], false], ["depth_m", "m", "depth", "--blue", [], false],
@@ -123,8 +125,11 @@ class Chart {
       label: second ? `${label}, B` : label, stroke: color(hue), width: 1.5, dash: second ? [2, 4] : dash, points: { show: false },
       value: (_, v) => (v === null || v === undefined ? "–" : v.toFixed(2)),
     }));
+    // Between the two sides of an estimate's standard error.
+    const bands = this.signals.flatMap(([name, , , hue], i) => (name.endsWith("_high") ? [{ series: [i + 1, i], fill: `color-mix(in srgb, ${color(hue)} 14%, transparent)` }] : []));
     this.plot?.destroy();
     this.plot = new uPlot({
+      bands,
       width: Math.max(200, this.figure.clientWidth - 16), height: 210, title: `${this.title} [${this.unit}]`,
       cursor: { sync: { key: "kort" }, drag: { x: true, y: false, setScale: false } },
       scales: { x: { time: false }, y: { range: (u, low, high) => this.range(low, high) } },

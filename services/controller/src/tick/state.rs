@@ -62,19 +62,22 @@ impl Tick {
         state
     }
 
-    /// The adapted coefficients, and the load that the model does not explain.
+    /// The adapted coefficients, and what the observer believes with its doubt.
     fn put_estimated(&self, state: &mut ControllerState) {
         let (adapted, nominal) = (self.controller.adapted(), self.controller.nominal());
         let coefficients = kort_control::estimators::NAMES.iter().enumerate().map(|(i, name)| {
             let (value, std_error) = adapted.coefficient(i, nominal);
             (*name, "1", value, std_error)
         });
-        let load = self.output.estimate.load_torque_n_m;
-        let swirl = self.output.estimate.swirl_m_s;
+        let believed = &self.output.estimate;
         let rest = [
-            ("load_torque_n_m", "N m", load.value, load.std_error),
-            ("swirl_m_s", "m/s", swirl.value, swirl.std_error),
-        ];
+            ("load_torque_n_m", "N m", believed.load_torque_n_m),
+            ("swirl_m_s", "m/s", believed.swirl_m_s),
+            ("thrust_n", "N", believed.thrust_n),
+            ("flow_m_s", "m/s", believed.flow_m_s),
+            ("ambient_m_s", "m/s", believed.ambient_m_s),
+        ]
+        .map(|(name, unit, of)| (name, unit, of.value, of.std_error));
         for ((name, unit, value, std_error), slot) in coefficients.chain(rest).zip(&mut state.parameters) {
             let std_error = if std_error.is_finite() { std_error } else { f64::NAN };
             *slot = Parameter {
