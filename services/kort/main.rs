@@ -30,6 +30,9 @@ const DONE: u8 = 0;
 const FAILED: u8 = 1;
 /// Wrong usage or unreadable input.
 const USAGE: u8 = 2;
+/// Said to a command that is not there.
+#[cfg(not(feature = "lab"))]
+const NO_LAB: &str = "this kort has no such command, for it was built without its laboratory\nhint: take the recording to a whole one; kort --help names what is here";
 
 #[cfg(all(feature = "servo", feature = "controller", feature = "gateway"))]
 const UP_EXAMPLE: &str =
@@ -153,6 +156,10 @@ impl Service {
 fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
+        #[cfg(not(feature = "lab"))]
+        Err(e) if e.kind() == clap::error::ErrorKind::InvalidSubcommand => {
+            return fail(USAGE, &NO_LAB);
+        }
         Err(e) => {
             let _ = e.print();
             return ExitCode::from(if e.use_stderr() { USAGE } else { DONE });

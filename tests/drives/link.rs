@@ -63,13 +63,24 @@ pub struct Case {
     pub thrust_n: f64,
     /// Its own time-out.
     pub timeout_ms: u64,
+    /// What makes it ready anew after a stop, where that takes its time.
+    pub revive: fn(&Emulator),
 }
 
 impl Case {
     /// A drive that takes current.
     pub fn new(kind: &'static str, keys: &'static str) -> Self {
         let command = Command::default();
-        Self { kind, keys, drive: 4.0, command, rig: RIG, thrust_n: 60.0, timeout_ms: TIMEOUT_MS }
+        Self {
+            kind,
+            keys,
+            drive: 4.0,
+            command,
+            rig: RIG,
+            thrust_n: 60.0,
+            timeout_ms: TIMEOUT_MS,
+            revive: |_| (),
+        }
     }
 
     /// After this the drive itself has taken the torque away; it may look at it every 10 ms only.
@@ -244,7 +255,10 @@ impl Case {
                 faults,
                 bound,
                 || emulator.spoil(mischief),
-                || emulator.spoil(Mischief::None),
+                || {
+                    emulator.spoil(Mischief::None);
+                    (self.revive)(emulator);
+                },
             );
         }
         // What loses nothing stops nothing.
@@ -269,7 +283,11 @@ impl Case {
         self.ends_at_zero(&mut bench, emulator, &reset, SILENCE, || emulator.restart(), || ());
         let fault = [Fault::AmplifierFault];
         let report = || emulator.report(code);
-        self.ends_at_zero(&mut bench, emulator, &fault, SILENCE, report, || emulator.report(0));
+        let mend = || {
+            emulator.report(0);
+            (self.revive)(emulator);
+        };
+        self.ends_at_zero(&mut bench, emulator, &fault, SILENCE, report, mend);
         assert!(bench.site.log().contains(words), "{}", bench.site.log());
         self.ends_at_zero(&mut bench, emulator, &fault, SILENCE, report, || emulator.restart());
     }
@@ -298,6 +316,7 @@ impl Case {
             let bound = self.timeout();
             assert!(took <= bound + SLACK, "SIG{signal}: {took:?} beyond {bound:?}");
             kill(bench.servo.id(), "KILL");
+            (self.revive)(emulator);
         }
     }
 

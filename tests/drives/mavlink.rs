@@ -13,15 +13,11 @@ use crate::link::{Case, SILENCE, alone, rig};
 
 const RIG: &str = "t200-vehicle";
 
+/// After a stop a vehicle cools down for ten seconds; where a test is about something else its supply is cut for a moment.
 fn case() -> Case {
     let command = Command { kind: DriveKind::Voltage as u32, ..Command::default() };
     let case = Case::new("mavlink", "motor = 3");
-    Case { drive: 6.0, command, rig: RIG, thrust_n: 10.0, timeout_ms: 510, ..case }
-}
-
-/// Most tests go through many stops, each with the vehicle's cool-down behind it: one whose first versions only warned of it.
-fn quick() -> Make {
-    Make { cool_down_s: 0.0, ..Make::default() }
+    Case { drive: 6.0, command, rig: RIG, thrust_n: 10.0, timeout_ms: 510, revive: Emulator::restart, ..case }
 }
 
 fn vehicle(make: Make) -> Emulator {
@@ -37,9 +33,10 @@ fn the_service_drives_it_and_records() {
 #[test]
 fn by_udp_it_is_driven_too_and_ends_at_zero() {
     alone(|| {
-        let make = Make { telemetry: Telemetry::Signed, ..quick() };
+        let make = Make { telemetry: Telemetry::Signed, ..Make::default() };
         let emulator = Emulator::start_udp(ArduSub::new(make, &rig(RIG))).unwrap();
         case().serves(&emulator);
+        emulator.restart();
         let mut bench = case().servo(&emulator);
         case().ends_at_zero(
             &mut bench,
@@ -47,7 +44,10 @@ fn by_udp_it_is_driven_too_and_ends_at_zero() {
             &[Fault::DriveLost],
             Duration::from_millis(520),
             || emulator.spoil(Mischief::Unplugged),
-            || emulator.spoil(Mischief::None),
+            || {
+                emulator.spoil(Mischief::None);
+                emulator.restart();
+            },
         );
     });
 }
@@ -58,29 +58,38 @@ fn every_fault_of_the_wire_ends_at_zero() {
         let lost = [Fault::DriveLost];
         let harmless = [Mischief::Split, Mischief::Noisy];
         // A repeated message tells its age by the vehicle's clock.
-        case().endures_its_wire(&vehicle(quick()), &lost, &lost, SILENCE, &harmless);
+        case().endures_its_wire(&vehicle(Make::default()), &lost, &lost, SILENCE, &harmless);
     });
 }
 
 #[test]
 fn a_servo_that_dies_or_stands_still_leaves_no_torque() {
-    alone(|| case().outlives_its_servo(&vehicle(quick())));
+    alone(|| case().outlives_its_servo(&vehicle(Make::default())));
 }
 
 #[test]
 fn a_vehicle_that_resets_or_whose_fail_safe_acts_ends_at_zero() {
     alone(|| {
-        let emulator = vehicle(quick());
+        let emulator = vehicle(Make::default());
         case().resets_and_reports(&emulator, 9, "it is in mode 9, and is driven in MANUAL (19) only");
-        ended_by(&mut case().servo(&emulator), &emulator, 101, "motor 1 moves too");
+        emulator.restart();
+        ended_by(&case(), &emulator, 101, "motor 1 moves too");
     });
 }
 
 /// Somebody else acts on the vehicle: zero, a fault with these words.
-fn ended_by(bench: &mut Bench, emulator: &Emulator, code: u32, words: &str) {
-    let (report, mend) = (|| emulator.report(code), || emulator.report(0));
-    case().ends_at_zero(bench, emulator, &[Fault::AmplifierFault], SILENCE, report, mend);
+fn ended_by(case: &Case, emulator: &Emulator, code: u32, words: &str) -> Bench {
+    let mut bench = case.servo(emulator);
+    let (report, mend) = (
+        || emulator.report(code),
+        || {
+            emulator.report(0);
+            (case.revive)(emulator);
+        },
+    );
+    case.ends_at_zero(&mut bench, emulator, &[Fault::AmplifierFault], SILENCE, report, mend);
     assert!(bench.site.log().contains(words), "{}", bench.site.log());
+    bench
 }
 
 /// What a pilot does stops kort; the vehicle's cool-down is waited for and told.
@@ -88,8 +97,8 @@ fn ended_by(bench: &mut Bench, emulator: &Emulator, code: u32, words: &str) {
 fn a_pilot_ends_it_and_its_cool_down_is_told() {
     alone(|| {
         let emulator = vehicle(Make::default());
-        let mut bench = case().servo(&emulator);
-        ended_by(&mut bench, &emulator, 100, "it ended the motor test: disarmed");
+        let patient = Case { revive: |_| (), ..case() };
+        let bench = ended_by(&patient, &emulator, 100, "it ended the motor test: disarmed");
         assert!(bench.site.log().contains("its own cool-down"), "{}", bench.site.log());
     });
 }
@@ -129,5 +138,5 @@ fn its_reason_not_to_be_armed_is_told() {
 
 #[test]
 fn volts_are_given_as_pulse_width() {
-    alone(|| case().follows(&vehicle(quick())));
+    alone(|| case().follows(&vehicle(Make::default())));
 }

@@ -11,6 +11,8 @@ use crate::mavlink::{Message, pack, unpack};
 use crate::stand::Stand;
 
 const TEST_LIFE_S: f64 = 0.5;
+/// After a test that ran out none begins for so long, s.
+const COOL_DOWN_S: f64 = 10.0;
 /// A test that could not begin is not tried again before this, s.
 const AGAIN_S: f64 = 2.0;
 /// Period of the main loop, s.
@@ -63,8 +65,6 @@ pub struct Make {
     pub output: usize,
     /// Its ESC.
     pub telemetry: Telemetry,
-    /// Time without a motor test after one ran out, s. Its first versions only warned: zero.
-    pub cool_down_s: f64,
     /// It lets nobody arm it, in these words.
     pub unfit: Option<&'static str>,
     /// A pilot has armed it before.
@@ -81,7 +81,6 @@ impl Default for Make {
             motor: 3,
             output: 2,
             telemetry: Telemetry::Unsigned,
-            cool_down_s: 10.0,
             unfit: None,
             piloted: false,
             boot_s: 0.4,
@@ -296,7 +295,7 @@ impl ArduSub {
             if self.refused_s.is_some_and(|at| now_s < at + AGAIN_S) {
                 return FAILED;
             }
-            let words = if self.failed_s.is_some_and(|at| now_s < at + self.make.cool_down_s) {
+            let words = if self.failed_s.is_some_and(|at| now_s < at + COOL_DOWN_S) {
                 Some("10 second cooldown required after motor test")
             } else {
                 (!self.armed).then_some("Arm motors before testing motors.")

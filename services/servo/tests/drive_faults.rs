@@ -60,8 +60,7 @@ fn a_drives_own_fault_ends_with_it_and_with_a_reset() {
     let moteus = Bench::start(Moteus::new(moteus::Make::default(), &rig)).unwrap();
     let cia402 = Bench::start(Adapter::new(Cia402::new(cia402::Make::default(), &rig))).unwrap();
     let vehicle = Rig::from_toml(include_str!("../../../config/thrusters/t200-vehicle.toml")).unwrap();
-    let quick = ardusub::Make { cool_down_s: 0.0, ..Default::default() };
-    let mavlink = Bench::start(ArduSub::new(quick, &vehicle)).unwrap();
+    let mavlink = Bench::start(ArduSub::new(ardusub::Make::default(), &vehicle)).unwrap();
     let own = |faults: u64| faults & Fault::AmplifierFault.bit() != 0;
     for (kind, keys, emulator, code) in [
         ("vesc", "pole_pairs = 7", vesc, 4),

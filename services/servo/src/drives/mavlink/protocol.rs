@@ -217,8 +217,13 @@ impl Protocol {
         }
         match self.vehicle.outputs(m, self.output) {
             Clock::Old => return,
-            Clock::Back if self.stage == Stage::Guarded => return heard(Heard::Restarted),
-            Clock::Back => return link::Protocol::begin(self),
+            Clock::Back => {
+                self.vehicle.was_reset();
+                if self.stage == Stage::Guarded {
+                    heard(Heard::Restarted);
+                }
+                return link::Protocol::begin(self);
+            }
             Clock::On => (),
         }
         if self.stage == Stage::Messages {

@@ -46,8 +46,6 @@ pub struct Vehicle {
     clock_us: u64,
     told_us: Option<u32>,
     cool_us: u64,
-    /// It was held when the conversation began anew: it will cool down.
-    pub was_held: bool,
     refused: Option<String>,
     /// Motor on each output, from 1; zero: none; absent: not told yet.
     motors: [Option<u32>; OUTPUTS],
@@ -70,9 +68,16 @@ pub enum Clock {
 }
 
 impl Vehicle {
-    /// A new conversation.
+    /// A new conversation. The vehicle's clock goes on, and so does its cool-down: one that was held will begin it.
     pub fn begin(&mut self) {
-        *self = Self { was_held: self.was_held || self.hold != Hold::Free, ..Self::default() };
+        let Self { clock_us, told_us, .. } = *self;
+        let cool_us = if self.hold == Hold::Free { self.cool_us } else { clock_us + COOLING_US };
+        *self = Self { clock_us, told_us, cool_us, ..Self::default() };
+    }
+
+    /// It was reset: its clock begins anew, and nothing is left of a cool-down.
+    pub fn was_reset(&mut self) {
+        *self = Self::default();
     }
 
     /// Outputs whose function is not known yet, from 1.
@@ -121,9 +126,6 @@ impl Vehicle {
             passed => self.clock_us += u64::from(passed.unwrap_or(0)),
         }
         self.told_us = Some(all.time_usec);
-        if std::mem::take(&mut self.was_held) {
-            self.cool_us = self.clock_us + COOLING_US;
-        }
         self.widths = [
             all.servo1_raw,
             all.servo2_raw,
