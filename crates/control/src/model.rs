@@ -197,6 +197,7 @@ impl ControlModel {
             tick_s: self.period_s,
             duration_s,
             angle_recorded: true,
+            reverses: true,
         }
     }
 

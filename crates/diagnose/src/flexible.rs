@@ -41,14 +41,9 @@ pub fn is_term(id: &str) -> bool {
 const POINTS: usize = 8;
 const NAMES: [&str; POINTS] = ["at_1", "at_2", "at_3", "at_4", "at_5", "at_6", "at_7", "at_8"];
 
-/// Where the points of a curve over `-reach` to `reach` lie.
-fn over(reach: f64) -> [f64; POINTS] {
-    std::array::from_fn(|k| reach * (2.0 * k as f64 / (POINTS - 1) as f64 - 1.0))
-}
-
-/// Where the points of a curve over time lie.
-fn in_time(duration_s: f64) -> [f64; POINTS] {
-    std::array::from_fn(|k| duration_s * k as f64 / (POINTS - 1) as f64)
+/// Where the points of a curve over a range lie.
+fn over([from, to]: [f64; 2]) -> [f64; POINTS] {
+    std::array::from_fn(|k| from + (to - from) * k as f64 / (POINTS - 1) as f64)
 }
 
 /// A straight piece between points; held beyond the ends.
@@ -65,13 +60,14 @@ fn curve<T: Real>(values: &[T], points: &[f64; POINTS], at: T) -> T {
     values[k] + (values[k + 1] - values[k]) * part
 }
 
-/// Heights of a curve, each about as large as `size` may be, then the reach it is laid over.
-fn heights(unit: &'static str, size: f64, reach: f64) -> Vec<Spec> {
+/// Heights of a curve, each about as large as `size` may be, then the range it is laid over.
+fn heights(unit: &'static str, size: f64, [from, to]: [f64; 2]) -> Vec<Spec> {
     let mut specs: Vec<Spec> = NAMES
         .iter()
         .map(|name| Spec::strength(name, unit, 0.2 * size, -20.0 * size, 20.0 * size).sigma(size))
         .collect();
-    specs.push(Spec::held("reach", "1", reach, reach, reach));
+    specs.push(Spec::held("from", "1", from, from, from));
+    specs.push(Spec::held("to", "1", to, to, to));
     specs
 }
 
@@ -99,12 +95,7 @@ struct Term<T> {
 
 impl<T: Real> Term<T> {
     fn boxed(place: Place, values: &[T]) -> Box<dyn Effect<T>> {
-        let reach = values[POINTS].re();
-        let timed = matches!(
-            place,
-            Place::ShaftOverTime | Place::DriveOverTime | Place::FlowOverTime | Place::SensorOverTime
-        );
-        let points = if timed { in_time(reach) } else { over(reach) };
+        let points = over([values[POINTS].re(), values[POINTS + 1].re()]);
         Box::new(Self { place, values: values[..POINTS].to_vec(), points })
     }
 
@@ -203,7 +194,7 @@ term!(
     Shaft,
     "shaft torque [N m] over shaft_speed_rad_s",
     free_shaft,
-    |s| heights("N m", 0.1 * s.torque_n_m, s.shaft_speed_rad_s),
+    |s| heights("N m", 0.1 * s.torque_n_m, s.both_ways(s.shaft_speed_rad_s)),
     ShaftOverSpeed
 );
 term!(
@@ -212,7 +203,7 @@ term!(
     Shaft,
     "shaft torque [N m] over flow_m_s",
     shaft_and_flow,
-    |s| heights("N m", 0.1 * s.torque_n_m, s.flow_m_s),
+    |s| heights("N m", 0.1 * s.torque_n_m, s.both_ways(s.flow_m_s)),
     ShaftOverFlow
 );
 term!(
@@ -221,7 +212,7 @@ term!(
     Shaft,
     "shaft torque [N m] over time_s",
     free_shaft,
-    |s| heights("N m", 0.1 * s.torque_n_m, s.duration_s),
+    |s| heights("N m", 0.1 * s.torque_n_m, [0.0, s.duration_s]),
     ShaftOverTime
 );
 term!(
@@ -230,7 +221,7 @@ term!(
     Drive,
     "addition to the command over the command",
     commanded,
-    |s| heights("of the command", 0.1 * s.command, s.command),
+    |s| heights("of the command", 0.1 * s.command, s.both_ways(s.command)),
     DriveOverCommand
 );
 term!(
@@ -239,7 +230,7 @@ term!(
     Drive,
     "relative addition to the command over time_s",
     commanded,
-    |s| heights("1", 0.1, s.duration_s),
+    |s| heights("1", 0.1, [0.0, s.duration_s]),
     DriveOverTime
 );
 term!(
@@ -248,7 +239,7 @@ term!(
     Blade,
     "thrust [N] over shaft_speed_rad_s",
     wet,
-    |s| heights("N", 0.1 * s.thrust_n, s.shaft_speed_rad_s),
+    |s| heights("N", 0.1 * s.thrust_n, s.both_ways(s.shaft_speed_rad_s)),
     BladeOverSpeed
 );
 term!(
@@ -257,7 +248,7 @@ term!(
     Blade,
     "thrust [N] over flow_m_s",
     flow_seen,
-    |s| heights("N", 0.1 * s.thrust_n, s.flow_m_s),
+    |s| heights("N", 0.1 * s.thrust_n, s.both_ways(s.flow_m_s)),
     BladeOverFlow
 );
 term!(
@@ -266,7 +257,7 @@ term!(
     Flow,
     "force on the axial flow [N] over flow_m_s",
     flow_seen,
-    |s| heights("N", 0.1 * s.thrust_n, s.flow_m_s),
+    |s| heights("N", 0.1 * s.thrust_n, s.both_ways(s.flow_m_s)),
     FlowOverFlow
 );
 term!(
@@ -275,7 +266,7 @@ term!(
     Flow,
     "ambient flow [m/s] over time_s",
     flow_seen,
-    |s| heights("m/s", 0.1 * s.flow_m_s, s.duration_s),
+    |s| heights("m/s", 0.1 * s.flow_m_s, [0.0, s.duration_s]),
     FlowOverTime
 );
 term!(
@@ -284,7 +275,7 @@ term!(
     Sensor,
     "addition to the thrust reading [N] over thrust_n",
     thrust_measured,
-    |s| heights("N", 0.1 * s.thrust_n, s.thrust_n),
+    |s| heights("N", 0.1 * s.thrust_n, s.both_ways(s.thrust_n)),
     SensorOverThrust
 );
 term!(
@@ -293,7 +284,7 @@ term!(
     Sensor,
     "addition to the thrust reading [N] over time_s",
     thrust_measured,
-    |s| heights("N", 0.1 * s.thrust_n, s.duration_s),
+    |s| heights("N", 0.1 * s.thrust_n, [0.0, s.duration_s]),
     SensorOverTime
 );
 
@@ -328,9 +319,13 @@ pub fn expression(term: &Descriptor, values: &[f64]) -> String {
     if let Some(words) = crate::column::expression(term, values) {
         return words;
     }
-    let reach = values[POINTS];
-    let points = if term.id.ends_with("over_time") { in_time(reach) } else { over(reach) };
-    let pairs: Vec<String> = points.iter().zip(values).map(|(x, y)| format!("{y:+.4} at {x:.3}")).collect();
+    let points = over([values[POINTS], values[POINTS + 1]]);
+    let heights = &values[..POINTS];
+    let most = heights.iter().fold(0.0_f64, |most, height| most.max(height.abs()));
+    // Three digits of the largest height.
+    let digits = (2.0 - most.max(1e-300).log10().floor()).clamp(0.0, 12.0) as usize;
+    let pairs: Vec<String> =
+        points.iter().zip(heights).map(|(x, y)| format!("{y:+.digits$} at {x:.3}")).collect();
     format!("straight between {}", pairs.join(", "))
 }
 
@@ -349,7 +344,7 @@ mod tests {
     #[test]
     fn a_curve_goes_through_its_points_and_is_held_beyond_them() {
         let values: Vec<f64> = (0..POINTS).map(|k| k as f64).collect();
-        let points = over(7.0);
+        let points = over([-7.0, 7.0]);
         assert_eq!(curve(&values, &points, -9.0), 0.0);
         assert_eq!(curve(&values, &points, 9.0), 7.0);
         assert!((curve(&values, &points, 0.0) - 3.5).abs() < 1e-12);

@@ -111,14 +111,18 @@ pub fn since_edge(recording: &kort_identify::data::Prepared) -> Vec<f64> {
         .collect()
 }
 
-/// Classes that hold clearly more of the error than of the samples, and most of the error.
+/// Share of the error in one class that is still a share: the rest may hold a little less than none.
+const MOST_OF_ALL: f64 = 1.05;
+
+/// Classes that hold clearly more of the error than of the samples, and most of the error. One that holds more than all
+/// of it says nothing: elsewhere the error grew.
 fn words(total: f64, count: f64, by_class: &[(f64, f64)]) -> String {
     let mut picked: Vec<(f64, String)> = CLASSES
         .iter()
         .zip(by_class)
         .filter_map(|(class, (sum, n))| {
             let (share, part) = (sum / total.max(1e-300), n / count.max(1.0));
-            (share > 0.45 && share > 1.25 * part).then(|| {
+            (share > 0.45 && share <= MOST_OF_ALL && share > 1.25 * part).then(|| {
                 (
                     share / part.max(1e-3),
                     format!(

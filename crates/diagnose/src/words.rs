@@ -233,12 +233,17 @@ pub fn summary(told: &Told) -> String {
                 told.mismatch.first().map_or("?", |m| &m.regime),
             );
             if let Some(term) = told.term {
+                let removed = term.heldout.excess_error_removed;
+                let held_out = if removed > 0.0 {
+                    format!("removes {:.0} % of what it is about on held-out data", 100.0 * removed)
+                } else {
+                    "removes nothing on held-out data: where to look, and no more".into()
+                };
                 text.push_str(&format!(
-                    " A term that bends to anything describes it: {} over {}: {} (removes {:.0} % of what it is about on held-out data).",
+                    " A term that bends to anything describes it: {} over {}: {} ({held_out}).",
                     term.enters,
                     term.variables.join(", "),
                     term.expression,
-                    100.0 * term.heldout.excess_error_removed
                 ));
             }
             text

@@ -1,9 +1,14 @@
 //! Cheap checks before any model: what a glance at the columns tells.
 
+use std::ops::Range;
+
 use kort_thruster::rig::Rig;
 
 use crate::data::{Series, pause_s};
 use crate::gaps::GAP_INTERVALS;
+
+mod supply;
+pub use supply::{Sag, supply_sag};
 
 /// What the checks found: words for the report, and rows to leave out.
 #[derive(Clone, Debug, Default)]
@@ -16,8 +21,14 @@ pub struct Checked {
 
 /// Longest run of one value in a sensor that should be noisy, in rows, before it counts as frozen.
 const FROZEN_ROWS: usize = 40;
+/// A frozen sensor goes on this many of its usual moves away from where it stood.
+const FROZEN_MOVES: f64 = 3.0;
+/// A drive may answer a step of its command this many rows late.
+const LATE_ROWS: usize = 10;
 /// A spike stands out of its neighbours by this many times their usual distance.
 const SPIKE_RATIO: f64 = 40.0;
+/// Columns that say what is asked of the drive.
+const COMMANDS: [&str; 5] = ["current_cmd_a", "voltage_cmd_v", "duty_cmd", "speed_cmd_rad_s", "thrust_cmd_n"];
 /// Share of the largest command that counts as a step of it.
 const STEP_SHARE: f64 = 0.05;
 /// A gap longer than this may hide changes of the drive, s.
@@ -33,7 +44,7 @@ pub fn check(series: &Series, rig: &Rig) -> Checked {
     saturated_current(series, rig, &mut out);
     for name in ["thrust_n", "shaft_speed_rad_s", "torque_n_m", "current_a"] {
         if let Some(column) = series.column(name) {
-            frozen(&series.name, name, column, &series.time_s, &mut out);
+            frozen(series, name, column, &mut out);
             spikes(&series.name, name, column, &series.time_s, &mut out);
         }
     }
@@ -73,23 +84,49 @@ fn saturated_current(series: &Series, rig: &Rig, out: &mut Checked) {
     }
 }
 
-fn frozen(recording: &str, name: &str, column: &[f64], time_s: &[f64], out: &mut Checked) {
-    let scale = column.iter().filter(|v| v.is_finite()).fold(0.0_f64, |m, v| m.max(v.abs()));
+fn frozen(series: &Series, name: &str, column: &[f64], out: &mut Checked) {
+    let scale = largest(column);
+    let mut moves: Vec<f64> =
+        column.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|move_| *move_ > 0.0).collect();
+    moves.sort_by(f64::total_cmp);
+    let usual = moves.get(moves.len() / 2).copied().unwrap_or(0.0);
     let mut from = 0;
     for k in 1..=column.len() {
         if k < column.len() && column[k] == column[from] {
             continue;
         }
-        // At rest a quantised sensor may well stand still.
-        if k - from >= FROZEN_ROWS && column[from].abs() > 0.05 * scale && varies(column) {
+        // At rest a quantised sensor may well stand still, and so may a coarse one while nothing is asked of the drive: a
+        // frozen one has missed a step of the command, or goes on elsewhere although none was given.
+        let late = k.saturating_sub(LATE_ROWS).max(from);
+        let missed = steps(series, from..late)
+            || !steps(series, late..column.len().min(k + 1))
+                && column.get(k).is_some_and(|next| (next - column[from]).abs() > FROZEN_MOVES * usual);
+        if k - from >= FROZEN_ROWS && column[from].abs() > 0.05 * scale && varies(column) && missed {
             out.notes.push(format!(
-                "{recording}: {name} stands still at {:.4} from {:.2} s to {:.2} s (frozen sensor?); those rows are left out",
-                column[from], time_s[from], time_s[k - 1]
+                "{}: {name} stands still at {:.4} from {:.2} s to {:.2} s (frozen sensor?); those rows are left out",
+                series.name,
+                column[from],
+                series.time_s[from],
+                series.time_s[k - 1]
             ));
             out.masked[from..k].fill(true);
         }
         from = k;
     }
+}
+
+/// Whether the command changes within these rows.
+fn steps(series: &Series, rows: Range<usize>) -> bool {
+    COMMANDS.iter().filter_map(|name| series.column(name)).any(|command| {
+        let within = command[rows.clone()].iter().copied().filter(|c| c.is_finite());
+        let (low, high) = within.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), c| (l.min(c), h.max(c)));
+        high - low > STEP_SHARE * largest(command)
+    })
+}
+
+/// The largest size in a column.
+fn largest(column: &[f64]) -> f64 {
+    column.iter().filter(|v| v.is_finite()).fold(0.0_f64, |m, v| m.max(v.abs()))
 }
 
 /// A sensor that repeats itself everywhere is coarse, not frozen.
@@ -106,7 +143,7 @@ fn spikes(recording: &str, name: &str, column: &[f64], time_s: &[f64], out: &mut
     let mut sizes: Vec<f64> = known.iter().map(|k| jump(*k)).collect();
     sizes.sort_by(f64::total_cmp);
     let Some(usual) = sizes.get(sizes.len() / 2).copied() else { return };
-    let scale = column.iter().filter(|v| v.is_finite()).fold(0.0_f64, |m, v| m.max(v.abs()));
+    let scale = largest(column);
     let limit = (SPIKE_RATIO * usual).max(0.25 * scale);
     let found: Vec<usize> = known
         .into_iter()
@@ -131,7 +168,7 @@ pub fn is_unsigned_speed(series: &Series) -> bool {
     let never_negative = speed.iter().all(|v| v.is_nan() || *v >= 0.0);
     let reversed = REVERSING.iter().any(|name| {
         series.column(name).is_some_and(|c| {
-            let top = c.iter().filter(|v| v.is_finite()).fold(0.0_f64, |m, v| m.max(v.abs()));
+            let top = largest(c);
             let negative = c.iter().filter(|v| **v < -0.2 * top).count();
             negative > c.len() / 20
         })
@@ -173,7 +210,7 @@ fn rest_bias(series: &Series, out: &mut Checked) {
         let n = rest.len() as f64;
         let mean = rest.iter().sum::<f64>() / n;
         let deviation = (rest.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
-        let scale = column.iter().filter(|v| v.is_finite()).fold(0.0_f64, |m, v| m.max(v.abs()));
+        let scale = largest(column);
         if mean.abs() > 6.0 * deviation / n.sqrt() && mean.abs() > 0.005 * scale {
             out.notes.push(format!(
                 "{}: {name} reads {mean:.4} at rest before the first command ({:.1} % of its range): zero it, or let the diagnosis judge the bias",
@@ -182,94 +219,6 @@ fn rest_bias(series: &Series, out: &mut Checked) {
             ));
         }
     }
-}
-
-/// A recorded supply that falls with the load.
-pub struct Sag {
-    /// At no load, V.
-    rest_v: f64,
-    /// At the largest load, V.
-    full_v: f64,
-    /// Of supply and load.
-    correlation: f64,
-    /// What rises, in words.
-    load: String,
-    /// What stands for the load, in words.
-    measure: &'static str,
-}
-
-impl Sag {
-    /// Share of the supply that is lost at the largest load; zero where supply and load have little to
-    /// do with each other.
-    pub fn share(&self) -> f64 {
-        if self.correlation < -0.4 { (1.0 - self.full_v / self.rest_v).max(0.0) } else { 0.0 }
-    }
-
-    /// In words, if it is large enough to speak of.
-    pub fn words(&self) -> Option<String> {
-        (self.share() > 0.01).then(|| {
-            format!(
-                "supply_v sags as {}: about {:.2} V at rest, {:.2} V at the largest load (correlation {:.2} with {}); a constant supply would be wrong here",
-                self.load, self.rest_v, self.full_v, self.correlation, self.measure
-            )
-        })
-    }
-}
-
-/// How the recorded supply follows the load: power where current and shaft speed are recorded, else the
-/// cube of a duty or a speed; every thruster whose command is recorded loads the same supply.
-pub fn supply_sag(series: &Series) -> Option<Sag> {
-    let supply = series.column("supply_v")?;
-    let current = series.column("current_a").or_else(|| series.column("current_cmd_a"));
-    let (load, measure, rows): (String, &str, Vec<(f64, f64)>) =
-        match (current, series.column("shaft_speed_rad_s")) {
-            (Some(current), Some(speed)) => {
-                let power = (0..supply.len()).map(|k| (current[k] * speed[k]).max(0.0));
-                (
-                    "the load rises".into(),
-                    "current times shaft speed",
-                    power.zip(supply.iter().copied()).collect(),
-                )
-            }
-            _ => {
-                let commands: Vec<&[f64]> = series
-                    .columns
-                    .iter()
-                    .filter(|c| {
-                        ["duty_cmd", "speed_cmd_rad_s", "voltage_cmd_v"].iter().any(|n| c.0.starts_with(n))
-                    })
-                    .filter_map(|c| series.column(&c.0))
-                    .collect();
-                let cubes = (0..supply.len()).map(|k| commands.iter().map(|c| c[k].abs().powi(3)).sum());
-                let words = match commands.len() {
-                    0 => return None,
-                    1 => "the command rises".into(),
-                    n => format!("the {n} commands together rise"),
-                };
-                (words, "the commands cubed", cubes.zip(supply.iter().copied()).collect())
-            }
-        };
-    let rows: Vec<(f64, f64)> = rows.into_iter().filter(|r| r.0.is_finite() && r.1.is_finite()).collect();
-    let n = rows.len() as f64;
-    if rows.len() < 50 {
-        return None;
-    }
-    let (mx, my) = (rows.iter().map(|r| r.0).sum::<f64>() / n, rows.iter().map(|r| r.1).sum::<f64>() / n);
-    let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
-    for (x, y) in &rows {
-        xx += (x - mx).powi(2);
-        xy += (x - mx) * (y - my);
-        yy += (y - my).powi(2);
-    }
-    let slope = xy / xx.max(1e-300);
-    let top = rows.iter().map(|r| r.0).fold(0.0, f64::max);
-    Some(Sag {
-        rest_v: my - slope * mx,
-        full_v: my + slope * (top - mx),
-        correlation: xy / (xx * yy).sqrt().max(1e-300),
-        load,
-        measure,
-    })
 }
 
 /// A command logged less often than the rows: it is held, and when it changed is known coarsely only.
@@ -289,9 +238,8 @@ fn sparse_commands(series: &Series, out: &mut Checked) {
 
 /// How many gaps begin at a step of the command: within an interval of the row that first shows it.
 fn after_steps(series: &Series, usual_s: f64) -> usize {
-    let names = ["current_cmd_a", "voltage_cmd_v", "duty_cmd", "speed_cmd_rad_s", "thrust_cmd_n"];
-    let Some(command) = names.iter().find_map(|name| series.column(name)) else { return 0 };
-    let top = command.iter().filter(|c| c.is_finite()).fold(0.0_f64, |m, c| m.max(c.abs()));
+    let Some(command) = COMMANDS.iter().find_map(|name| series.column(name)) else { return 0 };
+    let top = largest(command);
     let steps = |k: usize| {
         // Rows about the gap: the step stands in the last before it or the first after it.
         (k.saturating_sub(1)..(k + 2).min(command.len() - 1))
@@ -375,6 +323,20 @@ mod tests {
         assert!(is_unsigned_speed(&log(f64::abs, |_| true)));
         assert!(!is_unsigned_speed(&log(|s| s, |_| true)));
         assert!(notes(&log(f64::abs, |_| true)).contains("unsigned_speed_sensor"));
+    }
+
+    #[test]
+    fn a_coarse_sensor_in_steady_running_is_not_frozen_and_one_that_misses_a_reversal_is() {
+        // Counts of a tenth, so slow a swing that one count lasts many rows.
+        assert!(!notes(&log(|s| (30.0 * s).round() / 10.0, |_| true)).contains("frozen"));
+        let mut log = log(|s| s, |_| true);
+        let speed = &mut log.columns[1].1;
+        let noisy: Vec<f64> =
+            speed.iter().enumerate().map(|(k, v)| v + 0.01 * (0.7 * k as f64).sin()).collect();
+        *speed = noisy;
+        assert!(!notes(&log).contains("frozen"));
+        log.columns[1].1[250..350].fill(1.1);
+        assert!(notes(&log).contains("stands still at 1.1000 from 2.50 s"), "{}", notes(&log));
     }
 
     #[test]

@@ -96,6 +96,7 @@ mod tests {
             tick_s: 0.002,
             duration_s: 10.0,
             angle_recorded: true,
+            reverses: true,
         }
     }
 

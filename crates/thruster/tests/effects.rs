@@ -137,6 +137,7 @@ fn bench(name: &'static str, text: &str) -> Bench {
             tick_s: TICK_S,
             duration_s: DURATION_S,
             angle_recorded: true,
+            reverses: true,
         },
         rig,
         parameters,

@@ -64,9 +64,23 @@ pub fn scale(all: &[Prepared], rig: &Rig) -> Scale {
         inertia_kg_m2,
         tick_s: all.first().map_or(0.002, |p| p.tick_s),
         duration_s: all.iter().map(Prepared::duration_s).fold(0.0, f64::max),
+        reverses: goes_astern(all, speed, command),
         angle_recorded: all.iter().all(|p| p.stimulus.ticks.iter().any(|t| t.shaft_angle_rad.is_some())),
     }
 }
+
+/// Whether command or shaft speed ever went astern by more than a trifle.
+fn goes_astern(all: &[Prepared], speed_rad_s: f64, command: f64) -> bool {
+    let speeds = all
+        .iter()
+        .flat_map(|p| p.channels.iter().filter(|c| c.response == Response::ShaftSpeed))
+        .flat_map(|channel| &channel.values);
+    let commands = all.iter().flat_map(|p| &p.command);
+    speeds.copied().any(|v| v < -TRIFLE * speed_rad_s) || commands.copied().any(|c| c < -TRIFLE * command)
+}
+
+/// Share of the largest size below which a sign says nothing.
+const TRIFLE: f64 = 0.02;
 
 /// Name under which [`Available`] lists that a column is laid beside the inputs ([`Prepared::lay_extra`]).
 pub const COLUMN: &str = "a column of its own";

@@ -27,9 +27,16 @@ pub struct Scale {
     pub duration_s: f64,
     /// Whether the shaft angle was recorded, so that what follows it can be kept in phase.
     pub angle_recorded: bool,
+    /// Whether command or shaft speed ever went astern.
+    pub reverses: bool,
 }
 
 impl Scale {
+    /// What a quantity with this largest size ranges over: both ways, or ahead alone where the shaft never went astern.
+    pub fn both_ways(&self, size: f64) -> [f64; 2] {
+        [if self.reverses { -size } else { 0.0 }, size]
+    }
+
     /// A rig of no size: names and units of parameters do not depend on it.
     pub const ANY: Self = Self {
         shaft_speed_rad_s: 1.0,
@@ -44,6 +51,7 @@ impl Scale {
         tick_s: 0.002,
         duration_s: 1.0,
         angle_recorded: true,
+        reverses: true,
     };
 }
 

@@ -70,6 +70,7 @@ impl Bench {
             tick_s: TICK_S,
             duration_s: DURATION_S,
             angle_recorded: true,
+            reverses: true,
         };
         Self { rig, stimulus: Stimulus { ticks, logs }, scale }
     }

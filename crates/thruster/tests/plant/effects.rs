@@ -149,6 +149,7 @@ fn cogging_has_several_orders_at_once() {
         tick_s: TICK_S,
         duration_s: 10.0,
         angle_recorded: true,
+        reverses: true,
     };
     let mut values = vec![0.0; (cogging.parameters)(&scale).len()];
     let lines = [(72.0, 0.05, 0.03), (18.0, -0.02, 0.0), (12.0, 0.0, 0.01), (144.0, 0.004, 0.0)];
