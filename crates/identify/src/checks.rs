@@ -90,37 +90,46 @@ fn frozen(series: &Series, name: &str, column: &[f64], out: &mut Checked) {
         column.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|move_| *move_ > 0.0).collect();
     moves.sort_by(f64::total_cmp);
     let usual = moves.get(moves.len() / 2).copied().unwrap_or(0.0);
+    if !varies(column) {
+        return;
+    }
+    let commands = COMMANDS.iter().filter_map(|name| series.column(name));
+    let commands: Vec<(&[f64], f64)> = commands.map(|c| (c, STEP_SHARE * largest(c))).collect();
     let mut from = 0;
     for k in 1..=column.len() {
         if k < column.len() && column[k] == column[from] {
             continue;
         }
-        // At rest a quantised sensor may well stand still, and so may a coarse one while nothing is asked of the drive: a
-        // frozen one has missed a step of the command, or goes on elsewhere although none was given.
-        let late = k.saturating_sub(LATE_ROWS).max(from);
-        let missed = steps(series, from..late)
-            || !steps(series, late..column.len().min(k + 1))
-                && column.get(k).is_some_and(|next| (next - column[from]).abs() > FROZEN_MOVES * usual);
-        if k - from >= FROZEN_ROWS && column[from].abs() > 0.05 * scale && varies(column) && missed {
+        let stood = std::mem::replace(&mut from, k)..k;
+        let at = column[stood.start];
+        // At rest a quantised sensor may well stand still, ...
+        if stood.len() < FROZEN_ROWS || at.abs() <= 0.05 * scale {
+            continue;
+        }
+        // ... and so may a coarse one while nothing is asked of the drive: a frozen one has missed a step of the command, or
+        // goes on elsewhere although none was given.
+        let late = k.saturating_sub(LATE_ROWS).max(stood.start);
+        let missed = steps(&commands, stood.start..late)
+            || !steps(&commands, late..column.len().min(k + 1))
+                && column.get(k).is_some_and(|next| (next - at).abs() > FROZEN_MOVES * usual);
+        if missed {
             out.notes.push(format!(
-                "{}: {name} stands still at {:.4} from {:.2} s to {:.2} s (frozen sensor?); those rows are left out",
+                "{}: {name} stands still at {at:.4} from {:.2} s to {:.2} s (frozen sensor?); those rows are left out",
                 series.name,
-                column[from],
-                series.time_s[from],
+                series.time_s[stood.start],
                 series.time_s[k - 1]
             ));
-            out.masked[from..k].fill(true);
+            out.masked[stood].fill(true);
         }
-        from = k;
     }
 }
 
-/// Whether the command changes within these rows.
-fn steps(series: &Series, rows: Range<usize>) -> bool {
-    COMMANDS.iter().filter_map(|name| series.column(name)).any(|command| {
+/// Whether a command changes within these rows by more than this.
+fn steps(commands: &[(&[f64], f64)], rows: Range<usize>) -> bool {
+    commands.iter().any(|(command, least)| {
         let within = command[rows.clone()].iter().copied().filter(|c| c.is_finite());
         let (low, high) = within.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), c| (l.min(c), h.max(c)));
-        high - low > STEP_SHARE * largest(command)
+        high - low > *least
     })
 }
 

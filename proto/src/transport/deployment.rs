@@ -169,10 +169,10 @@ impl Deployment {
         config.global.set_root_path(&root);
         let prefix = self.prefix_of(generation);
         config.global.prefix = FileName::new(prefix.as_bytes()).map_err(|_| path_error())?;
-        // Clearing up after the dead takes tens of milliseconds: only the owner does it.
         // Each receiver keeps room for so many senders that are gone and were not read to their end: 3.6 kB each, 128 of them if nobody says
         // so, in every receiver of every process.
         config.defaults.publish_subscribe.subscriber_expired_connection_buffer = 16;
+        // Clearing up after the dead takes tens of milliseconds: only the owner does it.
         config.global.node.cleanup_dead_nodes_on_creation = false;
         config.global.node.cleanup_dead_nodes_on_destruction = false;
         config.global.service.cleanup_dead_nodes_on_open = false;
