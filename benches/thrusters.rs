@@ -54,13 +54,19 @@ fn measure(count: u64, seconds: u64) {
     let armed = arm(&mut stack, &ids);
     println!("{count} thrusters, {armed} of them armed");
 
-    let processes = children(stack.supervisor.id());
-    let before = (loops(&stack), processes.iter().map(|(pid, _)| cpu_s(*pid)).sum::<f64>());
+    let everyone = || -> Vec<(u32, String)> {
+        let up = (stack.supervisor.id(), "up".to_owned());
+        children(up.0).into_iter().chain([up]).collect()
+    };
+    let processes = everyone();
+    let busy = || -> BTreeMap<u32, f64> { processes.iter().map(|(pid, _)| (*pid, cpu_s(*pid))).collect() };
+    let before = (loops(&stack), busy());
     let began = Instant::now();
     std::thread::sleep(Duration::from_secs(seconds));
     let passed_s = began.elapsed().as_secs_f64();
-    let now = children(stack.supervisor.id());
-    let after = (loops(&stack), processes.iter().map(|(pid, _)| cpu_s(*pid)).sum::<f64>());
+    let now = everyone();
+    let after = (loops(&stack), busy());
+    let cores = |pid: &u32| (after.1.get(pid).unwrap_or(&0.0) - before.1.get(pid).unwrap_or(&0.0)) / passed_s;
 
     let mut buckets: Vec<(f64, f64)> = after
         .0
@@ -78,24 +84,25 @@ fn measure(count: u64, seconds: u64) {
     println!("  ticks left out        {:.0} of {:.0}", after.0.overruns - before.0.overruns, total);
     let same = |(pid, _): &(u32, String)| now.iter().any(|(other, _)| other == pid);
     if processes.iter().all(same) {
-        println!("  processor time        {:.2} cores", (after.1 - before.1) / passed_s);
+        println!(
+            "  processor time        {:.2} cores",
+            processes.iter().map(|(pid, _)| cores(pid)).sum::<f64>()
+        );
     } else {
         println!("  processes were replaced: this machine does not carry so many");
     }
     println!("  stopped meanwhile     {}", stopped(&stack, &ids));
-    let all =
-        processes.iter().map(|(pid, role)| (*pid, role.as_str())).chain([(stack.supervisor.id(), "up")]);
-    let (mut roles, mut shared) = (BTreeMap::<&str, (f64, f64)>::new(), BTreeMap::new());
-    for (pid, role) in all {
+    let (mut roles, mut shared) = (BTreeMap::<&str, (f64, f64, f64)>::new(), BTreeMap::new());
+    for (pid, role) in now.iter().map(|(pid, role)| (*pid, role.as_str())) {
         let sum = roles.entry(role).or_default();
-        *sum = (sum.0 + 1.0, sum.1 + own_mb(pid));
+        *sum = (sum.0 + 1.0, sum.1 + own_mb(pid), sum.2 + cores(&pid));
         shared.extend(shared_mb(pid));
     }
     let (own, shm) = (roles.values().map(|role| role.1).sum::<f64>(), shared.values().sum::<f64>());
     let whole = own + shm;
     println!("  memory                {whole:.0} MB: {own:.0} of the processes, {shm:.0} shared");
-    for (role, (n, own)) in roles {
-        println!("    {role:<18}  {:.1} MB each ({n})", own / n);
+    for (role, (n, own, cores)) in roles {
+        println!("    {role:<18}  {:.1} MB, {:.3} cores each ({n})", own / n, cores / n);
     }
     println!();
 }
