@@ -83,7 +83,10 @@ fn two_thrusters_side_by_side_are_commanded_in_turn_and_stopped_at_once() {
             "!$('fleet').hidden && fleet.size === 2 && [...fleet.values()].every((m) => m.state !== null)",
         );
         page.eval("lease_ttl_ms = 5000");
+        // A gateway that answers late: the signal of the larger thruster is not asked of the smaller one meanwhile.
+        page.eval("(() => { const now = fetch; window.fetch = (url, ...how) => String(url).endsWith('/t2') ? new Promise((on) => setTimeout(on, 600)).then(() => now(url, ...how)) : now(url, ...how); })()");
         for (id, newton) in [("t1", 60), ("t2", 15)] {
+            page.eval("preview()");
             page.eval(&format!("[...document.querySelectorAll('#mates button')].find((b) => b.ariaLabel === 'choose {id}').click()"));
             page.until(&format!("thruster === '{id}' && state !== null && state.id === '{id}'"));
             page.click("take");

@@ -1,7 +1,7 @@
 "use strict";
 const $ = (id) => document.getElementById(id);
 const RENEW_EVERY_MS = 500, STREAM_HZ = 50, DRAW_EVERY_MS = 50, STALE_MS = 700, WAIT_MS = 4000;
-let lease_ttl_ms = 3000, thruster = null, lease = null, socket = null, state = null, heard_ms = 0, paused_s = null, limitsOf = {}, taken_ms = 0, drawn_ms = 0;
+let lease_ttl_ms = 3000, thruster = null, lease = null, socket = null, state = null, heard_ms = 0, paused_s = null, limitsOf = null, taken_ms = 0, drawn_ms = 0;
 
 const TILES = [
   ["thrust", "N", (s) => s.measured.thrust_n, 1], ["thrust, estimated", "N", (s) => s.estimated.thrust_n, 1],
@@ -211,7 +211,7 @@ $("slider").addEventListener("keydown", (event) => { if (event.key === "Enter") 
 $("entry").addEventListener("input", () => { $("slider").value = $("entry").value; });
 document.querySelectorAll("input[name=kind]").forEach((radio) => radio.addEventListener("change", showKind));
 function showKind() {
-  const bound = limitsOf[kind()] ?? 100;
+  const bound = limitsOf?.[kind()] ?? 100;
   $("unit").textContent = kind() === "thrust_n" ? "N" : "rad/s";
   const step = bound > 20 ? 0.5 : 0.01, end = Math.floor(bound / step) * step; // steps count from min: zero must be one
   $("slider").min = -end; $("slider").max = end; $("slider").step = step;
@@ -277,7 +277,10 @@ async function choose(id) {
   if (lease) held.set(thruster, lease); // what one commands goes on while one looks at another
   thruster = id; lease = held.get(id) ?? null; taken_ms = performance.now(); held.delete(id);
   state = null; live.clear();
-  limitsOf = (await call("GET", base())).range; showKind(); showFields();
+  limitsOf = null; // nobody's, until the thruster told its own: a signal is not previewed within another's
+  const { range } = await call("GET", base());
+  if (thruster !== id) return; // another was chosen meanwhile
+  limitsOf = range; showKind(); showFields();
   connect(); loadHistory().catch(() => {}); await loadController();
 }
 $("login").addEventListener("submit", (event) => {

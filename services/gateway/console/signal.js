@@ -12,7 +12,7 @@ const KINDS = { // kind: [words, fields with their first values, segments made o
 };
 const unitOf = (field) => (field.endsWith("_s") ? "s" : field.endsWith("_hz") ? "Hz" : ["levels", "count", "tones", "order"].includes(field) ? "" : $("signal-of").value === "thrust_n" ? "N" : "rad/s");
 // First values are for a thruster that gives 60 N or 60 rad/s; one that does not begins with three fifths of its range.
-const scale = () => { const bound = limitsOf[$("signal-of").value] ?? 60; return bound < 60 ? 0.6 * bound / 60 : 1; };
+const scale = () => { const bound = limitsOf?.[$("signal-of").value] ?? 60; return bound < 60 ? 0.6 * bound / 60 : 1; };
 const firstOf = (name, first) => (["N", "rad/s"].includes(unitOf(name)) ? Number((first * scale()).toPrecision(3)) : first);
 let previewPlot = null, previewed = 0, scenarioText = null;
 
@@ -39,6 +39,7 @@ let waiting = null;
 function preview() { clearTimeout(waiting); waiting = setTimeout(() => showPreview().catch(() => {}), 250); }
 async function showPreview() {
   const body = asked(), mine = ++previewed;
+  if (!limitsOf) return; // showFields asks again once they are there
   if (!body || !thruster) { says("signal-text", $("signal-kind").value === "file" ? "Choose a scenario file." : "There is no diagnosis that proposes an experiment."); return; }
   let would;
   try { would = await call("POST", `${base()}/excitation?dry_run=true`, body, true); } catch (error) { if (mine === previewed) { signalRefused(error.message); } return; }
