@@ -278,6 +278,21 @@ fn a_full_disk_is_called_that_and_what_it_holds_reads() {
     }
 }
 
+/// What the crate beneath believes: the length of a text, 4 GiB of it, and that an attachment has its end.
+#[test]
+fn an_mcap_whose_records_are_shorter_than_they_say_is_refused() {
+    let mut bytes = written(&sample(3), Format::Mcap);
+    let library = 8 + 9 + 4;
+    bytes[library..library + 4].fill(0xff);
+    let refused = decode("rec", bytes.as_slice(), None).unwrap_err().to_string();
+    assert!(refused.contains("longer than its record"), "{refused}");
+    let mut attached = ::mcap::MAGIC.to_vec();
+    attached.push(::mcap::records::op::ATTACHMENT);
+    attached.extend(32_u64.to_le_bytes());
+    attached.extend([0; 32]);
+    assert!(decode("rec", attached.as_slice(), None).is_err());
+}
+
 proptest! {
     #[test]
     fn no_bytes_make_it_panic(bytes in proptest::collection::vec(any::<u8>(), 0..400)) {

@@ -8,7 +8,7 @@ mod write;
 
 use std::io::{self, Read};
 
-use mcap::records::Record;
+use mcap::records::{Record, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
 use crate::error::Problem;
@@ -43,7 +43,15 @@ fn records(
                 Err(e) => e.to_string(),
             },
             Ok(LinearReadEvent::Record { opcode, data }) => {
-                complete |= opcode == mcap::records::op::DATA_END;
+                complete |= opcode == op::DATA_END;
+                match whole(opcode, data) {
+                    Some(true) => (),
+                    Some(false) => {
+                        let message = "a text in it is longer than its record".into();
+                        return Err(Problem::Mcap { message });
+                    }
+                    None => continue,
+                }
                 match mcap::parse_record(opcode, data) {
                     Ok(record) => {
                         match &record {
@@ -63,6 +71,38 @@ fn records(
         return Ok((!complete).then_some(torn));
     }
     Ok(unfinished.then(|| "whoever wrote it was stopped before its end".to_owned()))
+}
+
+/// Whether the texts of a record lie within it; none for a record that is not used. The crate that takes it apart believes
+/// their lengths and reserves what they say, and of an attachment that is too short it panics.
+fn whole(opcode: u8, data: &[u8]) -> Option<bool> {
+    fn text<'d>(rest: &mut &'d [u8]) -> Option<&'d [u8]> {
+        let (length, after) = rest.split_first_chunk::<4>()?;
+        let (text, after) = after.split_at_checked(u32::from_le_bytes(*length) as usize)?;
+        *rest = after;
+        Some(text)
+    }
+    // Bytes before the texts, how many texts, and whether pairs of texts follow.
+    let (before, texts, pairs) = match opcode {
+        op::HEADER => (0, 2, false),
+        op::SCHEMA => (2, 2, false),
+        op::CHANNEL => (4, 2, true),
+        op::METADATA => (0, 1, true),
+        op::FOOTER | op::MESSAGE => (0, 0, false),
+        _ => return None,
+    };
+    let texts_lie_within = || -> Option<()> {
+        let mut rest = data.get(before..)?;
+        for _ in 0..texts {
+            text(&mut rest)?;
+        }
+        let mut inner = if pairs { text(&mut rest)? } else { &[] };
+        while !inner.is_empty() {
+            text(&mut inner)?;
+        }
+        Some(())
+    };
+    Some(texts_lie_within().is_some())
 }
 
 /// Decodes from start to end; a file without its end is read up to the last complete chunk.
