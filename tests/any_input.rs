@@ -3,7 +3,11 @@
 
 #[path = "../fuzz/entry_points.rs"]
 mod entry_points;
+#[path = "logs/writers.rs"]
+#[allow(dead_code)]
+mod writers;
 
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use entry_points::{body, deployment, description, recording, wire};
@@ -76,6 +80,29 @@ fn edits() -> impl Strategy<Value = Vec<Edit>> {
     prop::collection::vec((any::<Index>(), 0usize..6, any::<Index>(), any::<bool>()), 1..6)
 }
 
+/// The beginnings of logs of others, one of each kind; a database is nothing without its end.
+fn logs() -> &'static [Vec<u8>] {
+    static LOGS: std::sync::LazyLock<Vec<Vec<u8>>> = std::sync::LazyLock::new(|| {
+        let unpacked = files("tests/recordings/logs").into_iter().map(|packed| {
+            let mut bytes = Vec::new();
+            match flate2::read::GzDecoder::new(packed.as_slice()).read_to_end(&mut bytes) {
+                Ok(_) => bytes,
+                Err(_) => packed,
+            }
+        });
+        let written = [writers::dataflash(40), writers::candump(40).into_bytes(), writers::blackbox(40)];
+        let all = unpacked.chain(written);
+        all.map(|mut bytes| {
+            if !bytes.starts_with(b"SQLite") {
+                bytes.truncate(20_000);
+            }
+            bytes
+        })
+        .collect()
+    });
+    &LOGS
+}
+
 fn one(of: &[Vec<u8>], at: Index) -> &[u8] {
     &of[at.index(of.len())]
 }
@@ -143,6 +170,16 @@ proptest! {
         for kind in Body::ALL {
             let _ = body(kind, &bytes);
         }
+    }
+
+    #[test]
+    fn damaged_logs_of_others(seed in any::<Index>(), edits in edits(), flips in prop::collection::vec((any::<Index>(), 0u8..8), 0..8)) {
+        let mut bytes = edited(one(logs(), seed), &edits);
+        for (at, bit) in flips {
+            let at = at.index(bytes.len().max(1));
+            bytes.iter_mut().skip(at).take(1).for_each(|byte| *byte ^= 1 << bit);
+        }
+        let _ = recording(&bytes);
     }
 
     /// One bad cell among good rows: its line and its column are named.

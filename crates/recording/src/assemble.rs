@@ -192,7 +192,7 @@ fn note_gaps(recording: &mut Recording) {
     let gaps = recording.gaps();
     if let Some(longest) = gaps.iter().max_by(|a, b| (a.to_s - a.from_s).total_cmp(&(b.to_s - b.from_s))) {
         recording.notes.push(format!(
-            "{} gap(s) in time, the longest from {} to {} s (rows are usually {:.4} s apart)",
+            "{} gap(s) in time, the longest from {:.3} to {:.3} s (rows are usually {:.4} s apart)",
             gaps.len(),
             longest.from_s,
             longest.to_s,

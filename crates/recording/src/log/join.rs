@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{Log, Topic, same_source, steps};
+use super::{Log, said, same_source};
 use crate::assemble::{Assembler, CLOCK, Cell};
 use crate::columns::nearest;
 use crate::error::{Place, Problem};
@@ -80,12 +80,12 @@ pub(crate) fn recording(name: &str, log: &Log, map: &ColumnMap) -> Result<Record
         })?;
     }
     let mut losses = log.losses.clone();
-    losses.extend(other_stretches(log, grid, stretch));
+    losses.extend(said::other_stretches(log, grid, stretch));
     let mut recording = rows.finish(losses)?;
-    recording.unused = unused(log, &taken);
+    let used: Vec<usize> = taken.iter().map(|one| one.topic).collect();
+    recording.unused = said::unused(log, &used);
     let mut notes = log.notes.clone();
-    notes.push(words(log, &taken, grid, stretch));
-    notes.extend(silences(log, &taken, grid, stretch));
+    notes.extend(said::notes(log, &used, grid, stretch));
     notes.append(&mut recording.notes);
     recording.notes = notes;
     Ok(recording)
@@ -160,81 +160,6 @@ fn grid(log: &Log, taken: &[Taken], wanted: Option<&str>, map: &ColumnMap) -> Re
     densest.ok_or(Problem::TooFewRows { found: 0 })
 }
 
-fn other_stretches(log: &Log, grid: usize, stretch: usize) -> Option<String> {
-    let topic = &log.topics[grid];
-    let range = topic.stretch(stretch);
-    let (from, to) = (topic.stamps_s.get(range.start)?, topic.stamps_s.get(range.end.checked_sub(1)?)?);
-    (log.resets > 0).then(|| {
-        format!(
-            "the clock begins anew {} time(s); the longest stretch, {from} to {to} s, is read, and {} messages of `{}` outside it are left out",
-            log.resets,
-            topic.stamps_s.len() - range.len(),
-            topic.name
-        )
-    })
-}
-
-/// Topics that are in the log and not in the map.
-fn unused(log: &Log, taken: &[Taken]) -> Vec<String> {
-    let used = |place: usize| taken.iter().any(|one| one.topic == place);
-    let left = log.topics.iter().enumerate().filter(|(place, t)| !used(*place) && !t.stamps_s.is_empty());
-    let mut names: Vec<String> = left.map(|(_, topic)| topic.name.clone()).collect();
-    if names.len() > 40 {
-        let more = names.len() - 40;
-        names.truncate(40);
-        names.push(format!("and {more} more"));
-    }
-    names
-}
-
-fn rate(topic: &Topic, stretch: usize) -> String {
-    let (step_s, _) = steps(&topic.stamps_s[topic.stretch(stretch)]);
-    if step_s > 0.0 {
-        format!("`{}` ({:.1} Hz)", topic.name, 1.0 / step_s)
-    } else {
-        format!("`{}`", topic.name)
-    }
-}
-
-/// Topics in use beside the one whose messages are the rows.
-fn beside(taken: &[Taken], grid: usize) -> Vec<usize> {
-    let mut topics: Vec<usize> = taken.iter().map(|one| one.topic).filter(|topic| *topic != grid).collect();
-    topics.sort_unstable();
-    topics.dedup();
-    topics
-}
-
-/// How several rates became one.
-fn words(log: &Log, taken: &[Taken], grid: usize, stretch: usize) -> String {
-    let others = beside(taken, grid);
-    let mut text = format!(
-        "{}, stamps are {}; the rows are the messages of {}",
-        log.format,
-        log.clock,
-        rate(&log.topics[grid], stretch)
-    );
-    if !others.is_empty() {
-        let names: Vec<String> = others.into_iter().map(|topic| rate(&log.topics[topic], stretch)).collect();
-        text += &format!(
-            ", beside them {}: a command stands until its next message, a measured value in the first row after its own",
-            names.join(", ")
-        );
-    }
-    text
-}
-
-/// Gaps in the topics beside the one that makes the rows, whose gaps are those of the recording.
-fn silences(log: &Log, taken: &[Taken], grid: usize, stretch: usize) -> Vec<String> {
-    let line = |place: usize| {
-        let topic = &log.topics[place];
-        let (_, gaps) = steps(&topic.stamps_s[topic.stretch(stretch)]);
-        let longest = gaps.iter().max_by(|a, b| (a.1 - a.0).total_cmp(&(b.1 - b.0)))?;
-        let (name, count) = (&topic.name, gaps.len());
-        Some(format!("{count} gap(s) in `{name}`, the longest from {} to {} s", longest.0, longest.1))
-    };
-    beside(taken, grid).into_iter().filter_map(line).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::Gather;
@@ -288,6 +213,32 @@ mod tests {
         assert_eq!(r.rows(), 250);
         assert!(r.column("shaft_speed_rad_s").unwrap().iter().all(|v| !v.is_nan()));
         assert!((r.column("duty_cmd").unwrap()[30] - 0.1).abs() < 1e-12, "the command that stands then");
+    }
+
+    #[test]
+    fn another_clock_and_another_instance_are_said() {
+        let map = ColumnMap::from_toml("m", MAP).unwrap();
+        let sources: Vec<String> = map.sources().map(|(s, _)| s.to_string()).collect();
+        let notes = |ahead_s: f64| {
+            let mut gather = Gather::new("test", "seconds", Some(&sources));
+            let [out, esc, second] = ["out", "esc[0]", "esc[1]"].map(|name| gather.topic(name));
+            let (control, rpm) = (gather.field(out, "control[0]", None), gather.field(esc, "rpm", None));
+            for k in 0..400 {
+                let stamp_s = f64::from(k) * 0.01;
+                gather.message(out, stamp_s);
+                gather.set(out, control, 0.1);
+                if k % 4 == 0 {
+                    gather.message(esc, stamp_s + ahead_s);
+                    gather.set(esc, rpm, f64::from(k));
+                    gather.message(second, stamp_s);
+                }
+            }
+            recording("r", &gather.finish(), &map).unwrap().notes.join("; ")
+        };
+        let said = notes(2.0);
+        assert!(said.contains("`esc[0]` begins 2.0 s and ends 2.0 s later than the rows"), "{said}");
+        assert!(said.contains("also has `esc[1]`"), "{said}");
+        assert!(!notes(0.003).contains("begins"), "{}", notes(0.003));
     }
 
     #[test]

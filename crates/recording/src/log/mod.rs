@@ -2,6 +2,7 @@
 
 pub(crate) mod join;
 pub(crate) mod propose;
+mod said;
 mod survey;
 
 pub use survey::{FieldSurvey, GapSurvey, Proposal, Survey, TopicSurvey, survey};

@@ -1,0 +1,125 @@
+//! What is said of how a log of messages became rows: rates, gaps, clocks, and what was left out.
+
+use super::{Log, Topic, steps};
+
+/// A topic that begins and ends so much later than the rows is said to.
+const SHIFT_S: f64 = 1.0;
+
+/// What the clock's resets cost.
+pub(super) fn other_stretches(log: &Log, grid: usize, stretch: usize) -> Option<String> {
+    let topic = &log.topics[grid];
+    let range = topic.stretch(stretch);
+    let (from, to) = (topic.stamps_s.get(range.start)?, topic.stamps_s.get(range.end.checked_sub(1)?)?);
+    (log.resets > 0).then(|| {
+        format!(
+            "the clock begins anew {} time(s); the longest stretch, {from:.3} to {to:.3} s, is read, and {} messages of `{}` outside it are left out",
+            log.resets,
+            topic.stamps_s.len() - range.len(),
+            topic.name
+        )
+    })
+}
+
+/// Topics that are in the log and not in the map.
+pub(super) fn unused(log: &Log, used: &[usize]) -> Vec<String> {
+    let mut names: Vec<String> = left(log, used).map(|topic| topic.name.clone()).collect();
+    if names.len() > 40 {
+        let more = names.len() - 40;
+        names.truncate(40);
+        names.push(format!("and {more} more"));
+    }
+    names
+}
+
+fn rate(topic: &Topic, stretch: usize) -> String {
+    let (step_s, _) = steps(&topic.stamps_s[topic.stretch(stretch)]);
+    if step_s > 0.0 {
+        format!("`{}` ({:.1} Hz)", topic.name, 1.0 / step_s)
+    } else {
+        format!("`{}`", topic.name)
+    }
+}
+
+fn left<'l>(log: &'l Log, used: &'l [usize]) -> impl Iterator<Item = &'l Topic> {
+    let topics = log.topics.iter().enumerate();
+    topics.filter(|(place, t)| !used.contains(place) && !t.stamps_s.is_empty()).map(|(_, topic)| topic)
+}
+
+/// Topics in use beside the one whose messages are the rows.
+fn beside(used: &[usize], grid: usize) -> Vec<usize> {
+    let mut topics: Vec<usize> = used.iter().copied().filter(|topic| *topic != grid).collect();
+    topics.sort_unstable();
+    topics.dedup();
+    topics
+}
+
+/// How several rates became one.
+fn rows(log: &Log, used: &[usize], grid: usize, stretch: usize) -> String {
+    let others = beside(used, grid);
+    let mut text = format!(
+        "{}, stamps are {}; the rows are the messages of {}",
+        log.format,
+        log.clock,
+        rate(&log.topics[grid], stretch)
+    );
+    if !others.is_empty() {
+        let names: Vec<String> = others.into_iter().map(|topic| rate(&log.topics[topic], stretch)).collect();
+        text += &format!(
+            ", beside them {}: a command stands until its next message, a measured value in the first row after its own",
+            names.join(", ")
+        );
+    }
+    text
+}
+
+/// Gaps in a topic beside the one that makes the rows, whose gaps are those of the recording.
+fn silence(topic: &Topic, stretch: usize) -> Option<String> {
+    let (_, gaps) = steps(&topic.stamps_s[topic.stretch(stretch)]);
+    let longest = gaps.iter().max_by(|a, b| (a.1 - a.0).total_cmp(&(b.1 - b.0)))?;
+    let (name, count) = (&topic.name, gaps.len());
+    Some(format!("{count} gap(s) in `{name}`, the longest from {:.3} to {:.3} s", longest.0, longest.1))
+}
+
+/// A topic that begins and ends as much later than the rows, or earlier, has another clock, or a logger of its own.
+fn shifted(topic: &Topic, rows: &Topic, stretch: usize) -> Option<String> {
+    let ends = |topic: &Topic| {
+        let stamps_s = &topic.stamps_s[topic.stretch(stretch)];
+        Some((*stamps_s.first()?, *stamps_s.last()?, steps(stamps_s).0))
+    };
+    let ((from, to, step_s), (rows_from, rows_to, _)) = (ends(topic)?, ends(rows)?);
+    let (begin_s, end_s) = (from - rows_from, to - rows_to);
+    let least_s = SHIFT_S.max(3.0 * step_s);
+    if begin_s.abs() < least_s || (begin_s - end_s).abs() > least_s {
+        return None;
+    }
+    let word = if begin_s > 0.0 { "later" } else { "earlier" };
+    Some(format!(
+        "`{}` begins {:.1} s and ends {:.1} s {word} than the rows: if its clock is another, its values stand so far off",
+        topic.name,
+        begin_s.abs(),
+        end_s.abs()
+    ))
+}
+
+/// Other instances of what the map takes, as a second speed controller beside the first.
+fn kin(log: &Log, used: &[usize]) -> Option<String> {
+    let base = |name: &'_ str| name.split('[').next().unwrap_or_default().to_string();
+    let mine: Vec<String> = used.iter().map(|place| base(&log.topics[*place].name)).collect();
+    let others: Vec<String> = left(log, used)
+        .filter(|topic| mine.contains(&base(&topic.name)))
+        .map(|topic| format!("`{}`", topic.name))
+        .collect();
+    (!others.is_empty()).then(|| format!("the log also has {}, which the map does not take", others.join(", ")))
+}
+
+/// What a reader should know of how the log became rows.
+pub(super) fn notes(log: &Log, used: &[usize], grid: usize, stretch: usize) -> Vec<String> {
+    let mut notes = vec![rows(log, used, grid, stretch)];
+    for place in beside(used, grid) {
+        let topic = &log.topics[place];
+        notes.extend(silence(topic, stretch));
+        notes.extend(shifted(topic, &log.topics[grid], stretch));
+    }
+    notes.extend(kin(log, used));
+    notes
+}
