@@ -226,6 +226,25 @@ fn moteus_registers_by_name() {
     assert!(recording.notes.iter().any(|n| n.contains("COMMAND_Q_CURRENT")), "{:?}", recording.notes);
 }
 
+/// What moteus' own tview logged (`tests/logs/reference_writers.py`): flags, empty cells and `nan` among the numbers.
+#[test]
+fn what_tview_of_moteus_logs_comes_in_by_its_map() {
+    let log = "tests/recordings/logs/moteus_1_servo_stats.csv.gz";
+    let found = columns(log);
+    assert_eq!((found["format"].as_str(), shipped(&found)), (Some("CSV"), vec!["moteus-tview"]));
+    let recording = read(log, "moteus-tview");
+    assert_eq!(recording.rows(), 500);
+    let long_s = recording.time_s[499] - recording.time_s[0];
+    assert!((long_s - 9.98).abs() < 1e-6, "stamps are seconds since 1970: {long_s}");
+    let command = samples(&recording, "speed_cmd_rad_s");
+    assert_eq!(command.len(), 400, "none before the drive was commanded");
+    assert!(near(command[0].1, 4.0 * std::f64::consts::TAU));
+    let (speed, angle) =
+        (recording.column("shaft_speed_rad_s").unwrap(), recording.column("shaft_angle_rad").unwrap());
+    assert!((speed[199] / command[99].1 - 1.0).abs() < 1e-4, "the drive follows: {}", speed[199]);
+    assert!((angle[199] - angle[198] - 0.02 * speed[199]).abs() < 1e-9, "its angle is of its speed");
+}
+
 /// Against the numbers that Foxglove's own reader of ROS 2 bags (mcap_ros2) gives for the same file, which its writer made.
 #[test]
 fn a_ros_2_bag_reads_as_its_own_library_reads_it() {
@@ -315,4 +334,31 @@ fn bytes_on_a_can_bus_become_columns_by_a_map() {
     let wrong = kort(&["fit", &log, "--rig", "t200", "--columns", "vesc-can:id=06,pole_pairs=7"]);
     assert_eq!(wrong.status.code(), Some(2));
     assert!(stderr(&wrong).contains("0x00000906"), "{}", stderr(&wrong));
+}
+
+/// Two interfaces, extended and short identifiers, marks of direction: as can-utils' own asc2log wrote them.
+#[test]
+fn what_can_utils_write_comes_in() {
+    let log = "tests/recordings/logs/two-drives.candump.log.gz";
+    let found = columns(log);
+    assert_eq!(found["format"], "candump");
+    for (name, frames) in [("0x00000905", 1000), ("0x301", 500), ("0x281", 500), ("0x701", 10)] {
+        assert_eq!(topic(&found, name)["messages"], frames, "{name}");
+    }
+    let vesc = read(log, "vesc-can:id=05,pole_pairs=7");
+    let rad_s = |rpm: f64| rpm * std::f64::consts::TAU / 60.0;
+    assert_eq!((vesc.rows(), vesc.losses.len()), (1000, 0));
+    assert!(near(vesc.column("duty_cmd").unwrap()[300], 0.2));
+    assert!(near(vesc.column("shaft_speed_rad_s").unwrap()[399], rad_s(4200.0 / 7.0)));
+    assert!(near(vesc.column("current_a").unwrap()[799], -9.0 + 0.3 * 25.0));
+    let drive = read(log, "canopen-402:pdo=281,command=301");
+    let command = samples(&drive, "speed_cmd_rad_s");
+    assert!(near(command[250].1, rad_s(600.0)) && near(command[350].1, rad_s(-450.0)));
+    let settled =
+        samples(&drive, "shaft_speed_rad_s").into_iter().take_while(|(at, _)| *at < drive.time_s[399]);
+    assert!(
+        near(settled.last().unwrap().1, rad_s(-450.0)),
+        "{:?}",
+        samples(&drive, "shaft_speed_rad_s").len()
+    );
 }

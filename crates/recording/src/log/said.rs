@@ -109,7 +109,8 @@ fn kin(log: &Log, used: &[usize]) -> Option<String> {
         .filter(|topic| mine.contains(&base(&topic.name)))
         .map(|topic| format!("`{}`", topic.name))
         .collect();
-    (!others.is_empty()).then(|| format!("the log also has {}, which the map does not take", others.join(", ")))
+    (!others.is_empty())
+        .then(|| format!("the log also has {}, which the map does not take", others.join(", ")))
 }
 
 /// What a reader should know of how the log became rows.

@@ -16,6 +16,7 @@ shipped![
     "betaflight-vehicle",
     "canopen-402",
     "moteus",
+    "moteus-tview",
     "motor-step-acoustic-air",
     "px4",
     "px4-outputs",
