@@ -13,6 +13,13 @@ fn recordings_are_tagged_and_the_tuned_controller_is_kept_as_a_file() {
         let stack = Stack::start();
         let Some(mut page) = Browser::open(&format!("http://127.0.0.1:{}/", stack.site.port)) else { return };
         page.until("document.readyState === 'complete' && typeof state !== 'undefined' && state !== null");
+        // A connection that was lost for a while leaves no hole: the gateway kept what was measured meanwhile.
+        page.until("live.t.length > 20");
+        page.eval("window.cut_s = state.time_s; socket.close()");
+        page.until("state.time_s > cut_s + 1");
+        page.until("live.t.some((t) => t > cut_s + 0.3 && t < cut_s + 0.7)");
+        let order = "live.t.every((t, i) => i === 0 || t > live.t[i - 1]) && live.c.thrust_n.length === live.t.length";
+        assert_eq!(page.eval(order), json!(true), "rows stand in their order");
         for (name, tags) in [("first", "bollard, dry"), ("second", "tow")] {
             page.eval(&format!("$('recording-name').value = '{name}'; $('recording-tags').value = '{tags}'"));
             page.click("record");

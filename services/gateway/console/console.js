@@ -1,6 +1,6 @@
 "use strict";
 const $ = (id) => document.getElementById(id);
-const RENEW_EVERY_MS = 500, STREAM_HZ = 50, DRAW_EVERY_MS = 50, STALE_MS = 700, WAIT_MS = 4000;
+const RENEW_EVERY_MS = 500, STREAM_HZ = 50, DRAW_EVERY_MS = 50, STALE_MS = 700, WAIT_MS = 4000, HOLE_S = 0.5;
 let lease_ttl_ms = 3000, thruster = null, lease = null, socket = null, state = null, heard_ms = 0, paused_s = null, limitsOf = null, taken_ms = 0, drawn_ms = 0;
 
 const TILES = [
@@ -10,7 +10,7 @@ const TILES = [
   ["flow, estimated", "m/s", (s) => s.estimated.flow_m_s, 2], ["ambient, estimated", "m/s", (s) => s.estimated.ambient_m_s, 2],
 ];
 const scaled = (value, factor) => (value === null || value === undefined ? null : value * factor);
-const text = (value, digits) => (value === null || value === undefined ? "–" : value.toFixed(digits));
+const text = (value, digits) => (value === null || value === undefined ? "–" : value.toFixed(digits).replace(/^-(?=[0.]+$)/, "")); // no minus before a zero
 
 // The token lives as long as the tab: it is asked for where the gateway wants one.
 let token = sessionStorage.getItem("kort-token");
@@ -83,6 +83,8 @@ function record(s) {
     const doubt = est.parameters.find((p) => p.name === name)?.std_error ?? null;
     if (doubt !== null && est[name] !== null) { sides[`estimated_${of}_low`] = est[name] - doubt; sides[`estimated_${of}_high`] = est[name] + doubt; }
   }
+  const before_s = live.t[live.t.length - 1];
+  if (s.time_s - before_s > HOLE_S) loadHistory(before_s, s.time_s).catch(() => {});
   live.push(s.time_s, { ...s.measured, ...cmd, ...sides, thrust_cmd_n: set.thrust_n ?? cmd.thrust_cmd_n, speed_cmd_rad_s: set.speed_rad_s ?? cmd.speed_cmd_rad_s,
     estimated_thrust_n: est.thrust_n, estimated_flow_m_s: est.flow_m_s, estimated_ambient_m_s: est.ambient_m_s });
 }

@@ -123,7 +123,7 @@ class Chart {
     const axis = { stroke: color("--quiet"), grid: { stroke: color("--grid"), width: 1 }, ticks: { show: false }, font: "12px system-ui, 'DejaVu Sans', sans-serif" };
     const series = (second) => this.signals.map(([, , label, hue, dash]) => ({
       label: second ? `${label}, B` : label, stroke: color(hue), width: 1.5, dash: second ? [2, 4] : dash, points: { show: false },
-      value: (_, v) => (v === null || v === undefined ? "–" : v.toFixed(2)),
+      value: (_, v) => text(v, 2),
     }));
     // Between the two sides of an estimate's standard error.
     const bands = this.signals.flatMap(([name, , , hue], i) => (name.endsWith("_high") ? [{ series: [i + 1, i], fill: `color-mix(in srgb, ${color(hue)} 14%, transparent)` }] : []));
@@ -160,13 +160,15 @@ class Chart {
     const { a, b, difference } = source, both = Boolean(b);
     const shown = `${names}|${both}|${difference}`;
     if (this.shown !== shown) {
-      this.signals.forEach(([name], i) => {
+      this.signals.forEach(([name, , label], i) => {
         const on = shownSignals.has(name);
         this.plot.setSeries(i + 1, { show: on && !difference }, false);
         this.plot.setSeries(i + 1 + this.signals.length, { show: on && both }, false);
         // uPlot gives every series its row of the legend; those that are not asked for are no use there.
         const rows = this.box.querySelectorAll(".u-series");
-        rows[i + 1].hidden = !on || difference; rows[i + 1 + this.signals.length].hidden = !on || !both;
+        const [mine, theirs] = [rows[i + 1], rows[i + 1 + this.signals.length]];
+        mine.hidden = !on || difference; theirs.hidden = !on || !both;
+        theirs.querySelector(".u-label").textContent = `${label}, ${difference ? "B − A" : "B"}`;
       });
       this.shown = shown;
     }
@@ -216,7 +218,8 @@ function tableOf(source, from_s, to_s) {
   }
   return `${rows.join("\n")}\n`;
 }
-function pictureOf() {
+function pictureOf({ b, difference }) {
+  const of = !b ? "" : difference ? ", B − A" : ", B dashed";
   const drawn = charts.filter((chart) => !chart.figure.hidden && chart.plot), scale = window.devicePixelRatio || 1;
   const width = Math.max(...drawn.map((chart) => chart.plot.ctx.canvas.width)), line = 24 * scale;
   const sheet = Object.assign(document.createElement("canvas"), { width, height: drawn.reduce((sum, chart) => sum + chart.plot.ctx.canvas.height + line, 0) });
@@ -226,7 +229,8 @@ function pictureOf() {
   for (const chart of drawn) {
     let left = 6 * scale;
     pen.font = `${13 * scale}px system-ui, sans-serif`; pen.fillStyle = css.getPropertyValue("--ink");
-    pen.fillText(`${chart.title} [${chart.unit}]`, left, top + 16 * scale); left += pen.measureText(`${chart.title} [${chart.unit}]   `).width;
+    const title = `${chart.title} [${chart.unit}]${of}`;
+    pen.fillText(title, left, top + 16 * scale); left += pen.measureText(`${title}   `).width;
     for (const [name, , label, hue] of chart.signals.filter((signal) => shownSignals.has(signal[0]))) {
       pen.fillStyle = css.getPropertyValue(hue); pen.fillText(label, left, top + 16 * scale); left += pen.measureText(`${label}   `).width;
     }

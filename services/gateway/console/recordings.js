@@ -67,7 +67,7 @@ $("run-live").addEventListener("click", () => showRun(null));
 $("zoom-out").addEventListener("click", () => zoomTo(null, null));
 $("fix-y").addEventListener("change", () => charts.forEach((chart) => chart.fix($("fix-y").checked)));
 $("save-csv").addEventListener("click", () => { const [source, from_s, to_s] = shownNow(); save(`${thruster}-plots.csv`, new Blob([tableOf(source, from_s, to_s)], { type: "text/csv" })); });
-$("save-png").addEventListener("click", async () => save(`${thruster}-plots.png`, await pictureOf()));
+$("save-png").addEventListener("click", async () => save(`${thruster}-plots.png`, await pictureOf(shownNow()[0])));
 document.querySelector(".plots").replaceChildren(...charts.map((chart) => chart.figure));
 $("signals").replaceChildren(...charts.map((chart) => {
   const group = document.createElement("fieldset"), legend = document.createElement("legend");
@@ -82,11 +82,14 @@ $("signals").replaceChildren(...charts.map((chart) => {
 }));
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { charts.forEach((chart) => { if (chart.plot) chart.build(); }); preview(); });
 
-// The plots begin with what the gateway has kept.
-async function loadHistory() {
-  const kept = await call("GET", `${base()}/history?last_s=600&hz=25`), before = new Columns();
-  const first = live.t[0] ?? Infinity, names = Object.keys(kept.columns);
-  kept.time_s.forEach((t, i) => { if (t < first) before.push(t, Object.fromEntries(names.map((name) => [name, kept.columns[name][i]]))); });
-  live.t = before.t.concat(live.t);
-  for (const name in live.c) live.c[name] = before.c[name].concat(live.c[name]);
+// What the gateway has kept: with it the plots begin, and a hole that a lost connection left is filled.
+async function loadHistory(from_s, to_s) {
+  const of = thruster, last_s = from_s === undefined ? 600 : Math.min(600, Math.ceil(state.time_s - from_s) + 2);
+  const kept = await call("GET", `${base()}/history?last_s=${last_s}&hz=25`), part = new Columns(), names = Object.keys(kept.columns);
+  if (of !== thruster) return;
+  const until_s = to_s ?? live.t[0] ?? Infinity;
+  kept.time_s.forEach((t, i) => { if (t > (from_s ?? -Infinity) && t < until_s) part.push(t, Object.fromEntries(names.map((name) => [name, kept.columns[name][i]]))); });
+  const place = lowerBound(live.t, until_s);
+  live.t.splice(place, 0, ...part.t);
+  for (const name in live.c) live.c[name].splice(place, 0, ...part.c[name]);
 }
