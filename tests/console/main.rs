@@ -133,7 +133,11 @@ fn a_bench_engineer_plays_signals_and_compares_runs() {
             page.click("play");
             // By the page's own log: a browser on a busy machine may show this test less than the whole signal.
             page.until(&text_is("log", &format!("recorded as {name}")));
-            page.until(&format!("{}.split('steps is complete').length === {}", TEXT.replace("ID", "log"), played + 2));
+            page.until(&format!(
+                "{}.split('steps is complete').length === {}",
+                TEXT.replace("ID", "log"),
+                played + 2
+            ));
             page.until("state.excitation === null && state.setpoint.thrust_n === 0");
             page.until(&format!(
                 "[...document.querySelectorAll('#recordings button')].some((b) => b.ariaLabel === 'compare {name}')"

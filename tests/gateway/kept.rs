@@ -30,6 +30,10 @@ fn recordings_are_tagged_while_they_run_and_after_and_found_by_it() {
         };
         assert_eq!(names("bollard"), ["one"]);
         assert_eq!(tag("two", &["tow", "new-propeller"]).json()["tags"], json!(["tow", "new-propeller"]));
+        wait("rows in both", || {
+            let list = stack.get("/v1/recordings")?;
+            list.as_array()?.iter().all(|one| one["rows"].as_u64() > Some(2)).then_some(())
+        });
         for name in ["one", "two"] {
             let done = send(port, "DELETE", &format!("/v1/recordings/{name}"), &[], b"");
             assert_eq!(done.status, 200, "{}", done.text());
@@ -37,6 +41,11 @@ fn recordings_are_tagged_while_they_run_and_after_and_found_by_it() {
         assert_eq!(names("tow"), ["two"], "what was given while it ran stays");
         assert_eq!(tag("one", &["tow"]).json()["state"], "complete");
         assert_eq!((names("tow"), names("bollard")), (vec!["one".into(), "two".into()], vec![]));
+        for (name, tags) in [("one", "bollard"), ("two", "tow new-propeller")] {
+            let file = stack.site.folder.path().join(format!("recordings/{name}.mcap"));
+            let read = kort_recording::Recording::read(&file, None).unwrap();
+            assert_eq!(read.about["tags"], tags, "the file itself has the tags of its end");
+        }
         let kept = std::fs::read_to_string(stack.site.folder.path().join("recordings/one.json")).unwrap();
         assert!(kept.contains("\"tow\""), "on the disk: {kept}");
         assert_problem(&tag("one", &["no blank"]), 422, "out-of-range", "a blank");

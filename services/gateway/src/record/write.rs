@@ -25,6 +25,9 @@ const STATE_EVERY_S: f64 = 0.1;
 /// The law's parameters beside the states.
 const LAW_EVERY_S: f64 = 5.0;
 
+/// What the tags are called in the file's metadata, between spaces; what comes later goes before.
+const TAGS: &str = "tags";
+
 /// Something on its way to the disk.
 #[derive(Debug)]
 pub enum Item {
@@ -56,6 +59,8 @@ pub struct Job {
     info: Arc<Mutex<RecordingInfo>>,
     began: SystemTime,
     file: Mcap,
+    /// The tags that the file has.
+    tagged: Vec<String>,
     part: u32,
     base: String,
     first_ns: Option<u64>,
@@ -104,6 +109,7 @@ impl Job {
             info,
             began,
             file,
+            tagged: now.tags,
             part: 1,
             first_ns,
             given: (0, 0.0),
@@ -116,7 +122,8 @@ impl Job {
     /// Writes until the recorder lets go of the other end, a limit is reached or the disk refuses.
     pub fn run(mut self, recorder: &Recorder, inbox: &Receiver<Item>) {
         let ended = self.write(recorder, inbox);
-        let finished = self.file.finish();
+        let tags = lock(&self.info).tags.clone();
+        let finished = finish(self.file, &self.tagged, tags);
         let info = {
             let mut info = lock(&self.info);
             if finished.is_ok() {
@@ -223,7 +230,8 @@ impl Job {
             ..now.clone()
         };
         let file = create(&self.folder, &next, &self.subject, self.began)?;
-        std::mem::replace(&mut self.file, file).finish()?;
+        let tagged = std::mem::replace(&mut self.tagged, next.tags.clone());
+        finish(std::mem::replace(&mut self.file, file), &tagged, now.tags.clone())?;
         recorder.note_info(&RecordingInfo { state: RecordingState::Complete, ..now });
         // Tags may have come meanwhile.
         let mut info = lock(&self.info);
@@ -233,6 +241,14 @@ impl Job {
         (self.state_s, self.law_s) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
         Ok(())
     }
+}
+
+/// Ends a file; with its tags where they came while it was written.
+fn finish(mut file: Mcap, tagged: &[String], tags: Vec<String>) -> io::Result<()> {
+    if tagged != tags {
+        file.about(BTreeMap::from([(TAGS.to_owned(), tags.join(" "))]))?;
+    }
+    file.finish()
 }
 
 fn create(folder: &Path, info: &RecordingInfo, subject: &Subject, began: SystemTime) -> io::Result<Mcap> {
@@ -247,6 +263,7 @@ fn create(folder: &Path, info: &RecordingInfo, subject: &Subject, began: SystemT
             ("recording", &info.name),
             ("owner", &info.owner),
             ("started", &info.started),
+            (TAGS, &info.tags.join(" ")),
             ("rate_hz", &info.rate_hz.to_string()),
             ("rig", &rig),
             ("rig_file", &rig_file),

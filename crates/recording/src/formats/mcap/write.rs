@@ -60,8 +60,7 @@ impl<W: Write + Seek> Rows<W> {
         output: W,
     ) -> io::Result<Self> {
         let mut rows = Self::create(topic, columns, output)?;
-        let about = mcap::records::Metadata { name: ABOUT.into(), metadata: about };
-        rows.writer.write_metadata(&about).map_err(cause)?;
+        rows.about(about)?;
         let object = br#"{"type":"object"}"#;
         let mut channel = |schema: &str, topic: &str| -> io::Result<u16> {
             let id = rows.writer.add_schema(schema, "jsonschema", object).map_err(cause)?;
@@ -72,6 +71,15 @@ impl<W: Write + Seek> Rows<W> {
         rows.beside = Some([state, event]);
         rows.origin_ns = origin_ns;
         Ok(rows)
+    }
+
+    /// What is known of the recording; what is said again later takes the place of what was said before.
+    ///
+    /// # Errors
+    /// The output cannot be written.
+    pub fn about(&mut self, about: BTreeMap<String, String>) -> io::Result<()> {
+        let about = mcap::records::Metadata { name: ABOUT.into(), metadata: about };
+        self.writer.write_metadata(&about).map_err(cause)
     }
 
     /// A column not sampled in this row is left out of the message.
