@@ -63,6 +63,10 @@ pub enum EventKind {
     DiagnosisCancelled,
     /// A diagnosis was deleted.
     DiagnosisDeleted,
+    /// A calibration was begun.
+    CalibrationStarted,
+    /// A calibration is over: done, stopped, aborted or failed.
+    CalibrationEnded,
     /// Latched faults were cleared.
     FaultsCleared,
     /// A fault was latched: a stop that nobody asked for, if the drive was armed.

@@ -260,6 +260,9 @@ message! { "kort.Request",
 /// A request older than this is not acted upon, ns.
 pub const REQUEST_LIFE_NS: u64 = 500_000_000;
 
+/// A controller that was asked to stand aside, and is not asked again, takes its place again after this time, ns.
+pub const ASIDE_NS: u64 = 500_000_000;
+
 message! { "kort.Reply",
     /// The answer to a request.
     Reply {

@@ -10,13 +10,17 @@ use rustix::process::{Pid, Signal, getppid, set_parent_process_death_signal};
 
 use crate::{FAILED, fail};
 
-/// Makes this process a job of its parent: it runs only where nothing else wants the processor, and ends with it.
+/// Makes this process a job of its parent: it ends with it, and unless it commands a drive it runs only where nothing
+/// else wants the processor.
 ///
 /// # Errors
 /// The parent is gone already.
 #[cfg(feature = "lab")]
-pub fn begin(parent: u32) -> Result<(), ExitCode> {
+pub fn begin(parent: u32, drives: bool) -> Result<(), ExitCode> {
     follow(parent, Signal::KILL)?;
+    if drives {
+        return Ok(());
+    }
     // Where the one is not permitted the other still helps.
     let _ = nice(19);
     if let Some(words) = idle() {

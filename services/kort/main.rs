@@ -215,7 +215,7 @@ fn dispatch(command: Command) -> Result<ExitCode, ExitCode> {
         #[cfg(feature = "lab")]
         Command::Lab(command) => {
             if let Some(parent) = command.job_of() {
-                job::begin(parent)?;
+                job::begin(parent, command.drives())?;
             }
             Ok(kort_lab::run(command))
         }

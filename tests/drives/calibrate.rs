@@ -4,9 +4,9 @@ use std::io::{BufRead, BufReader};
 use std::process::Stdio;
 
 use rustix::process::{Pid, Signal, kill_process};
-use serde_json::Value;
+use serde_json::{Value, json};
 
-use crate::common::Site;
+use crate::common::{Site, Stack, wait};
 
 /// A session on this site, nobody asked.
 fn calibrate(site: &Site, more: &[&str]) -> std::process::Command {
@@ -79,4 +79,94 @@ fn interrupted(site: &Site) -> Option<String> {
     }
     assert_eq!(status.code(), Some(1), "{before:?} {rest}");
     Some(rest)
+}
+
+/// Waits until the calibration asks for a stage, and returns its words; a session that is over was held up.
+fn asked(stack: &Stack, id: &str, stage: &str) -> Option<String> {
+    wait("the stage to be asked for, or an end", || {
+        let info = stack.expect("GET", &format!("/calibrations/{id}"), None);
+        if info["state"] != "running" {
+            assert!(was_held_up(&info.to_string()), "{info}");
+            return Some(None);
+        }
+        let words = info["asks"].as_str().filter(|_| info["stage"] == stage)?;
+        Some(Some(words.to_owned()))
+    })
+}
+
+fn over(stack: &Stack, id: &str) -> Value {
+    wait("the calibration to be over", || {
+        let info = stack.expect("GET", &format!("/calibrations/{id}"), None);
+        (info["state"] != "running").then_some(info)
+    })
+}
+
+fn kind(answer: Option<(u16, Value)>) -> (u16, String) {
+    let (status, body) = answer.expect("an answer");
+    (status, body["type"].as_str().unwrap_or_default().trim_start_matches("urn:kort:problem:").to_owned())
+}
+
+/// The service's own servo, asked for by the interface: it says what it will do, needs the lease at every step, bears
+/// nobody beside it, and ends at zero with a word; then the controller drives again as if nothing had been.
+#[test]
+fn a_running_service_calibrates_under_the_lease_and_drives_on_after_it() {
+    let mut stack = Stack::start();
+    let none = |stack: &Stack| kind(stack.http("POST", "/calibrations", None));
+    assert_eq!(none(&stack), (403, "lease-required".into()), "nobody has the lease");
+    stack.command(0.0, 60_000);
+    assert_eq!(none(&stack), (409, "refused".into()), "it is armed");
+    stack.expect("POST", "/disarm", None);
+    let odd = kind(stack.http("POST", "/calibrations", Some(json!({"share": 1.5}))));
+    assert_eq!(odd, (422, "out-of-range".into()));
+
+    let go_on = |stack: &Stack, id: &str, stage: &str| {
+        stack.http("POST", &format!("/calibrations/{id}/go-on"), Some(json!({"stage": stage})))
+    };
+    let aborted = (0..ATTEMPTS).find_map(|_| {
+        let begun = stack.expect("POST", "/calibrations", Some(json!({"share": 0.2})));
+        let id = begun["id"].as_str().unwrap().to_owned();
+        let words = asked(&stack, &id, "zeros")?;
+        assert!(words.contains("the shaft stands"), "{words}");
+        assert_eq!(stack.state().unwrap()["calibration"]["stage"], "zeros");
+        for (method, path, body) in [
+            ("POST", "/arm", None),
+            ("PUT", "/setpoint", Some(json!({"thrust_n": 5.0}))),
+            ("POST", "/calibrations", None),
+        ] {
+            assert_eq!(kind(stack.http(method, path, body)), (409, "calibration-active".into()), "{path}");
+        }
+        assert_eq!(kind(go_on(&stack, &id, "working_range")), (409, "refused".into()));
+        assert_eq!(go_on(&stack, &id, "zeros").unwrap().0, 200);
+        let words = asked(&stack, &id, "first_movement")?;
+        assert!(words.contains("the shaft turns by some 0.08 rad a pulse"), "{words}");
+        assert_eq!(go_on(&stack, &id, "first_movement").unwrap().0, 200);
+        asked(&stack, &id, "direction")?;
+        assert_eq!(stack.expect("DELETE", &format!("/calibrations/{id}"), None)["id"], id.as_str());
+        assert_eq!(stack.state().unwrap()["armed"], false, "zero torque with the answer");
+        let info = over(&stack, &id);
+        assert_eq!((&info["state"], &info["cause"]), (&json!("aborted"), &json!("local aborted it")));
+        assert_eq!(info["report"]["steps"][0]["name"], "zeros", "what was found is told: {info}");
+        assert_eq!(kind(stack.http("GET", &format!("/calibrations/{id}/rig"), None)).0, 409);
+        Some(id)
+    });
+    let aborted = aborted.expect("a session that was not held up");
+
+    // It lives under its lease.
+    let begun = stack.expect("POST", "/calibrations", None);
+    let id = begun["id"].as_str().unwrap();
+    stack.expect("DELETE", "/lease", None);
+    stack.leases.clear();
+    let info = over(&stack, id);
+    assert_eq!((&info["state"], &info["cause"]), (&json!("aborted"), &json!("its lease ended")));
+
+    // The controller has its place again.
+    stack.thrust(30.0, 60_000);
+    assert!(stack.state().unwrap()["calibration"].is_null());
+    let (status, _) = stack.http("DELETE", &format!("/calibrations/{aborted}"), None).unwrap();
+    assert_eq!(status, 204);
+    let events = stack.get("/v1/events").unwrap().to_string();
+    assert!(
+        events.contains("calibration_started") && events.contains("is aborted: its lease ended"),
+        "{events}"
+    );
 }

@@ -41,6 +41,9 @@ enumeration! {
         Rest = 5 "rest",
         /// Go on with the revision of the rig description that lies beside the shared memory.
         SetRig = 6 "set-rig",
+        /// Send the servo no commands for [`ASIDE_NS`](super::ASIDE_NS): somebody else takes the controller's place for a
+        /// while, and asks again and again while they do.
+        StandAside = 7 "stand-aside",
     }
 }
 

@@ -116,7 +116,7 @@ pub fn run(config: &Config, deployment: &Deployment, id: &str, latched: u64) -> 
         }
         told = false;
         let mut ports = ControllerPorts::open(deployment, id)?;
-        let tick = Tick::new(&rig, &law, period_ns, monotonic_ns())
+        let mut tick = Tick::new(&rig, &law, period_ns, monotonic_ns())
             .map_err(|error| ControllerError::Model { file: file.clone(), error })?
             .with_rise(thruster.controller.setpoint_rise_s)
             .with_latched(latched)
@@ -127,7 +127,12 @@ pub fn run(config: &Config, deployment: &Deployment, id: &str, latched: u64) -> 
             rate_hz = 1e9 / period_ns as f64,
             "controller runs, at zero"
         );
-        serve(tick, &mut ports, &workshop, thruster, deployment, &stop);
+        while serve(&mut tick, &mut ports, &workshop, thruster, deployment, &stop) == Left::Aside {
+            // Whoever took its place was a younger sender; the servo hears no older one any more.
+            drop(ports);
+            ports = ControllerPorts::open(deployment, id)?;
+            info!(thruster = id, "controller takes its place again, at zero");
+        }
     }
     info!(thruster = id, "controller ends, servo stopped");
     Ok(())
@@ -154,21 +159,31 @@ fn law(config: &Config, id: &str, thruster: &Thruster) -> Result<ControllerConfi
     Ok(law)
 }
 
-/// Ticks until told to stop or the shared memory has a new generation.
+/// Why the loop was left.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Left {
+    /// It is told to stop, or the shared memory has a new generation.
+    Over,
+    /// It stood aside for another commander, who is gone.
+    Aside,
+}
+
+/// Ticks until told to stop, the shared memory has a new generation, or it has stood aside.
 fn serve(
-    mut tick: Tick,
+    tick: &mut Tick,
     ports: &mut ControllerPorts,
     workshop: &Workshop,
     thruster: &Thruster,
     deployment: &Deployment,
     stop: &AtomicBool,
-) {
+) -> Left {
     let period_ns = thruster.controller_period_ns();
     let slack_ns = thruster.servo_period_ns() / 2;
     let mut timing = Timing { period_ns, ..Timing::default() };
     let mut last_ns = monotonic_ns();
     let mut looked_ns = last_ns;
     let mut answered = Answered::default();
+    let mut aside = false;
     loop {
         let woken = ports.ticks.wait(Duration::from_nanos(period_ns + slack_ns));
         let woke_ns = monotonic_ns();
@@ -198,11 +213,14 @@ fn serve(
                 _ => tick.request(&request, woke_ns),
             });
         }
-        let fitted = workshop.fit(&mut tick);
+        let fitted = workshop.fit(tick);
         let command = tick.tick(woke_ns);
         let command = if stopping { Command { drive: 0.0, stop: 1, ..command } } else { command };
-        // What cannot be sent is missed by its reader, who watches for that.
-        let _ = ports.command.send(command);
+        let before = std::mem::replace(&mut aside, tick.aside(woke_ns));
+        if !aside {
+            // What cannot be sent is missed by its reader, who watches for that.
+            let _ = ports.command.send(command);
+        }
         // Answers come behind the command that follows from what was asked: whoever has one may build on it.
         for reply in replies.into_iter().flatten().chain(fitted) {
             answered.keep(&reply);
@@ -214,13 +232,16 @@ fn serve(
         let _ = ports.state.send(state);
         timing.busy_ns = monotonic_ns().saturating_sub(woke_ns);
         if stopping {
-            return;
+            return Left::Over;
+        }
+        if before && !aside {
+            return Left::Aside;
         }
         // The servo is silent: perhaps its shared memory has been replaced.
         if !woken && woke_ns.saturating_sub(looked_ns) > 200_000_000 {
             looked_ns = woke_ns;
             if deployment.generation() != Some(ports.generation) {
-                return;
+                return Left::Over;
             }
         }
     }

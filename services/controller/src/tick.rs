@@ -62,6 +62,8 @@ pub struct Tick {
     refused: Option<(u64, u64)>,
     output: Output,
     in_force: f64,
+    /// Until when somebody else commands the servo, on CLOCK_MONOTONIC, ns.
+    aside_until_ns: u64,
 }
 
 /// The setpoint goes to zero, and why.
@@ -123,6 +125,7 @@ impl Tick {
             refused: None,
             output: Output::default(),
             in_force: 0.0,
+            aside_until_ns: 0,
         })
     }
 

@@ -3,8 +3,8 @@
 use crate::extract::{Json, OptionalJson};
 use crate::problem::Problem;
 use crate::routes::bodies::{
-    ControllerFile, ControllerRequest, DiagnosisRequest, ExcitationRequest, LeaseRequest, RecordingRequest,
-    RecordingSetRequest, RigRequest, TagsRequest, incoming,
+    CalibrationRequest, ControllerFile, ControllerRequest, DiagnosisRequest, ExcitationRequest, GoOnRequest,
+    LeaseRequest, RecordingRequest, RecordingSetRequest, RigRequest, TagsRequest, incoming,
 };
 use crate::view::Setpoint;
 
@@ -25,6 +25,10 @@ pub enum Body {
     Rig,
     /// `POST …/diagnoses`
     Diagnosis,
+    /// `POST …/calibrations`
+    Calibration,
+    /// `POST …/calibrations/{calibration}/go-on`
+    GoOn,
     /// `POST /v1/recordings`
     Recording,
     /// `POST /v1/recording-sets`
@@ -37,7 +41,7 @@ pub enum Body {
 
 impl Body {
     /// Every kind.
-    pub const ALL: [Body; 11] = [
+    pub const ALL: [Body; 13] = [
         Body::Setpoint,
         Body::Lease,
         Body::Controller,
@@ -45,6 +49,8 @@ impl Body {
         Body::Excitation,
         Body::Rig,
         Body::Diagnosis,
+        Body::Calibration,
+        Body::GoOn,
         Body::Recording,
         Body::RecordingSet,
         Body::Tags,
@@ -64,6 +70,8 @@ impl Body {
             Body::Excitation => Json::<ExcitationRequest>::from_bytes(bytes).map(drop),
             Body::Rig => Json::<RigRequest>::from_bytes(bytes).map(drop),
             Body::Diagnosis => OptionalJson::<DiagnosisRequest>::from_bytes(bytes).map(drop),
+            Body::Calibration => OptionalJson::<CalibrationRequest>::from_bytes(bytes).map(drop),
+            Body::GoOn => Json::<GoOnRequest>::from_bytes(bytes).map(drop),
             Body::Recording => OptionalJson::<RecordingRequest>::from_bytes(bytes).map(drop),
             Body::RecordingSet => OptionalJson::<RecordingSetRequest>::from_bytes(bytes).map(drop),
             Body::Tags => Json::<TagsRequest>::from_bytes(bytes).map(drop),

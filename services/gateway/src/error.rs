@@ -59,6 +59,14 @@ pub enum GatewayError {
         /// The system's words.
         error: std::io::Error,
     },
+    /// The folder of the calibrations cannot be used.
+    #[error("gateway.calibrations = {}: {error}\nhint: name a folder this user can write", folder.display())]
+    Calibrations {
+        /// The folder.
+        folder: PathBuf,
+        /// The system's words.
+        error: std::io::Error,
+    },
     /// Who may command beyond this machine is not said.
     #[error(
         "gateway.bind = {bind} is reached from other machines, and {} holds no token\nhint: kort token new NAME --role viewer|pilot|admin makes one",

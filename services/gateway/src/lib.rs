@@ -10,6 +10,7 @@
 
 pub mod bodies;
 mod bus;
+mod calibration;
 mod connections;
 mod desk;
 mod diagnosis;
@@ -56,6 +57,7 @@ use tokio::sync::watch;
 use utoipa::openapi::OpenApi;
 
 use bus::{Bell, Pulse};
+use calibration::Calibrations;
 use connections::Connections;
 use diagnosis::Diagnoses;
 use durations::Durations;
@@ -85,6 +87,7 @@ pub(crate) struct App {
     controllers: Vec<ControllerConfig>,
     rings: Vec<Ring>,
     diagnoses: Arc<Diagnoses>,
+    calibrations: Arc<Calibrations>,
     tallies: Vec<Arc<Tally>>,
     recorder: Arc<Recorder>,
     events: Arc<Events>,
@@ -142,6 +145,10 @@ impl App {
 
     fn diagnoses(&self) -> &Arc<Diagnoses> {
         &self.diagnoses
+    }
+
+    fn calibrations(&self) -> &Arc<Calibrations> {
+        &self.calibrations
     }
 
     fn tallies(&self) -> &[Arc<Tally>] {
@@ -324,6 +331,7 @@ pub fn run(config: &Config, deployment: &Deployment) -> Result<(), GatewayError>
     let settings = Settings::new(config)?;
     let thrusters = settings::thrusters(config)?;
     tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?.block_on(serve(
+        config,
         settings,
         thrusters,
         deployment.clone(),
@@ -331,6 +339,7 @@ pub fn run(config: &Config, deployment: &Deployment) -> Result<(), GatewayError>
 }
 
 async fn serve(
+    config: &Config,
     settings: Settings,
     thrusters: Vec<Deployed>,
     deployment: Deployment,
@@ -350,6 +359,10 @@ async fn serve(
         Diagnoses::open(&settings.diagnoses, &settings.recordings, settings.diagnosis, Arc::clone(&events))
             .map_err(|error| GatewayError::Diagnoses { folder: settings.diagnoses.clone(), error })?;
     let diagnoses = Arc::new(diagnoses);
+    let calibrations =
+        Calibrations::open(&settings.calibrations, config, &deployment, Arc::clone(&events))
+            .map_err(|error| GatewayError::Calibrations { folder: settings.calibrations.clone(), error })?;
+    let calibrations = Arc::new(calibrations);
     let (stop_streams, stopping) = watch::channel(false);
 
     let mut app = App {
@@ -358,6 +371,7 @@ async fn serve(
         controllers: Vec::new(),
         rings: Vec::new(),
         diagnoses: Arc::clone(&diagnoses),
+        calibrations: Arc::clone(&calibrations),
         tallies: Vec::new(),
         recorder: Arc::clone(&recorder),
         events: Arc::clone(&events),
@@ -462,6 +476,7 @@ async fn serve(
         tokio::time::sleep(Duration::from_millis(10)).await;
     }
     diagnoses.stop();
+    calibrations.stop();
     recorder.stop_all();
     stop_bus.store(true, Ordering::Relaxed);
     let _ = bus.join();

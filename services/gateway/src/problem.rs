@@ -25,6 +25,7 @@ pub enum Kind {
     UnknownRecording,
     UnknownRevision,
     UnknownDiagnosis,
+    UnknownCalibration,
     UnknownFault,
     MethodNotAllowed,
     RequestTimeout,
@@ -36,6 +37,7 @@ pub enum Kind {
     NoRecording,
     RecordingActive,
     DiagnosisActive,
+    CalibrationActive,
     ExcitationActive,
     NoExcitation,
     BodyTooLarge,
@@ -54,7 +56,7 @@ pub enum Kind {
 
 impl Kind {
     /// All kinds, for the documentation and the tests.
-    pub const ALL: [Kind; 40] = [
+    pub const ALL: [Kind; 42] = [
         Kind::MalformedJson,
         Kind::MalformedPath,
         Kind::MalformedQuery,
@@ -70,6 +72,7 @@ impl Kind {
         Kind::UnknownRecording,
         Kind::UnknownRevision,
         Kind::UnknownDiagnosis,
+        Kind::UnknownCalibration,
         Kind::UnknownFault,
         Kind::MethodNotAllowed,
         Kind::RequestTimeout,
@@ -81,6 +84,7 @@ impl Kind {
         Kind::NoRecording,
         Kind::RecordingActive,
         Kind::DiagnosisActive,
+        Kind::CalibrationActive,
         Kind::ExcitationActive,
         Kind::NoExcitation,
         Kind::BodyTooLarge,
@@ -119,6 +123,7 @@ impl Kind {
             Kind::UnknownRecording => (S::NOT_FOUND, "unknown-recording", "No such recording"),
             Kind::UnknownRevision => (S::NOT_FOUND, "unknown-revision", "No such revision of the rig"),
             Kind::UnknownDiagnosis => (S::NOT_FOUND, "unknown-diagnosis", "No such diagnosis"),
+            Kind::UnknownCalibration => (S::NOT_FOUND, "unknown-calibration", "No such calibration"),
             Kind::UnknownFault => (S::NOT_FOUND, "unknown-fault", "No such fault code"),
             Kind::MethodNotAllowed => {
                 (S::METHOD_NOT_ALLOWED, "method-not-allowed", "This route has no such method")
@@ -136,6 +141,7 @@ impl Kind {
                 (S::CONFLICT, "recording-active", "A recording is running or has this name")
             }
             Kind::DiagnosisActive => (S::CONFLICT, "diagnosis-active", "A diagnosis is running"),
+            Kind::CalibrationActive => (S::CONFLICT, "calibration-active", "A calibration is running"),
             Kind::ExcitationActive => (S::CONFLICT, "excitation-active", "A test signal is playing"),
             Kind::NoExcitation => (S::CONFLICT, "no-excitation", "No test signal is playing"),
             Kind::BodyTooLarge => (S::PAYLOAD_TOO_LARGE, "body-too-large", "The body is too large"),

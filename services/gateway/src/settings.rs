@@ -29,6 +29,8 @@ pub struct Settings {
     pub rigs: PathBuf,
     /// Folder of the diagnoses, likewise.
     pub diagnoses: PathBuf,
+    /// Folder of the calibrations, likewise.
+    pub calibrations: PathBuf,
     /// File of the tokens, likewise; `kort token new` writes it.
     pub tokens: PathBuf,
     /// Ask for a token on loopback too; beyond it one is always asked for.
@@ -119,6 +121,7 @@ impl Default for Settings {
             events: PathBuf::from("kort-state/events"),
             rigs: PathBuf::from("kort-state/rigs"),
             diagnoses: PathBuf::from("kort-state/diagnoses"),
+            calibrations: PathBuf::from("kort-state/calibrations"),
             tokens: PathBuf::from("kort-state/tokens.toml"),
             require_tokens: false,
             hosts: Vec::new(),

@@ -1,5 +1,6 @@
 //! One thruster as the gateway sees it: what it asks (the desk) and what it last heard.
 
+mod calibration;
 mod command;
 mod law;
 
@@ -15,6 +16,7 @@ use kort_proto::signals::Kind as SignalKind;
 use tokio::sync::oneshot;
 
 use crate::bus::Bell;
+use crate::calibration::CalibrationInfo;
 use crate::desk::Desk;
 use crate::events::Events;
 use crate::excitation::ExcitationStep;
@@ -58,6 +60,8 @@ pub struct Thruster {
     rendered: Mutex<(Rendered, Bytes)>,
     /// Name and step of the diagnosis that runs, and when it began.
     diagnosis: Mutex<Option<(String, String, Instant)>>,
+    /// The calibration that runs, and when it began.
+    calibration: Mutex<Option<(CalibrationInfo, Instant)>>,
     trial: Mutex<Trial>,
 }
 
@@ -88,6 +92,7 @@ impl Thruster {
             bell,
             events,
             diagnosis: Mutex::default(),
+            calibration: Mutex::default(),
             trial: Mutex::new(Trial::new(range.thrust_n)),
             rendered: Mutex::new(((u64::MAX, u64::MAX, false), Bytes::new())),
         };
@@ -165,6 +170,7 @@ impl Thruster {
         let now = Instant::now();
         self.desk().may(lease, now)?;
         self.ready()?;
+        self.not_calibrated()?;
         if let Some(fault) = Fault::in_set(self.heard().faults(now)).next() {
             return Err(latched(fault));
         }
@@ -267,6 +273,7 @@ impl Thruster {
                 step: step.clone(),
                 elapsed_s: now.saturating_duration_since(*began).as_secs_f64(),
             }),
+            calibration: self.calibration(now),
             revision_trial: self.trial().view(),
             excitation: desk.playing().map(|playing| ExcitationStep {
                 name: playing.signal.name.clone(),

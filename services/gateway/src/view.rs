@@ -8,6 +8,7 @@ use utoipa::openapi::RefOr;
 use utoipa::openapi::schema::{ObjectBuilder, Schema, SchemaType, Type};
 use utoipa::{PartialSchema, ToSchema};
 
+use crate::calibration::CalibrationStep;
 use crate::excitation::ExcitationStep;
 use crate::extract::Object;
 use crate::rig::TrialView;
@@ -49,6 +50,8 @@ pub struct ThrusterState {
     pub mismatch: Option<MismatchView>,
     /// The diagnosis of it that runs; null if none does.
     pub diagnosis: Option<DiagnosisStep>,
+    /// The calibration of it that runs; null if none does.
+    pub calibration: Option<CalibrationStep>,
     /// How the thrust fares since another revision of the rig came into force; null if none did since the gateway started.
     pub revision_trial: Option<TrialView>,
     /// The test signal that plays; null if none does.

@@ -168,7 +168,10 @@ impl Servo {
         let answer =
             |outcome, words: std::fmt::Arguments| Some(Reply::to(request, Process::Servo, outcome, words));
         match RequestKind::from_u32(request.kind)? {
-            RequestKind::SetController | RequestKind::SetRig | RequestKind::Rest => None,
+            RequestKind::SetController
+            | RequestKind::SetRig
+            | RequestKind::Rest
+            | RequestKind::StandAside => None,
             RequestKind::Disarm => {
                 self.stop();
                 answer(Outcome::Done, format_args!("disarmed"))

@@ -1,7 +1,7 @@
 //! What is asked of the controller, and its answers.
 
 use kort_control::{EstimatorKind, LawKind, ObserverKind};
-use kort_proto::messages::{Outcome, Process, REQUEST_LIFE_NS, Reply, Request, RequestKind};
+use kort_proto::messages::{ASIDE_NS, Outcome, Process, REQUEST_LIFE_NS, Reply, Request, RequestKind};
 
 use super::{Ending, Tick};
 
@@ -29,6 +29,14 @@ impl Tick {
                 answer(Outcome::Refused, format_args!("it was given too long ago; hint: ask again"))
             }
             RequestKind::SetRig => None,
+            RequestKind::StandAside if self.armed && !self.aside(now_ns) => {
+                answer(Outcome::Refused, format_args!("the drive is armed; hint: disarm first"))
+            }
+            RequestKind::StandAside => {
+                self.forget();
+                self.aside_until_ns = now_ns + ASIDE_NS;
+                answer(Outcome::Done, format_args!("stands aside"))
+            }
             RequestKind::Rest => {
                 let since_ns = self.ending.map_or(now_ns, |ending| ending.since_ns);
                 self.ending = Some(Ending { since_ns, cause: None, hold: true });
@@ -44,6 +52,11 @@ impl Tick {
                 Err(words) => answer(Outcome::Invalid, format_args!("{words}")),
             },
         }
+    }
+
+    /// Does somebody else command the servo?
+    pub fn aside(&self, now_ns: u64) -> bool {
+        now_ns < self.aside_until_ns
     }
 
     /// Switches law, observer, estimator and parameters, all or nothing.

@@ -297,7 +297,8 @@ async fn last(app: &App, thruster: &str, last_s: f64) -> Result<Subject, Problem
     Ok(Subject::Last(span_s, rows))
 }
 
-async fn blocking<T: Send + 'static>(
+/// Does what may wait for the disk beside the runtime.
+pub async fn blocking<T: Send + 'static>(
     work: impl FnOnce() -> Result<T, Problem> + Send + 'static,
 ) -> Result<T, Problem> {
     let done = tokio::task::spawn_blocking(work).await;

@@ -1,6 +1,7 @@
 //! The routes, a file per resource. Adding one: write `routes/<name>.rs`, register it here.
 
 mod arming;
+mod calibrations;
 mod console;
 mod controller;
 mod controller_file;
@@ -25,6 +26,7 @@ pub use controller::{ControllerRequest, ControllerView, LawParameter};
 
 /// What clients send, for [`crate::bodies`].
 pub mod bodies {
+    pub use super::calibrations::{CalibrationRequest, GoOnRequest};
     pub use super::controller::ControllerRequest;
     pub use super::controller_file::ControllerFile;
     pub use super::diagnoses::DiagnosisRequest;
@@ -64,6 +66,7 @@ pub fn router(app: Arc<App>) -> Router {
         .merge(controller_file::routes())
         .merge(rig::routes())
         .merge(diagnoses::routes())
+        .merge(calibrations::routes())
         .merge(stream::routes())
         .merge(history::routes())
         .merge(recordings::routes())

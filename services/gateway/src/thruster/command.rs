@@ -27,6 +27,7 @@ impl Thruster {
         let heard = self.heard();
         desk.lease.check(&self.id, lease, now)?;
         self.ready()?;
+        self.not_calibrated()?;
         if let Some(fault) = Fault::in_set(heard.faults(now)).next() {
             return Err(latched(fault));
         }

@@ -1,7 +1,8 @@
 //! A session on a living servo: this process takes the controller's place.
 //!
 //! The servo runs as in any deployment, with its limits, trips and the drive's own time-out. Whatever ends this
-//! process ends its commands, and the servo goes to zero by itself; Ctrl-C reaches both.
+//! process ends its commands, and the servo goes to zero by itself; Ctrl-C reaches both. As a job of a running service
+//! the servo is the service's, and its controller is asked to stand aside for as long as this process speaks.
 
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command as Program};
@@ -13,8 +14,8 @@ use std::time::{Duration, Instant};
 use kort_calibrate::{Next, Plan, Session};
 use kort_proto::config::Config;
 use kort_proto::faults::Names;
-use kort_proto::messages::{Command, DriveKind, Outcome, Process, Request, RequestKind, Telemetry};
-use kort_proto::transport::{ControllerPorts, Deployment, GatewayPorts, keep_on, realtime};
+use kort_proto::messages::{ASIDE_NS, Command, DriveKind, Outcome, Process, Request, RequestKind, Telemetry};
+use kort_proto::transport::{ControllerPorts, Deployment, GatewayPorts, keep_on, ordinary, realtime};
 use kort_servo::settings::Settings;
 use kort_thruster::rig::Rig;
 use rustix::process::{Pid, Signal, kill_process};
@@ -27,6 +28,8 @@ const PATIENCE: Duration = Duration::from_secs(10);
 const TICK: Duration = Duration::from_millis(20);
 /// A servo that tells nothing for this long is gone.
 const SILENCE: Duration = Duration::from_secs(2);
+/// The controller of a running service is asked to stand aside this often: several may be lost.
+const ASIDE_EVERY: Duration = Duration::from_nanos(ASIDE_NS / 5);
 
 /// What to run on.
 pub struct Bench<'a> {
@@ -44,6 +47,8 @@ pub struct Bench<'a> {
     pub share: f64,
     /// Nobody is asked.
     pub yes: bool,
+    /// The service that runs on the deployment asked for it.
+    pub job: bool,
 }
 
 /// How it ended: the session with its record, and why it stopped, if it did.
@@ -63,7 +68,11 @@ pub fn run(bench: &Bench) -> Result<Ended, Failure> {
     let settings =
         Settings::new(bench.config, bench.thruster, thruster, bench.rig).map_err(Failure::input)?;
     let stop = Arc::new(AtomicBool::new(false));
+    let over = Arc::new(AtomicBool::new(false));
     for signal in [signal_hook::consts::SIGTERM, signal_hook::consts::SIGINT, signal_hook::consts::SIGHUP] {
+        // Once nothing is driven any more they end the process as they end any other.
+        signal_hook::flag::register_conditional_default(signal, Arc::clone(&over))
+            .map_err(Failure::failed)?;
         signal_hook::flag::register(signal, Arc::clone(&stop)).map_err(Failure::failed)?;
     }
     let plan = Plan::new(
@@ -73,7 +82,7 @@ pub fn run(bench: &Bench) -> Result<Ended, Failure> {
         settings.period_ns as f64 * 1e-9,
         bench.share,
     );
-    let mut servo = Servo::start(bench)?;
+    let mut servo = if bench.job { Servo(None) } else { Servo::start(bench)? };
     let mut wire = Wire::open(bench, settings.limits.kind, &mut servo, &stop)?;
     if let Some(missing) = keep_on(&thruster.controller.cores) {
         eprintln!("warning: {missing}");
@@ -85,13 +94,16 @@ pub fn run(bench: &Bench) -> Result<Ended, Failure> {
     }
     wire.arm(&mut servo, &stop)?;
     let session = Session::new(plan, settings.limits.kind.name());
-    let ended = go(session, &mut wire, &stop, bench.yes);
+    let ended = go(session, &mut wire, &stop, bench);
     wire.rest();
+    over.store(true, Ordering::Relaxed);
+    // What follows is arithmetic, and must not keep the servos of others waiting.
+    ordinary();
     Ok(ended)
 }
 
 /// The session, tick by tick, until it ends.
-fn go(mut session: Session, wire: &mut Wire, stop: &AtomicBool, yes: bool) -> Ended {
+fn go(mut session: Session, wire: &mut Wire, stop: &AtomicBool, bench: &Bench) -> Ended {
     let mut asked: Option<&'static str> = None;
     let mut answer: Option<Receiver<bool>> = None;
     let mut first_ns = None;
@@ -115,8 +127,7 @@ fn go(mut session: Session, wire: &mut Wire, stop: &AtomicBool, yes: bool) -> En
                 Next::Ask { stage, words } => {
                     if asked != Some(stage) {
                         asked = Some(stage);
-                        eprintln!("\n{stage}: {words}");
-                        answer = ask(yes);
+                        answer = ask(stage, &words, bench);
                     }
                     match answer.as_ref().map_or(Ok(true), Receiver::try_recv) {
                         Ok(true) => session.go_on(),
@@ -133,7 +144,7 @@ fn go(mut session: Session, wire: &mut Wire, stop: &AtomicBool, yes: bool) -> En
                 Next::Stopped(why) => return Ended { session, stopped: Some(why.to_string()) },
             };
         }
-        if stop.load(Ordering::Relaxed) {
+        if stop.load(Ordering::Relaxed) || wire.is_to_rest() {
             return Ended { session, stopped: Some("aborted; the drive is at zero".into()) };
         }
         if heard.elapsed() > SILENCE {
@@ -145,11 +156,16 @@ fn go(mut session: Session, wire: &mut Wire, stop: &AtomicBool, yes: bool) -> En
 }
 
 /// Asks the operator on a thread of its own: the servo goes on being commanded zero meanwhile.
-fn ask(yes: bool) -> Option<Receiver<bool>> {
-    if yes {
-        return None;
+fn ask(stage: &str, words: &str, bench: &Bench) -> Option<Receiver<bool>> {
+    if bench.job {
+        eprintln!("ask: {stage}: {words}");
+    } else {
+        eprintln!("\n{stage}: {words}");
+        if bench.yes {
+            return None;
+        }
+        eprint!("[Enter] goes on, Ctrl-C stops: ");
     }
-    eprint!("[Enter] goes on, Ctrl-C stops: ");
     let (tell, told) = channel();
     std::thread::spawn(move || {
         let mut line = String::new();
@@ -159,8 +175,8 @@ fn ask(yes: bool) -> Option<Receiver<bool>> {
     Some(told)
 }
 
-/// The servo's process; it ends with this one.
-struct Servo(Child);
+/// The servo's process; it ends with this one. None: it is the service's.
+struct Servo(Option<Child>);
 
 impl Servo {
     fn start(bench: &Bench) -> Result<Self, Failure> {
@@ -172,12 +188,12 @@ impl Servo {
             command.arg("--config").arg(file);
         }
         command.arg("--thruster").arg(bench.thruster);
-        command.spawn().map(Self).map_err(Failure::failed)
+        command.spawn().map(|child| Self(Some(child))).map_err(Failure::failed)
     }
 
     /// Has it ended?
     fn ended(&mut self) -> Option<Failure> {
-        let status = self.0.try_wait().ok().flatten()?;
+        let status = self.0.as_mut()?.try_wait().ok().flatten()?;
         let words = format!("the servo ended ({status}); its reason stands above");
         Some(match status.code() {
             Some(2) => Failure::Input(words),
@@ -190,15 +206,16 @@ impl Servo {
 
 impl Drop for Servo {
     fn drop(&mut self) {
-        if let Some(pid) = i32::try_from(self.0.id()).ok().and_then(Pid::from_raw) {
+        let Some(child) = &mut self.0 else { return };
+        if let Some(pid) = i32::try_from(child.id()).ok().and_then(Pid::from_raw) {
             let _ = kill_process(pid, Signal::TERM);
         }
         let end = Instant::now() + SILENCE;
-        while Instant::now() < end && matches!(self.0.try_wait(), Ok(None)) {
+        while Instant::now() < end && matches!(child.try_wait(), Ok(None)) {
             std::thread::sleep(Duration::from_millis(5));
         }
-        let _ = self.0.kill();
-        let _ = self.0.wait();
+        let _ = child.kill();
+        let _ = child.wait();
     }
 }
 
@@ -208,6 +225,8 @@ struct Wire {
     gateway: GatewayPorts,
     kind: DriveKind,
     asked: u64,
+    /// When the service's controller was asked to stand aside; none where none runs.
+    aside: Option<Instant>,
 }
 
 impl Wire {
@@ -225,10 +244,11 @@ impl Wire {
             });
             match opened {
                 Ok((controller, gateway)) => {
-                    let mut wire = Self { controller, gateway, kind, asked: 0 };
+                    let aside = bench.job.then(Instant::now);
+                    let mut wire = Self { controller, gateway, kind, asked: 0, aside };
                     // The servo of this generation speaks.
                     if wire.listen(Duration::from_millis(200)).is_some() {
-                        return Ok(wire);
+                        return wire.alone();
                     }
                 }
                 Err(error) if Instant::now() > end => return Err(Failure::failed(error)),
@@ -254,7 +274,23 @@ impl Wire {
         }
     }
 
+    /// The only one that commands: a controller that runs stands aside.
+    fn alone(mut self) -> Result<Self, Failure> {
+        if self.aside.is_none() {
+            return Ok(self);
+        }
+        match self.answer(RequestKind::StandAside, Process::Controller, None) {
+            Some((Outcome::Done, _)) => Ok(self),
+            Some((_, words)) => Err(Failure::failed(format!("the controller does not stand aside: {words}"))),
+            None => Err(Failure::failed("the controller does not answer\nhint: GET /readyz, and its log")),
+        }
+    }
+
     fn command(&mut self, drive: f64, stop: u32) {
+        if self.aside.is_some_and(|at| at.elapsed() > ASIDE_EVERY) {
+            self.aside = Some(Instant::now());
+            let _ = self.send(RequestKind::StandAside);
+        }
         let command = Command {
             drive,
             kind: self.kind as u32,
@@ -296,22 +332,43 @@ impl Wire {
         Err(Failure::failed(format!("the servo cannot be armed: {refused}")))
     }
 
-    fn request(&mut self, kind: RequestKind) -> Option<(Outcome, String)> {
+    /// Sends a request; its number.
+    fn send(&mut self, kind: RequestKind) -> Option<u64> {
         self.asked += 1;
-        let id = self.asked;
-        self.gateway.request.send(Request { id, kind: kind as u32, ..Request::default() }).ok()?;
+        let request = Request { id: self.asked, kind: kind as u32, ..Request::default() };
+        self.gateway.request.send(request).ok().map(|()| self.asked)
+    }
+
+    /// Asks the servo, with commands of zero meanwhile.
+    fn request(&mut self, kind: RequestKind) -> Option<(Outcome, String)> {
+        self.answer(kind, Process::Servo, Some(0.0))
+    }
+
+    fn answer(&mut self, kind: RequestKind, of: Process, drive: Option<f64>) -> Option<(Outcome, String)> {
+        let id = self.send(kind)?;
         let session = self.gateway.request.session();
         let end = Instant::now() + Duration::from_millis(500);
         while Instant::now() < end {
             self.controller.ticks.wait(TICK);
-            self.command(0.0, 0);
+            if let Some(drive) = drive {
+                self.command(drive, 0);
+            }
             while let Some(reply) = self.gateway.reply.next() {
-                if reply.id == id && reply.to_session == session && reply.from == Process::Servo as u32 {
+                if reply.id == id && reply.to_session == session && reply.from == of as u32 {
                     return Some((Outcome::from_u32(reply.outcome)?, reply.message.as_str().to_owned()));
                 }
             }
         }
         None
+    }
+
+    /// Does the service bring its thrusters to rest? What it asks of its controller concerns whoever took its place.
+    fn is_to_rest(&mut self) -> bool {
+        let mut rest = false;
+        while let Some(request) = self.controller.request.next() {
+            rest |= request.kind == RequestKind::Rest as u32;
+        }
+        rest
     }
 
     /// Zero and off.

@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 
 use kort_calibrate::{Report, steps};
 use kort_proto::config::Config;
-use kort_proto::transport::Deployment;
+use kort_proto::transport::{Deployment, idle};
 use kort_thruster::rig::Rig;
+use rustix::process::nice;
 
 use crate::calibrate::{conclude, live, rehearse};
 use crate::failure::{Failure, Outcome, check_writable, print, print_json, write_text};
@@ -59,6 +60,17 @@ pub struct Calibrate {
     /// Print one JSON document (kort.calibration/1, or kort.calibration-rehearsal/1)
     #[arg(long)]
     json: bool,
+    /// A job of the service that runs on this deployment, which has this process id: its servo is used, and its
+    /// controller stands aside
+    #[arg(long, value_name = "PID", hide = true)]
+    job: Option<u32>,
+}
+
+impl Calibrate {
+    /// The service's process that this is a job of.
+    pub fn job_of(&self) -> Option<u32> {
+        self.job
+    }
 }
 
 fn share(text: &str) -> Result<f64, String> {
@@ -113,6 +125,7 @@ fn session(
         rig,
         share: args.share,
         yes: args.yes,
+        job: args.job.is_some(),
     };
     let ended = live::run(&bench).inspect_err(|_| remove_empty(&[output, &recording]))?;
     let facts = ended.session.facts();
@@ -136,8 +149,14 @@ fn session(
         return Err(Failure::failed(why));
     }
     let period_s = ended.session.plan().period_s;
-    let spinner = progress::spinner();
-    let told = |text: &str| spinner.set_message(text.to_string());
+    if args.job.is_some() {
+        behind_everything_else();
+    }
+    let spinner = args.job.is_none().then(progress::spinner);
+    let told = |text: &str| match &spinner {
+        Some(spinner) => spinner.set_message(text.to_string()),
+        None => eprintln!("step: {text}"),
+    };
     let estimate = conclude::estimated(ended.session.log(), period_s, rig, facts, &told)?;
     conclude::save(&estimate, &recording)?;
     let (text, left_out) = conclude::rig_text(rig_text, &estimate)?;
@@ -159,6 +178,14 @@ fn session(
         print(&render::verdict::text(&diagnosis.report, &calibrated));
     }
     Ok(Outcome::Done)
+}
+
+/// The session is over, the service goes on: from now on this process runs where nothing else wants the processor.
+fn behind_everything_else() {
+    let _ = nice(19);
+    if let Some(words) = idle() {
+        eprintln!("warning: {words}");
+    }
 }
 
 /// Takes away what was only made to see whether it can be written.

@@ -44,12 +44,18 @@ pub enum Command {
 }
 
 impl Command {
-    /// The service's process that this is a job of: it gives way to everything else, and ends with it.
+    /// The service's process that this is a job of: it ends with it.
     pub fn job_of(&self) -> Option<u32> {
         match self {
             Command::Diagnose(diagnose) => diagnose.job_of(),
+            Command::Calibrate(calibrate) => calibrate.job_of(),
             _ => None,
         }
+    }
+
+    /// Does it command a drive? Whatever else is a job gives way to everything else.
+    pub fn drives(&self) -> bool {
+        matches!(self, Command::Calibrate(_))
     }
 
     /// Does it.

@@ -1,0 +1,61 @@
+//! A calibration holds the thruster: who may begin one, and what nobody may meanwhile.
+
+use std::time::Instant;
+
+use kort_proto::faults::Fault;
+
+use super::{Thruster, latched, lock};
+use crate::calibration::{CalibrationInfo, CalibrationStep};
+use crate::problem::{Kind, Problem};
+
+impl Thruster {
+    /// A calibration of it has come so far, or is over.
+    pub fn set_calibration(&self, at: Option<(CalibrationInfo, Instant)>) {
+        *lock(&self.calibration) = at;
+    }
+
+    /// How far the calibration is, if one runs.
+    pub fn calibration(&self, now: Instant) -> Option<CalibrationStep> {
+        lock(&self.calibration).as_ref().map(|(info, began)| CalibrationStep {
+            id: info.id.clone(),
+            stage: info.stage.clone().unwrap_or_else(|| "starting".into()),
+            asks: info.asks.clone(),
+            drives: info.drives,
+            elapsed_s: now.saturating_duration_since(*began).as_secs_f64(),
+        })
+    }
+
+    /// Refuses what a calibration that holds the thruster does not bear beside it.
+    pub fn not_calibrated(&self) -> Result<(), Problem> {
+        match &*lock(&self.calibration) {
+            Some((info, _)) if info.drives => Err(Problem::new(
+                Kind::CalibrationActive,
+                format!("thruster {} is held by calibration {}", self.id, info.id),
+            )
+            .hint("POST …/disarm or DELETE …/calibrations/{calibration} ends it at once")),
+            _ => Ok(()),
+        }
+    }
+
+    /// Refuses whoever does not hold the lease in force.
+    pub fn holds(&self, lease: Option<&str>) -> Result<(), Problem> {
+        self.desk().lease.check(&self.id, lease, Instant::now())
+    }
+
+    /// May this lease's holder calibrate now? At rest, disarmed, without a fault. Returns the lease.
+    pub fn may_calibrate(&self, lease: Option<&str>) -> Result<String, Problem> {
+        self.holds(lease)?;
+        self.ready()?;
+        let now = Instant::now();
+        if let Some(fault) = Fault::in_set(self.heard().faults(now)).next() {
+            return Err(latched(fault));
+        }
+        self.not_calibrated()?;
+        if self.heard().armed(now) {
+            let words = format!("thruster {} is armed; a calibration begins at rest", self.id);
+            return Err(Problem::new(Kind::Refused, words).hint("POST …/disarm first"));
+        }
+        self.desk().done(lease, now);
+        Ok(lease.unwrap_or_default().to_owned())
+    }
+}
