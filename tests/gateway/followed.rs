@@ -3,13 +3,14 @@
 use crate::common::{self, Stack, pages};
 
 /// Pages followed here, and in `tests/diagnoses.rs`.
-const FOLLOWED: [&str; 6] = [
+const FOLLOWED: [&str; 7] = [
     "README.md",
     "docs/tutorial.md",
     "docs/operations.md",
     "docs/recordings.md",
     "docs/measured-recordings.md",
     "docs/console.md",
+    "docs/hardware.md",
 ];
 
 #[test]
@@ -25,6 +26,8 @@ fn operations_and_the_console_as_a_reader_follows_them() {
         assert!(said.contains("\"difference\":"), "{said}");
         assert!(said.contains("\"ended_by\":\"local ended it\""), "the test signal is ended: {said}");
         let said = pages::follow("docs/console.md", stack.site.port);
+        let asked = pages::follow("docs/hardware.md", stack.site.port);
+        assert!(asked.contains("\"asks\":\"listens to every sensor"), "{asked}");
         assert!(said.contains("phase_margin_deg") && said.contains("\"tags\":[\"bollard\"]"), "{said}");
     });
 }
