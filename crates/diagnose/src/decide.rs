@@ -23,7 +23,7 @@ pub struct Decision {
     pub verdict: Verdict,
     /// Names, members of the likeliest set each followed by its rivals.
     pub named: Vec<Named>,
-    /// The nameless term that the likeliest set holds, if any.
+    /// The nameless term that the likeliest set holds, if it is more likely there than not.
     pub term: Option<&'static str>,
 }
 
@@ -57,7 +57,8 @@ pub struct Circumstances {
 pub fn decide(explanations: &[Explanation], circumstances: &Circumstances) -> Decision {
     let empty: Set = Vec::new();
     let best = explanations.first().map_or(&empty, |e| &e.set);
-    let term = best.iter().copied().find(|id| is_term(id));
+    let more_likely_than_not = |id: &&str| presence(explanations, id, 1.0) >= 0.5;
+    let term = best.iter().copied().find(|id| is_term(id)).filter(more_likely_than_not);
     let stands = |id: &&'static str| !is_term(id) && !circumstances.negligible.contains(id);
     let members: Vec<&'static str> = best.iter().copied().filter(stands).collect();
     // How likely a name is among all that was fitted, and whether it stands in a world that the catalogue holds.
@@ -170,6 +171,8 @@ mod tests {
             (&[(&["windage_drag"], 0.0), (&[], 80.0)], usual, Verdict::Explained),
             (&[(&["windage_drag"], 0.0), (&["duct_loss"], 2.0), (&[], 80.0)], usual, Verdict::Ambiguous),
             (&[(&["unknown_shaft_step"], 0.0), (&["windage_drag"], 90.0)], usual, Verdict::Unexplained),
+            (&[(&["unknown_shaft_step"], 0.0), (&[], 0.5)], usual, Verdict::NoMismatch),
+            (&[(&["unknown_shaft_step"], 0.0), (&[], 0.5)], much, Verdict::Unexplained),
             (&[(&["unknown_shaft_step", "windage_drag"], 0.0)], left, Verdict::PartlyExplained),
             (&[(&["unknown_shaft_step", "windage_drag"], 0.0)], usual, Verdict::Explained),
             (

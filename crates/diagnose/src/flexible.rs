@@ -11,6 +11,7 @@ use kort_thruster::plant::{Balance, Drive, Local, Sensed, Tick};
 use kort_thruster::real::Real;
 use kort_thruster::rig::Rig;
 
+use crate::load_steps;
 use crate::nameless::nameless;
 
 /// Every term.
@@ -18,7 +19,7 @@ pub const TERMS: &[&Descriptor] = &[
     &SHAFT_OVER_SPEED,
     &SHAFT_OVER_FLOW,
     &SHAFT_OVER_TIME,
-    &SHAFT_STEP,
+    &load_steps::LOAD_STEPS,
     &DRIVE_OVER_COMMAND,
     &DRIVE_OVER_TIME,
     &BLADE_OVER_SPEED,
@@ -139,26 +140,6 @@ impl<T: Real> Effect<T> for Term<T> {
             Place::SensorOverTime => self.at(T::from(tick.time_s)),
             _ => self.at(sensed.thrust_n),
         };
-    }
-}
-
-/// A load on the shaft that comes on at one instant and stays.
-struct Step<T> {
-    torque_n_m: T,
-    at_s: T,
-}
-
-/// How long a step takes, s: short against anything that is logged, long against a tick.
-const RISE_S: f64 = 0.02;
-
-impl<T: Real> Effect<T> for Step<T> {
-    fn hooks(&self) -> Hooks {
-        Hooks::BALANCE
-    }
-
-    fn balance(&self, at: &Local<T>, _: &[T], balance: &mut Balance<T>, _: &mut [T]) {
-        let on = (((T::from(at.time_s) - self.at_s) / RISE_S).tanh() + 1.0) * 0.5;
-        balance.shaft_torque_n_m += self.torque_n_m * on;
     }
 }
 
@@ -288,33 +269,10 @@ term!(
     SensorOverTime
 );
 
-const SHAFT_STEP: Descriptor = nameless! {
-    id: "unknown_shaft_step",
-    path: Path::Shaft,
-    what: "a load that comes on at one instant",
-    equation: "shaft torque [N m] from an instant on",
-    parameters: |s| {
-        vec![
-            Spec::strength("torque_n_m", "N m", 0.02 * s.torque_n_m, -s.torque_n_m, s.torque_n_m)
-                .sigma(0.1 * s.torque_n_m),
-            Spec::shape("from_s", "s", 0.5 * s.duration_s, 0.0, s.duration_s),
-        ]
-    },
-    starts: |s| {
-        let at = |k: usize| vec![0.02 * s.torque_n_m, s.duration_s * (k as f64 + 0.5) / INSTANTS as f64];
-        (0..INSTANTS).map(at).collect()
-    },
-    needs: free_shaft,
-    build: both!(|values, _: &Context<_>| Box::new(Step { torque_n_m: values[0], at_s: values[1] })),
-};
-
-/// Instants at which a step is tried.
-const INSTANTS: usize = 24;
-
 /// A term's numbers as words: variable and height of every point, or size and instant of a step.
 pub fn expression(term: &Descriptor, values: &[f64]) -> String {
-    if term.id == SHAFT_STEP.id {
-        return format!("{:+.4} N m from t = {:.2} s on", values[0], values[1]);
+    if term.id == load_steps::LOAD_STEPS.id {
+        return load_steps::expression(values);
     }
     if let Some(words) = crate::column::expression(term, values) {
         return words;
@@ -331,7 +289,7 @@ pub fn expression(term: &Descriptor, values: &[f64]) -> String {
 
 /// What a term enters, and over what.
 pub fn enters(term: &Descriptor) -> (&'static str, &'static str) {
-    if term.id == SHAFT_STEP.id {
+    if term.id == load_steps::LOAD_STEPS.id {
         return ("shaft torque [N m]", "time_s");
     }
     term.equation.split_once(" over ").unwrap_or((term.equation, "time_s"))

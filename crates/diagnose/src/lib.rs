@@ -11,6 +11,7 @@ mod experiment;
 pub mod flexible;
 mod follows;
 mod left;
+mod load_steps;
 mod locate;
 mod nameless;
 mod place;

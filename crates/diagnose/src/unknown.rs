@@ -10,6 +10,7 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 
 use crate::flexible::TERMS;
+use crate::load_steps::{self, LOAD_STEPS};
 use crate::search::{Search, Set};
 
 /// Looks for what has no name beside a set, and keeps the sets with it that do better, or as well with fewer
@@ -33,21 +34,28 @@ pub fn look(
     }
 }
 
-/// Fits the term that promises most on top of a set; the set with it, if it earns its price.
+/// Terms that are fitted on top of a set at most.
+const EXACT: usize = 3;
+
+/// Fits the terms that promise most on top of a set; the best set with one, if a promise may earn its price.
 fn put_on(search: &mut Search, set: &Set, terms: &[&'static Descriptor]) -> Option<Set> {
-    let parent = search.fits.get(set)?;
-    let promised: Vec<(f64, &'static Descriptor, Hypothesis)> =
-        terms.par_iter().filter_map(|term| promise(search, parent, term)).collect();
-    let (cost, term, hypothesis) = promised.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
-    if cost + search.price_of(term.id) >= parent.cost() {
-        return None;
+    let parent = search.fits.get(set)?.clone();
+    let mut promised: Vec<(f64, &'static Descriptor, Hypothesis)> =
+        terms.par_iter().filter_map(|term| promise(search, &parent, term)).collect();
+    let near = |cost: &f64| parent.cost() + search.doubt(parent.cost() - cost);
+    promised.retain(|(cost, term, _)| cost + search.price_of(term.id) < near(cost));
+    promised.sort_by(|a, b| a.0.total_cmp(&b.0));
+    promised.truncate(EXACT);
+    let mut larger: Vec<Set> = Vec::new();
+    for (_, term, hypothesis) in promised {
+        let mut set = set.clone();
+        set.push(term.id);
+        set.sort_unstable();
+        search.fit_set(set.clone(), &hypothesis, &parent.columns);
+        larger.push(set);
     }
-    let columns = parent.columns.clone();
-    let mut larger = set.clone();
-    larger.push(term.id);
-    larger.sort_unstable();
-    search.fit_set(larger.clone(), &hypothesis, &columns);
-    search.fits.contains_key(&larger).then_some(larger)
+    larger.retain(|set| search.fits.contains_key(set));
+    larger.into_iter().min_by(|a, b| search.cost(a).total_cmp(&search.cost(b)))
 }
 
 /// Cost of a set with a term on it, to first order; and the set from there.
@@ -57,6 +65,9 @@ fn promise(
     term: &'static Descriptor,
 ) -> Option<(f64, &'static Descriptor, Hypothesis)> {
     let problem = search.problem;
+    if term.id == LOAD_STEPS.id {
+        return load_steps::promise(problem, parent).map(|(cost, hypothesis)| (cost, term, hypothesis));
+    }
     let whole = Member::new(term, &problem.scale);
     let specs = (term.parameters)(&problem.scale);
     let shapes = specs.iter().any(|s| s.shape && !s.held);

@@ -15,6 +15,7 @@ use crate::diagnose::Options;
 use crate::experiment;
 use crate::flexible::is_term;
 use crate::left::{self, Rest};
+use crate::load_steps;
 use crate::locate::{self, locate};
 use crate::place;
 use crate::posterior::{Explanation, presence};
@@ -160,7 +161,10 @@ impl<'a, 'p> Writer<'a, 'p> {
             let smaller = self.without(&self.best, member);
             let smaller_full = self.residual(&smaller);
             let smaller_trained = self.trained(&smaller);
-            let located = locate(problem, &smaller_full, &last_full, &speed);
+            let mut located = locate(problem, &smaller_full, &last_full, &speed);
+            if member == load_steps::LOAD_STEPS.id {
+                (located.regime, located.spans) = load_steps::regime(problem, self.last);
+            }
             let gain = (smaller.noise.misfit - self.last.noise.misfit).max(0.0);
             let share = ((self.excess(&smaller_full) - self.excess(&last_full)) / whole).clamp(0.0, 1.0);
             let path = self.path(member);

@@ -94,7 +94,7 @@ impl Search<'_, '_> {
 
     /// How far a cost may be off that gains so much: what a screen promises is off by a share of it where the
     /// response bends.
-    fn doubt(&self, gain: f64) -> f64 {
+    pub(crate) fn doubt(&self, gain: f64) -> f64 {
         self.constants.rivals + SCREEN_DOUBT * gain.max(0.0)
     }
 }

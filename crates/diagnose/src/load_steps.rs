@@ -1,0 +1,283 @@
+//! A load on the shaft that comes on, goes off or changes at instants: what a hand on a brake, weed in a propeller or
+//! a clutch does, and no law of the machine's own motion.
+//!
+//! An instant has no slope where the load is none, and a few of them together show what one alone does not (a load
+//! that comes on and goes off again). They are looked for by what a small load does from each instant of a grid on,
+//! simulated once, in as many places as pay for themselves; each is then moved to where it leaves least.
+
+use std::sync::Arc;
+
+use kort_identify::Quadratic;
+use kort_identify::fit::Fit;
+use kort_identify::hypothesis::{Free, Hypothesis, Member};
+use kort_identify::simulate::Problem;
+use kort_thruster::both;
+use kort_thruster::effects::{Context, Descriptor, Effect, Hooks, Path, Scale, Spec, free_shaft, one_start};
+use kort_thruster::plant::{Balance, Local};
+use kort_thruster::real::Real;
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use crate::nameless::nameless;
+
+/// Most changes in a recording.
+const MOST: usize = 4;
+/// Instants of the grid.
+const INSTANTS: usize = 40;
+/// How long a change takes, s: least (long against a tick), usually, and most.
+const RISE_S: [f64; 3] = [0.02, 0.05, 0.5];
+/// An instant is moved by halves of the grid's step, so often.
+const HALVINGS: i32 = 4;
+/// Changes that are tried beyond what paid: a load that comes on and goes off again shows with its second one.
+const LOOKAHEAD: usize = 2;
+
+const SIZES: [&str; MOST] = ["torque_1_n_m", "torque_2_n_m", "torque_3_n_m", "torque_4_n_m"];
+const BEGINNINGS: [&str; MOST] = ["from_1_s", "from_2_s", "from_3_s", "from_4_s"];
+
+/// The term.
+pub const LOAD_STEPS: Descriptor = Descriptor {
+    forms: &[&[0, 1, 2], &[0, 1, 2, 3, 4], &[0, 1, 2, 3, 4, 5, 6], &[0, 1, 2, 3, 4, 5, 6, 7, 8]],
+    ..nameless! {
+        id: "unknown_shaft_step",
+        path: Path::Shaft,
+        what: "a load that changes at instants",
+        equation: "shaft torque [N m] from instants on",
+        parameters: specs,
+        starts: one_start,
+        needs: free_shaft,
+        build: both!(|values, _: &Context<_>| Box::new(Steps { values: values.to_vec() })),
+    }
+};
+
+fn specs(scale: &Scale) -> Vec<Spec> {
+    let most = scale.torque_n_m;
+    let of_change = |k: usize| {
+        let size = Spec::strength(SIZES[k], "N m", SMALL * most, -most, most).sigma(0.1 * most);
+        [size, Spec::shape(BEGINNINGS[k], "s", 0.5 * scale.duration_s, 0.0, scale.duration_s)]
+    };
+    let [least, usual, longest] = RISE_S;
+    let rise = Spec::shape("rise_s", "s", usual, least, longest);
+    std::iter::once(rise).chain((0..MOST).flat_map(of_change)).collect()
+}
+
+/// The load that is tried, as a share of the largest torque.
+const SMALL: f64 = 0.02;
+
+struct Steps<T> {
+    values: Vec<T>,
+}
+
+impl<T: Real> Effect<T> for Steps<T> {
+    fn hooks(&self) -> Hooks {
+        Hooks::BALANCE
+    }
+
+    fn balance(&self, at: &Local<T>, _: &[T], balance: &mut Balance<T>, _: &mut [T]) {
+        let Some((rise_s, changes)) = self.values.split_first() else { return };
+        for change in changes.chunks_exact(2) {
+            let on = (((T::from(at.time_s) - change[1]) / *rise_s).tanh() + 1.0) * 0.5;
+            balance.shaft_torque_n_m += change[0] * on;
+        }
+    }
+}
+
+/// Sizes and instants of the changes that are there, in order of time.
+fn in_order(values: &[f64]) -> Vec<[f64; 2]> {
+    let there = values.get(1..).unwrap_or_default().chunks_exact(2).filter(|change| change[0] != 0.0);
+    let mut changes: Vec<[f64; 2]> = there.map(|change| [change[0], change[1]]).collect();
+    changes.sort_by(|a, b| a[1].total_cmp(&b[1]));
+    changes
+}
+
+/// The changes as words, in order of time.
+pub fn expression(values: &[f64]) -> String {
+    let words = in_order(values)
+        .into_iter()
+        .map(|[size, from_s]| format!("{size:+.4} N m from t = {from_s:.2} s on"));
+    words.collect::<Vec<_>>().join(", ")
+}
+
+/// When the load of a fit differs, in words and as spans from each change to the next.
+pub fn regime(problem: &Problem, fit: &Fit) -> (String, Vec<[f64; 2]>) {
+    let members = problem.members(&fit.hypothesis, &fit.values);
+    let values =
+        members.into_iter().find(|m| m.effect.id == LOAD_STEPS.id).map_or_else(Vec::new, |m| m.values);
+    let spans = spans(&values, problem.scale.duration_s);
+    let instants: Vec<String> = spans.iter().map(|span| format!("{:.2} s", span[0])).collect();
+    (format!("from t = {} on", instants.join(", ")), spans)
+}
+
+fn spans(values: &[f64], duration_s: f64) -> Vec<[f64; 2]> {
+    let changes = in_order(values);
+    let ends = changes.iter().skip(1).map(|c| c[1]).chain([duration_s]);
+    changes.iter().zip(ends).map(|(change, end)| [change[1], end]).collect()
+}
+
+/// The term with these changes.
+fn changes(scale: &Scale, sizes: &[f64], instants: &[f64]) -> Member {
+    let mut member = Member::new(&LOAD_STEPS, scale);
+    for k in 0..MOST {
+        member.values[2 * k + 1] = sizes.get(k).copied().unwrap_or(0.0);
+        match instants.get(k) {
+            Some(instant) => member.values[2 * k + 2] = *instant,
+            None => member.held.extend([2 * k + 1, 2 * k + 2]),
+        }
+    }
+    member
+}
+
+/// Cost of a set with changes of the load on it, as many as pay for themselves, about as it will be; and the set from
+/// there.
+pub fn promise(problem: &Problem, parent: &Fit) -> Option<(f64, Hypothesis)> {
+    let looking = Looking::new(problem, parent);
+    let step_s = problem.scale.duration_s / INSTANTS as f64;
+    let grid: Vec<Change> =
+        (0..INSTANTS).into_par_iter().filter_map(|k| looking.change((k as f64 + 0.5) * step_s)).collect();
+    let mut changes: Vec<Change> = Vec::new();
+    let mut best: Option<(Promise, Vec<f64>)> = None;
+    let mut in_vain = 0;
+    while changes.len() < MOST && in_vain < LOOKAHEAD {
+        let beside = |next: &Change| [changes.as_slice(), std::slice::from_ref(next)].concat();
+        let costs = grid.par_iter().map(|next| looking.promise(&beside(next)).cost);
+        let costs: Vec<f64> = costs.collect();
+        let Some(least) = (0..grid.len()).min_by(|a, b| costs[*a].total_cmp(&costs[*b])) else { break };
+        changes = beside(&grid[least]);
+        let promise = looking.place(&mut changes, step_s);
+        if best.as_ref().is_none_or(|(known, _)| promise.cost < known.cost) {
+            best = Some((promise, changes.iter().map(|c| c.from_s).collect()));
+            in_vain = 0;
+        } else {
+            in_vain += 1;
+        }
+    }
+    let (promise, instants) = best?;
+    Some((promise.cost, looking.with(&promise.sizes_n_m, &instants)))
+}
+
+/// What a small load does from an instant on.
+#[derive(Clone)]
+struct Change {
+    from_s: f64,
+    action: Arc<DVector<f64>>,
+}
+
+/// What changes of the load promise: the cost with them, and how large they would be.
+struct Promise {
+    cost: f64,
+    sizes_n_m: Vec<f64>,
+}
+
+/// A fitted set on which changes are tried.
+struct Looking<'a> {
+    problem: &'a Problem<'a>,
+    parent: &'a Fit,
+    /// Derivatives of what is free in the set.
+    columns: Vec<&'a DVector<f64>>,
+    /// Their products.
+    known: Vec<DMatrix<f64>>,
+    /// A change's size, in small loads.
+    size: Free,
+    small_n_m: f64,
+}
+
+impl<'a> Looking<'a> {
+    fn new(problem: &'a Problem<'a>, parent: &'a Fit) -> Self {
+        let small_n_m = SMALL * problem.scale.torque_n_m;
+        let one = parent.hypothesis.with(
+            &parent.values,
+            changes(&problem.scale, &[small_n_m], &[0.0]),
+            &problem.scale,
+        );
+        let size = one.free[parent.values.len() + 1].clone();
+        Self {
+            problem,
+            parent,
+            columns: parent.columns.iter().flatten().map(AsRef::as_ref).collect(),
+            known: problem.about(&parent.lines, &parent.columns, &parent.hypothesis).curvature().to_vec(),
+            size: Free {
+                sigma: size.sigma / small_n_m,
+                low: size.low / small_n_m,
+                high: size.high / small_n_m,
+                ..size
+            },
+            small_n_m,
+        }
+    }
+
+    fn with(&self, sizes_n_m: &[f64], instants: &[f64]) -> Hypothesis {
+        let scale = &self.problem.scale;
+        self.parent.hypothesis.with(&self.parent.values, changes(scale, sizes_n_m, instants), scale)
+    }
+
+    fn change(&self, from_s: f64) -> Option<Change> {
+        let hypothesis = self.with(&[self.small_n_m], &[from_s]);
+        let action = &self.parent.lines - self.problem.residual_lines(&hypothesis, &hypothesis.start);
+        action.iter().all(|v| v.is_finite()).then(|| Change { from_s, action: Arc::new(action) })
+    }
+
+    fn promise(&self, changes: &[Change]) -> Promise {
+        let (problem, parent) = (self.problem, self.parent);
+        let actions = changes.iter().map(|change| change.action.as_ref());
+        let columns: Vec<&DVector<f64>> = self.columns.iter().copied().chain(actions).collect();
+        let mut free = parent.hypothesis.free.clone();
+        free.extend(changes.iter().map(|_| self.size.clone()));
+        let mut values = parent.values.clone();
+        values.resize(free.len(), 0.0);
+        let model = Quadratic::extended(
+            &problem.spectrum,
+            &problem.criterion,
+            &parent.lines,
+            &columns,
+            &free,
+            &self.known,
+        );
+        let found = model.minimise(&parent.floor, &free, &values, 0.0);
+        // An instant is a number too: one of so many.
+        let instants = 2.0 * (INSTANTS as f64).ln() * changes.len() as f64;
+        let size = |k: usize| found.step[k] * free[k].sigma * self.small_n_m;
+        Promise {
+            cost: found.misfit + found.penalty + model.price(&found.noise) + instants,
+            sizes_n_m: (parent.values.len()..free.len()).map(size).collect(),
+        }
+    }
+
+    /// Moves each change to where they leave least together.
+    fn place(&self, changes: &mut [Change], step_s: f64) -> Promise {
+        let mut least = self.promise(changes);
+        for halving in 1..=HALVINGS {
+            let by = step_s * 0.5_f64.powi(halving);
+            for k in 0..changes.len() {
+                let from_s = changes[k].from_s;
+                for to in [from_s - by, from_s + by] {
+                    let Some(moved) = self.change(to.clamp(0.0, self.problem.scale.duration_s)) else {
+                        continue;
+                    };
+                    let before = std::mem::replace(&mut changes[k], moved);
+                    let there = self.promise(changes);
+                    if there.cost < least.cost { least = there } else { changes[k] = before }
+                }
+            }
+        }
+        least
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn changes_are_told_in_order_of_time_and_those_that_are_none_are_not() {
+        let told = expression(&[0.05, 0.25, 9.0, -0.5, 3.125, 0.0, 1.0, 0.0, 2.0]);
+        assert_eq!(told, "-0.5000 N m from t = 3.12 s on, +0.2500 N m from t = 9.00 s on");
+        let spans = spans(&[0.05, 0.25, 9.0, -0.5, 3.125, 0.0, 1.0, 0.0, 2.0], 20.0);
+        assert_eq!(spans, [[3.125, 9.0], [9.0, 20.0]]);
+    }
+
+    #[test]
+    fn what_is_not_there_is_not_free() {
+        let two = changes(&Scale::ANY, &[0.1, 0.2], &[0.3, 0.4]);
+        assert_eq!(two.held, [5, 6, 7, 8]);
+        assert_eq!(two.values[1..6], [0.1, 0.3, 0.2, 0.4, 0.0]);
+    }
+}
