@@ -29,28 +29,41 @@ fn brake_changes(recording: &str) -> Vec<f64> {
     rows.windows(2).filter(|w| w[0].1 != w[1].1).map(|w| w[1].0).collect()
 }
 
-#[test]
-fn a_brake_eased_in_mid_run_is_found_when_and_where_it_was() {
-    let recording = "tests/recordings/rosa-rotor-air-d445.csv";
-    let report = diagnose(recording, "config/thrusters/rosa-rotor.toml", "rosa-rotor-air");
-    let notes = report["notes"].to_string();
-    assert!(notes.contains("leaves out: damping_level"), "the answer is hidden: {notes}");
+/// Sizes and instants of the changes of the load that a report tells, in order of time.
+fn changes_told(report: &Value) -> Vec<(f64, f64)> {
+    let list = report["empirical_term"]["parameters"].as_array().unwrap();
+    let value =
+        |name: String| list.iter().find(|p| p["name"] == name.as_str()).map(|p| p["value"].as_f64().unwrap());
+    let change = |k: usize| Some((value(format!("torque_{k}_n_m"))?, value(format!("from_{k}_s"))?));
+    let mut changes: Vec<(f64, f64)> = (1..=4).filter_map(change).collect();
+    changes.sort_by(|a, b| a.1.total_cmp(&b.1));
+    changes
+}
 
-    assert_eq!(report["verdict"], "unexplained", "{}", report["summary"]);
-    assert_eq!(report["mismatch"][0]["path"], "shaft");
-    let term = &report["empirical_term"];
-    assert_eq!(term["path"], "shaft");
-    let value = |name: &str| {
-        let list = term["parameters"].as_array().unwrap();
-        list.iter().find(|p| p["name"] == name).unwrap()["value"].as_f64().unwrap()
-    };
-    let truth = brake_changes(recording);
-    assert_eq!(truth.len(), 1);
-    let onset = value("from_s");
-    assert!((onset - truth[0]).abs() < 0.3, "found at {onset} s, changed at {} s", truth[0]);
-    assert!(value("torque_n_m") > 0.0, "the brake was eased: torque came free");
-    let removed = term["heldout"]["excess_error_removed"].as_f64().unwrap();
-    assert!(removed > 0.7, "{removed}");
+#[test]
+fn a_brake_moved_in_mid_run_is_found_when_and_where_it_was() {
+    // Eased once; tightened, then eased twice.
+    for (recording, signs) in [("d445", &[1.0][..]), ("d439", &[-1.0, 1.0, 1.0])] {
+        let recording = &format!("tests/recordings/rosa-rotor-air-{recording}.csv");
+        let report = diagnose(recording, "config/thrusters/rosa-rotor.toml", "rosa-rotor-air");
+        let notes = report["notes"].to_string();
+        assert!(notes.contains("leaves out: damping_level"), "the answer is hidden: {notes}");
+
+        assert_eq!(report["verdict"], "unexplained", "{}", report["summary"]);
+        assert_eq!(report["mismatch"][0]["path"], "shaft");
+        assert_eq!(report["empirical_term"]["path"], "shaft");
+        let (truth, told) = (brake_changes(recording), changes_told(&report));
+        assert_eq!(told.len(), truth.len(), "{told:?}, moved at {truth:?}");
+        for (((torque, onset), moved), sign) in told.iter().zip(&truth).zip(signs) {
+            assert!((onset - moved).abs() < 0.3, "found at {onset} s, moved at {moved} s");
+            assert!(
+                torque * sign > 0.0,
+                "torque comes free where the brake is eased: {torque} N m at {onset} s"
+            );
+        }
+        let removed = report["empirical_term"]["heldout"]["excess_error_removed"].as_f64().unwrap();
+        assert!(removed > 0.7, "{removed}");
+    }
 }
 
 #[test]

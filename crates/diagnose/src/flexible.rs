@@ -1,6 +1,7 @@
 //! Terms that bend to anything, one for each place where physics may be missing: the alternative of last
 //! resort. They have no form of their own, so they pay for all their numbers, and win only where no set of
-//! named effects comes near. What they show is said as a table of numbers, not as a law.
+//! named effects comes near. What they show is said as a table of numbers, not as a law. None bends where an effect of
+//! the catalogue does: a curve of the command is `command_curve`, a course of the inflow is `ambient_flow_unsteady`.
 
 use kort_thruster::both;
 use kort_thruster::effects::{
@@ -20,12 +21,10 @@ pub const TERMS: &[&Descriptor] = &[
     &SHAFT_OVER_FLOW,
     &SHAFT_OVER_TIME,
     &load_steps::LOAD_STEPS,
-    &DRIVE_OVER_COMMAND,
     &DRIVE_OVER_TIME,
     &BLADE_OVER_SPEED,
     &BLADE_OVER_FLOW,
     &FLOW_OVER_FLOW,
-    &FLOW_OVER_TIME,
     &SENSOR_OVER_THRUST,
     &SENSOR_OVER_TIME,
     &crate::column::SHAFT,
@@ -78,12 +77,10 @@ enum Place {
     ShaftOverSpeed,
     ShaftOverFlow,
     ShaftOverTime,
-    DriveOverCommand,
     DriveOverTime,
     BladeOverSpeed,
     BladeOverFlow,
     FlowOverFlow,
-    FlowOverTime,
     SensorOverThrust,
     SensorOverTime,
 }
@@ -108,17 +105,14 @@ impl<T: Real> Term<T> {
 impl<T: Real> Effect<T> for Term<T> {
     fn hooks(&self) -> Hooks {
         match self.place {
-            Place::DriveOverCommand | Place::DriveOverTime => Hooks::DRIVE,
+            Place::DriveOverTime => Hooks::DRIVE,
             Place::SensorOverThrust | Place::SensorOverTime => Hooks::SENSE,
             _ => Hooks::BALANCE,
         }
     }
 
     fn drive(&mut self, tick: &Tick, drive: &mut Drive<T>) {
-        drive.command = match self.place {
-            Place::DriveOverTime => drive.command * (self.at(T::from(tick.time_s)) + 1.0),
-            _ => drive.command + self.at(drive.command),
-        };
+        drive.command *= self.at(T::from(tick.time_s)) + 1.0;
     }
 
     fn balance(&self, at: &Local<T>, _: &[T], balance: &mut Balance<T>, _: &mut [T]) {
@@ -130,7 +124,6 @@ impl<T: Real> Effect<T> for Term<T> {
             Place::BladeOverSpeed => balance.thrust_n += self.at(speed),
             Place::BladeOverFlow => balance.thrust_n += self.at(flow),
             Place::FlowOverFlow => balance.momentum_n += self.at(flow),
-            Place::FlowOverTime => balance.ambient_m_s += self.at(time),
             _ => {}
         }
     }
@@ -197,15 +190,6 @@ term!(
     ShaftOverTime
 );
 term!(
-    DRIVE_OVER_COMMAND,
-    "unknown_drive_over_command",
-    Drive,
-    "addition to the command over the command",
-    commanded,
-    |s| heights("of the command", 0.1 * s.command, s.both_ways(s.command)),
-    DriveOverCommand
-);
-term!(
     DRIVE_OVER_TIME,
     "unknown_drive_over_time",
     Drive,
@@ -240,15 +224,6 @@ term!(
     flow_seen,
     |s| heights("N", 0.1 * s.thrust_n, s.both_ways(s.flow_m_s)),
     FlowOverFlow
-);
-term!(
-    FLOW_OVER_TIME,
-    "unknown_flow_over_time",
-    Flow,
-    "ambient flow [m/s] over time_s",
-    flow_seen,
-    |s| heights("m/s", 0.1 * s.flow_m_s, [0.0, s.duration_s]),
-    FlowOverTime
 );
 term!(
     SENSOR_OVER_THRUST,

@@ -8,7 +8,7 @@
 use std::sync::Arc;
 
 use kort_identify::Quadratic;
-use kort_identify::fit::Fit;
+use kort_identify::fit::{Columns, Fit};
 use kort_identify::hypothesis::{Free, Hypothesis, Member};
 use kort_identify::simulate::Problem;
 use kort_thruster::both;
@@ -24,6 +24,8 @@ use crate::nameless::nameless;
 const MOST: usize = 4;
 /// Instants of the grid.
 const INSTANTS: usize = 40;
+/// Share of the recording before the first change, and after the last, at least.
+const MARGIN: f64 = 0.02;
 /// How long a change takes, s: least (long against a tick), usually, and most.
 const RISE_S: [f64; 3] = [0.02, 0.05, 0.5];
 /// An instant is moved by halves of the grid's step, so often.
@@ -53,7 +55,9 @@ fn specs(scale: &Scale) -> Vec<Spec> {
     let most = scale.torque_n_m;
     let of_change = |k: usize| {
         let size = Spec::strength(SIZES[k], "N m", SMALL * most, -most, most).sigma(0.1 * most);
-        [size, Spec::shape(BEGINNINGS[k], "s", 0.5 * scale.duration_s, 0.0, scale.duration_s)]
+        // What it was before and what it is after must both be seen: a load throughout is no change.
+        let [first, last] = [MARGIN, 1.0 - MARGIN].map(|share| share * scale.duration_s);
+        [size, Spec::shape(BEGINNINGS[k], "s", 0.5 * scale.duration_s, first, last)]
     };
     let [least, usual, longest] = RISE_S;
     let rise = Spec::shape("rise_s", "s", usual, least, longest);
@@ -154,6 +158,25 @@ pub fn promise(problem: &Problem, parent: &Fit) -> Option<(f64, Hypothesis)> {
     Some((promise.cost, looking.with(&promise.sizes_n_m, &instants)))
 }
 
+/// A fit's set with one change less, for each that it has.
+pub fn with_one_less(problem: &Problem, fit: &Fit) -> Vec<(Hypothesis, Columns)> {
+    let members = problem.members(&fit.hypothesis, &fit.values);
+    let Some(place) = members.iter().position(|m| m.effect.id == LOAD_STEPS.id) else { return Vec::new() };
+    let all = in_order(&members[place].values);
+    let less = |k: usize| {
+        let mut rest = all.clone();
+        rest.remove(k);
+        let (sizes, instants): (Vec<f64>, Vec<f64>) =
+            rest.into_iter().map(|[size, from_s]| (size, from_s)).unzip();
+        let mut fewer = changes(&problem.scale, &sizes, &instants);
+        fewer.values[0] = members[place].values[0];
+        let mut members = members.clone();
+        members[place] = fewer;
+        problem.recompose(fit, &members)
+    };
+    if all.len() < 2 { Vec::new() } else { (0..all.len()).map(less).collect() }
+}
+
 /// What a small load does from an instant on.
 #[derive(Clone)]
 struct Change {
@@ -243,13 +266,14 @@ impl<'a> Looking<'a> {
 
     /// Moves each change to where they leave least together.
     fn place(&self, changes: &mut [Change], step_s: f64) -> Promise {
+        let [first, last] = [MARGIN, 1.0 - MARGIN].map(|share| share * self.problem.scale.duration_s);
         let mut least = self.promise(changes);
         for halving in 1..=HALVINGS {
             let by = step_s * 0.5_f64.powi(halving);
             for k in 0..changes.len() {
                 let from_s = changes[k].from_s;
                 for to in [from_s - by, from_s + by] {
-                    let Some(moved) = self.change(to.clamp(0.0, self.problem.scale.duration_s)) else {
+                    let Some(moved) = self.change(to.clamp(first, last)) else {
                         continue;
                     };
                     let before = std::mem::replace(&mut changes[k], moved);

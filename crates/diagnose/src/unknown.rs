@@ -52,10 +52,24 @@ fn put_on(search: &mut Search, set: &Set, terms: &[&'static Descriptor]) -> Opti
         set.push(term.id);
         set.sort_unstable();
         search.fit_set(set.clone(), &hypothesis, &parent.columns);
+        leave_out_changes(search, &set);
         larger.push(set);
     }
     larger.retain(|set| search.fits.contains_key(set));
     larger.into_iter().min_by(|a, b| search.cost(a).total_cmp(&search.cost(b)))
+}
+
+/// Leaves changes of the load out of a set as long as that helps.
+fn leave_out_changes(search: &mut Search, set: &Set) {
+    while let Some(fit) = search.fits.get(set) {
+        let before = fit.cost();
+        for (hypothesis, columns) in load_steps::with_one_less(search.problem, fit) {
+            search.fit_set(set.clone(), &hypothesis, &columns);
+        }
+        if search.fits[set].cost() >= before {
+            return;
+        }
+    }
 }
 
 /// Cost of a set with a term on it, to first order; and the set from there.

@@ -163,6 +163,8 @@ pub struct Told<'a> {
     pub mismatch: &'a [Mismatch],
     /// What is known without a name.
     pub term: Option<&'a EmpiricalTerm>,
+    /// Whether that term is a load that changes at instants.
+    pub load_changes: bool,
     /// What is left.
     pub remainder: Option<&'a Remainder>,
     /// What to run next.
@@ -239,8 +241,13 @@ pub fn summary(told: &Told) -> String {
                 } else {
                     "removes nothing on held-out data: where to look, and no more".into()
                 };
+                let what = if told.load_changes {
+                    "A load that changes in mid-run"
+                } else {
+                    "A term that bends to anything"
+                };
                 text.push_str(&format!(
-                    " A term that bends to anything describes it: {} over {}: {} ({held_out}).",
+                    " {what} describes it: {} over {}: {} ({held_out}).",
                     term.enters,
                     term.variables.join(", "),
                     term.expression,

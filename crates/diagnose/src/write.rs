@@ -209,13 +209,8 @@ impl<'a, 'p> Writer<'a, 'p> {
         let std_last = problem.standard_errors(self.last);
         let empirical_term = decision.term.map(|term| {
             let smaller = self.without(&self.best, term);
-            words::empirical(
-                problem,
-                self.last,
-                &std_last,
-                term,
-                self.score(&self.trained(&smaller), &last_trained),
-            )
+            let heldout = self.score(&self.trained(&smaller), &last_trained);
+            words::empirical(problem, self.last, &std_last, term, heldout)
         });
         let remainder = match (decision.term, rest) {
             _ if decision.named.is_empty() => None,
@@ -268,6 +263,7 @@ impl<'a, 'p> Writer<'a, 'p> {
             findings: &findings,
             mismatch: &mismatch,
             term: empirical_term.as_ref(),
+            load_changes: decision.term == Some(load_steps::LOAD_STEPS.id),
             remainder: remainder.as_ref(),
             next: next_experiment.as_ref(),
             baseline: &baseline,

@@ -82,14 +82,12 @@ impl<'a, 'p> Search<'a, 'p> {
         set.iter().map(|id| self.rarity_of(id)).sum()
     }
 
-    /// An effect is one of the catalogue, more or less common. What has no name is as likely as one of them,
+    /// An effect is one of the catalogue, more or less common. What has no name is rarer than all of them together, and
     /// at one of the places where it may be.
     fn rarity_of(&self, id: &str) -> f64 {
-        if is_term(id) {
-            return (TERMS.len() as f64).ln();
-        }
         let commonness = self.descriptor(id).map_or(1.0, |d| d.commonness);
-        (self.effects.len().max(1) as f64 / commonness).ln()
+        let alike = if is_term(id) { TERMS.len() } else { self.effects.len().max(1) };
+        (alike as f64 / commonness).ln()
     }
 
     /// What a choice among the ways in which an effect may act costs, on the scale on which a fit prices its numbers:
