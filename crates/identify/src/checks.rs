@@ -171,10 +171,17 @@ fn spikes(recording: &str, name: &str, column: &[f64], time_s: &[f64], out: &mut
     }
 }
 
-/// Whether only the size of the shaft speed was recorded: never negative although the drive reverses.
+/// Readings below zero by more than this share of the largest are more than a sensor's noise about rest.
+const ABOUT_REST: f64 = 0.02;
+/// One reading in so many may be an outlier.
+const OUTLIERS: usize = 200;
+
+/// Whether only the size of the shaft speed was recorded: never negative, but for noise and outliers, although the
+/// drive reverses.
 pub fn is_unsigned_speed(series: &Series) -> bool {
     let Some(speed) = series.column("shaft_speed_rad_s") else { return false };
-    let never_negative = speed.iter().all(|v| v.is_nan() || *v >= 0.0);
+    let below = -ABOUT_REST * largest(speed);
+    let never_negative = speed.iter().filter(|v| **v < below).count() <= speed.len() / OUTLIERS;
     let reversed = REVERSING.iter().any(|name| {
         series.column(name).is_some_and(|c| {
             let top = largest(c);
@@ -330,6 +337,8 @@ mod tests {
     #[test]
     fn a_speed_without_its_sign_is_told_from_one_with_it() {
         assert!(is_unsigned_speed(&log(f64::abs, |_| true)));
+        // Noise about rest, and a spike.
+        assert!(is_unsigned_speed(&log(|s| s.abs() - 0.915, |_| true)));
         assert!(!is_unsigned_speed(&log(|s| s, |_| true)));
         assert!(notes(&log(f64::abs, |_| true)).contains("unsigned_speed_sensor"));
     }

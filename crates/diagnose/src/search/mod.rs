@@ -26,6 +26,8 @@ pub type Set = Vec<&'static str>;
 const MOST_EFFECTS: usize = 8;
 /// Iterations of an exact fit.
 const ITERATIONS: usize = 12;
+/// A set that has come to cost so much less is a new place to start smaller ones from.
+const BETTER: f64 = 1.0;
 /// Steps of a fit by which forms or starts are compared.
 const FIRST_STEPS: usize = 4;
 
@@ -38,7 +40,8 @@ pub struct Search<'a, 'p> {
     /// Every set fitted.
     pub fits: BTreeMap<Set, Fit>,
     screens: BTreeMap<Set, Vec<Screened>>,
-    dropped: BTreeSet<(Set, Set)>,
+    /// What a larger set cost when a smaller one was last fitted from where it ended.
+    dropped: BTreeMap<(Set, Set), f64>,
     reshaped: BTreeSet<(Set, u64)>,
     /// What each effect does to the model, and to other equations in its place: by members without a size.
     probes: BTreeMap<Set, Vec<Vec<Probe>>>,
@@ -58,7 +61,7 @@ impl<'a, 'p> Search<'a, 'p> {
             effects,
             fits: BTreeMap::new(),
             screens: BTreeMap::new(),
-            dropped: BTreeSet::new(),
+            dropped: BTreeMap::new(),
             reshaped: BTreeSet::new(),
             probes: BTreeMap::new(),
             ways: Vec::new(),
@@ -164,8 +167,12 @@ impl<'a, 'p> Search<'a, 'p> {
                 continue;
             }
             let set = vec![effect.id];
-            let hypothesis = baseline.hypothesis.with(&baseline.values, member, &self.problem.scale);
-            self.fit_set(set.clone(), &hypothesis, &baseline.columns);
+            // Numbers that were bent to other equations may have no way back: from what is stated too.
+            let stated: Vec<f64> = baseline.hypothesis.free.iter().map(|free| free.mean).collect();
+            for (values, columns) in [(&baseline.values, &baseline.columns), (&stated, &Vec::new())] {
+                let hypothesis = baseline.hypothesis.with(values, member.clone(), &self.problem.scale);
+                self.fit_set(set.clone(), &hypothesis, columns);
+            }
             self.hold(&set, effect.id);
         }
     }
@@ -310,10 +317,12 @@ impl<'a, 'p> Search<'a, 'p> {
     /// Fits a set from where a larger one that holds it ended: a member that only led the others to a better
     /// place must not be kept for it.
     fn ensure(&mut self, set: &Set, larger: &Set) {
-        if !self.dropped.insert((set.clone(), larger.clone())) {
+        let Some(from) = self.fits.get(larger) else { return };
+        let known = self.dropped.entry((set.clone(), larger.clone())).or_insert(f64::INFINITY);
+        if from.cost() > *known - BETTER {
             return;
         }
-        let Some(from) = self.fits.get(larger) else { return };
+        *known = from.cost();
         let all = self.problem.members(&from.hypothesis, &from.values);
         let members: Vec<Member> = all.into_iter().filter(|m| set.contains(&m.effect.id)).collect();
         let (hypothesis, columns) = self.problem.recompose(from, &members);
