@@ -171,8 +171,16 @@ mod tests {
             (&[(&["windage_drag"], 0.0), (&[], 80.0)], usual, Verdict::Explained),
             (&[(&["windage_drag"], 0.0), (&["duct_loss"], 2.0), (&[], 80.0)], usual, Verdict::Ambiguous),
             (&[(&["unknown_shaft_step"], 0.0), (&["windage_drag"], 90.0)], usual, Verdict::Unexplained),
-            (&[(&["unknown_shaft_step"], 0.0), (&[], 0.5)], usual, Verdict::NoMismatch),
-            (&[(&["unknown_shaft_step"], 0.0), (&[], 0.5)], much, Verdict::Unexplained),
+            (
+                &[(&["unknown_shaft_step"], 0.0), (&[], 0.5), (&["windage_drag"], 0.5)],
+                usual,
+                Verdict::NoMismatch,
+            ),
+            (
+                &[(&["unknown_shaft_step"], 0.0), (&[], 0.5), (&["windage_drag"], 0.5)],
+                much,
+                Verdict::Unexplained,
+            ),
             (&[(&["unknown_shaft_step", "windage_drag"], 0.0)], left, Verdict::PartlyExplained),
             (&[(&["unknown_shaft_step", "windage_drag"], 0.0)], usual, Verdict::Explained),
             (
