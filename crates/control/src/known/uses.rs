@@ -1,6 +1,6 @@
 //! What each known effect is used for, found by the same probing that uses it: `kort explain EFFECT`.
 
-use kort_thruster::effects::{Descriptor, Effect};
+use kort_thruster::effects::{Descriptor, Effect, Path};
 use kort_thruster::plant::{Sensed, Tick};
 use kort_thruster::rig::{AmplifierKind, KnownEffect, Quantity, Rig};
 
@@ -125,14 +125,19 @@ pub fn of_effect(effect: &'static Descriptor) -> Usage {
     ] {
         let Ok(rig) = Rig::from_toml(text) else { continue };
         let Ok(model) = ControlModel::from_rig(&rig, 1e-3) else { continue };
-        let specs = (effect.parameters)(&model.scale(&rig, 600.0));
-        let known = KnownEffect {
-            effect: effect.id,
-            parameters: specs.iter().map(|s| (s.name, Quantity::exact(s.start))).collect(),
-        };
-        if let Ok(found) = of_one(&rig, &known, 1e-3) {
-            usage.uses.extend(found.uses);
-            usage.left = found.left;
+        let scale = model.scale(&rig, 600.0);
+        let specs = (effect.parameters)(&scale);
+        // Where every value leaves things as they are (factors of one), another start moves them.
+        let starts = std::iter::once(specs.iter().map(|s| s.start).collect()).chain((effect.starts)(&scale));
+        for values in starts {
+            let known = KnownEffect {
+                effect: effect.id,
+                parameters: specs.iter().zip(values).map(|(s, v)| (s.name, Quantity::exact(v))).collect(),
+            };
+            if let Ok(found) = of_one(&rig, &known, 1e-3) {
+                usage.uses.extend(found.uses);
+                usage.left = found.left.or(usage.left);
+            }
         }
     }
     usage.uses.sort_unstable();
@@ -257,6 +262,8 @@ fn why(rig: &Rig) -> &'static str {
         "its own states are too fast to be followed from what is measured: what it does to the shaft is left to the observer's unexplained load, what it does to the water to its ambient flow"
     } else if hooks.foil {
         "it depends on depth or on the speed itself, which a table over the angle of attack does not hold: what it does is left to the observer's unexplained load and ambient flow, and to the force sensor"
+    } else if hooks == kort_thruster::effects::Hooks::NONE && descriptor.path == Path::Flow {
+        "at these values it states what every law and observer reckons with already: the flow is a state of its own"
     } else if hooks == kort_thruster::effects::Hooks::NONE {
         "it is a property of the log, not of the thruster: a running controller meets gaps as values that are not measured"
     } else {
@@ -319,10 +326,12 @@ mod tests {
             ("clock_skew", Use::Sensors),
             ("flowmeter_offset_lag_location", Use::Sensors),
             ("torque_channel_bias", Use::Sensors),
+            ("axial_flow_dynamics", Use::Water),
         ] {
             assert!(of(id).uses.contains(&used), "{id}: {:?}", of(id));
         }
-        for id in ["ventilation", "cavitation", "gear_backlash"] {
+        // What only lags leaves lift and drag where they were once it has settled.
+        for id in ["ventilation", "cavitation", "gear_backlash", "unsteady_lift_lag"] {
             assert!(of(id).left.is_some(), "{:?}", of(id));
         }
     }
