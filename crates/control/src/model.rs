@@ -8,6 +8,7 @@ mod bandwidth;
 mod blades;
 mod static_map;
 mod swirl;
+mod telling;
 
 use kort_thruster::blade::{Blade, BladeRow};
 use kort_thruster::effects::Scale;
@@ -115,6 +116,8 @@ pub struct ControlModel {
     pub thrust_max_n: f64,
     /// Longest step, s, at which an explicit second-order step of shaft and water stays accurate.
     pub step_max_s: f64,
+    /// Thrust that comes with torque of the blades which the model does not explain, N/(N m) = 1/m; 0 where thrust is measured.
+    pub thrust_per_torque_1_m: f64,
 }
 
 impl ControlModel {
@@ -168,11 +171,13 @@ impl ControlModel {
             speed_max_rad_s: 0.0,
             thrust_max_n: 0.0,
             step_max_s: 1e-3,
+            thrust_per_torque_1_m: 0.0,
         };
         model.refresh();
         model.set_envelope();
         known::design(&mut model, rig);
         model.set_envelope();
+        model.thrust_per_torque_1_m = model.thrust_told_by_torque(rig);
         Ok(model)
     }
 

@@ -109,6 +109,8 @@ pub struct Estimate {
     pub swirl_m_s: Estimated,
     /// Torque of the blades by the model, N m; positive opposes ahead.
     pub blade_torque_n_m: f64,
+    /// Share by which the blades probably give more thrust than the model says, by what their torque is off.
+    pub thrust_surplus: f64,
     /// Measurements rejected by the innovation gate since start.
     pub gated: u64,
 }

@@ -36,7 +36,9 @@ impl Aim {
     pub fn at(&mut self, model: &ControlModel, estimate: &Estimate, thrust_n: f64, arrives_s: f64) -> Target {
         let swirl = estimate.swirl_m_s.value;
         let flow = arriving(model, estimate.flow_m_s.value, estimate.ambient_m_s.value, thrust_n, arrives_s);
-        let wanted = model.speed_for_thrust_rad_s(thrust_n, flow, swirl, self.speed_rad_s);
+        // What the blades give beyond the model need not be asked of it.
+        let of_model = thrust_n / (1.0 + estimate.thrust_surplus);
+        let wanted = model.speed_for_thrust_rad_s(of_model, flow, swirl, self.speed_rad_s);
         let cap = 1.1 * model.speed_max_rad_s;
         self.speed_rad_s = wanted.clamp(-cap, cap);
         let slopes = model.slopes(model.blade.inflow(self.speed_rad_s, flow, swirl));
@@ -104,5 +106,9 @@ mod tests {
         estimate.flow_m_s.value = 0.4;
         let target = Aim::default().at(&model, &estimate, 80.0, 0.0);
         assert!((model.load(target.speed_rad_s, 0.4, 0.0).thrust_n - 80.0).abs() < 1e-3 && !target.capped);
+        // Blades that give a twentieth more are asked for that much less.
+        estimate.thrust_surplus = 0.05;
+        let target = Aim::default().at(&model, &estimate, 80.0, 0.0);
+        assert!((1.05 * model.load(target.speed_rad_s, 0.4, 0.0).thrust_n - 80.0).abs() < 1e-3);
     }
 }

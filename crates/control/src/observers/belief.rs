@@ -314,15 +314,19 @@ impl Belief {
         let of = |i: usize| Estimated { value: self.x[i], std_error: self.p[(i, i)].max(0.0).sqrt() };
         let s = model.slopes(model.blade.inflow(self.x[SPEED], self.x[FLOW], self.x[SWIRL]));
         let (_, variance) = self.thrust_doubt(model, &s);
-        let thrust_var = variance.max(0.0);
+        let (thrust_var, water) = (variance.max(0.0), water_of(&self.x));
         Estimate {
             shaft_speed_rad_s: of(SPEED),
             flow_m_s: of(FLOW),
             ambient_m_s: of(AMBIENT),
-            thrust_n: Estimated { value: s.thrust_n, std_error: thrust_var.sqrt() },
+            thrust_n: Estimated {
+                value: s.thrust_n + water.thrust_beyond_n(model),
+                std_error: thrust_var.sqrt(),
+            },
             load_torque_n_m: self.load(model),
             swirl_m_s: of(SWIRL),
             blade_torque_n_m: s.torque_n_m,
+            thrust_surplus: water.thrust_surplus(model),
             gated: self.gated,
         }
     }

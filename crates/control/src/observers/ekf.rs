@@ -116,6 +116,8 @@ fn transition(model: &ControlModel, x: &Vector, noise: &Noise, dt: f64) -> Matri
     a[(SPEED, LOAD)] = -model.sense(w.speed_rad_s) / inertia;
     a[(SPEED, BLADE)] = -model.square(w.speed_rad_s) / inertia;
     a[(FLOW, SPEED)] = lever * s.thrust_by_tangential / mass;
+    // What thrust comes with unexplained torque of the blades.
+    a[(FLOW, BLADE)] = model.thrust_per_torque_1_m * model.square(w.speed_rad_s) / mass;
     let v = w.flow_m_s;
     a[(FLOW, FLOW)] = (s.thrust_by_axial - flux * (v.abs() + (v - w.ambient_m_s) * v.signum())) / mass;
     a[(FLOW, SWIRL)] = -s.thrust_by_tangential / mass;
@@ -176,7 +178,7 @@ mod tests {
 
     #[test]
     fn transition_agrees_with_differences() {
-        let model = stand();
+        let model = ControlModel { thrust_per_torque_1_m: 5.0, ..stand() };
         let noise = Noise::new(&model, &ObserverOptions::default());
         let x = Vector::from([45.0, 0.7, 0.0, 0.2, 0.1, 44.0, 0.3]);
         let dt = 1e-3;

@@ -174,6 +174,9 @@ impl Observer {
     }
 }
 
+/// Largest share by which blades are believed to give more or less thrust than stated.
+const SURPLUS_MAX: f64 = 0.3;
+
 /// Shaft, water and what drives them: the physical part of every observer's state. What load the model does not
 /// explain opposes the turning shaft, as friction and an error of the blades' torque do, so that a reversal
 /// finds it known.
@@ -203,7 +206,11 @@ impl Water {
                 - model.friction_n_m(self.speed_rad_s)
                 - self.unexplained_n_m(model))
                 / model.inertia_kg_m2,
-            model.flow_acceleration(load.thrust_n, self.flow_m_s, self.ambient_m_s),
+            model.flow_acceleration(
+                load.thrust_n + self.thrust_beyond_n(model),
+                self.flow_m_s,
+                self.ambient_m_s,
+            ),
             model.swirl_acceleration(load.torque_n_m, self.flow_m_s, self.swirl_m_s),
             model.swirl_decay_per_s(self.flow_m_s),
         ]
@@ -213,6 +220,18 @@ impl Water {
     #[inline]
     fn unexplained_n_m(&self, model: &ControlModel) -> f64 {
         self.load_n_m * model.sense(self.speed_rad_s) + self.blade_load_n_m * model.square(self.speed_rad_s)
+    }
+
+    /// Thrust that probably comes with the blades' unexplained torque, N.
+    #[inline]
+    fn thrust_beyond_n(&self, model: &ControlModel) -> f64 {
+        model.thrust_per_torque_1_m * self.blade_load_n_m * model.square(self.speed_rad_s)
+    }
+
+    /// The same as a share of what the model gives in still water, held to what blades can err by.
+    fn thrust_surplus(&self, model: &ControlModel) -> f64 {
+        let top = model.map.thrust_n(model.speed_max_rad_s);
+        (model.thrust_per_torque_1_m * self.blade_load_n_m / top).clamp(-SURPLUS_MAX, SURPLUS_MAX)
     }
 
     #[inline]
@@ -286,10 +305,11 @@ impl Water {
             shaft_speed_rad_s: unsure(self.speed_rad_s),
             flow_m_s: unsure(self.flow_m_s),
             ambient_m_s: unsure(self.ambient_m_s),
-            thrust_n: unsure(load.thrust_n),
+            thrust_n: unsure(load.thrust_n + self.thrust_beyond_n(model)),
             load_torque_n_m: unsure(self.unexplained_n_m(model)),
             swirl_m_s: unsure(self.swirl_m_s),
             blade_torque_n_m: load.torque_n_m,
+            thrust_surplus: self.thrust_surplus(model),
             gated: 0,
         }
     }
