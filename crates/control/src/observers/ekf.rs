@@ -178,7 +178,8 @@ mod tests {
 
     #[test]
     fn transition_agrees_with_differences() {
-        let model = ControlModel { thrust_per_torque_1_m: 5.0, ..stand() };
+        let mut model = stand();
+        model.thrust_per_torque_1_m = 5.0;
         let noise = Noise::new(&model, &ObserverOptions::default());
         let x = Vector::from([45.0, 0.7, 0.0, 0.2, 0.1, 44.0, 0.3]);
         let dt = 1e-3;
