@@ -232,6 +232,13 @@ fn what_tview_of_moteus_logs_comes_in_by_its_map() {
     let log = "tests/recordings/logs/moteus_1_servo_stats.csv.gz";
     let found = columns(log);
     assert_eq!((found["format"].as_str(), shipped(&found)), (Some("CSV"), vec!["moteus-tview"]));
+    let columns =
+        ["velocity", "control_velocity"].map(|source| field(topic(&found, ""), source)["column"].clone());
+    assert_eq!(
+        columns,
+        ["shaft_speed_rad_s", "speed_cmd_rad_s"],
+        "what its trajectory asks for is no measurement"
+    );
     let recording = read(log, "moteus-tview");
     assert_eq!(recording.rows(), 500);
     let long_s = recording.time_s[499] - recording.time_s[0];
@@ -318,6 +325,12 @@ fn bytes_on_a_can_bus_become_columns_by_a_map() {
     let log = write("can.log", writers::candump(200));
     let found = columns(&log);
     assert_eq!(found["format"], "candump");
+    assert_eq!(shipped(&found), ["canopen-402:command=301,pdo=281", "vesc-can:id=05,pole_pairs=7"]);
+    // Other nodes than the maps' examples are told by their identifiers; frames too short for the numbers are not taken.
+    let others = "(1.000000) can0 00000963#0000111100020003\n(1.000000) can0 28A#370000000000\n(1.000000) can0 30A#0F0000000000\n\
+         (1.010000) can0 00000917#00001111\n(1.010000) can0 28B#370000000000\n(1.010000) can0 30C#0F0000000000\n";
+    let found_others = columns(&write("others.log", others));
+    assert_eq!(shipped(&found_others), ["canopen-402:command=30A,pdo=28A", "vesc-can:id=63,pole_pairs=7"]);
     let duty = field(topic(&found, "0x00000905"), "0x00000905.i16be[6]");
     assert_eq!((&duty["min"], &duty["max"]), (&250.0.into(), &250.0.into()));
     let rad_s = |rpm: f64| rpm * std::f64::consts::TAU / 60.0;

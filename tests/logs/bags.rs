@@ -144,4 +144,12 @@ fn a_log_is_converted_by_its_map() {
     let refused = kort(&["convert", log, "--columns", "px4-uavcan:bank=1", "-o", &lab::path("flight.xlsx")]);
     assert_eq!(refused.status.code(), Some(2));
     assert!(stderr(&refused).contains(".parquet"), "{}", stderr(&refused));
+    // One that fails leaves nothing new behind, and what was there as it was.
+    let (new, old) = (lab::path("of-no-log.csv"), write("of-an-earlier-log.csv", "time_s,current_a\n"));
+    for output in [&new, &old] {
+        let failed = kort(&["convert", log, "--columns", "px4-uavcan:bank=7,motor=3", "-o", output]);
+        assert_eq!(failed.status.code(), Some(2), "{}", stderr(&failed));
+    }
+    assert!(!std::path::Path::new(&new).exists());
+    assert_eq!(std::fs::read_to_string(&old).unwrap(), "time_s,current_a\n");
 }

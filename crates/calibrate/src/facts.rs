@@ -1,6 +1,7 @@
 //! What a session has found so far.
 
 use serde::Serialize;
+use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// A sensor at rest.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -17,11 +18,26 @@ pub struct RestReading {
     pub step: f64,
 }
 
+/// Standard errors in a tolerance: a session states some thirty quantities, and in 99 sessions of 100 all of them are to
+/// lie inside. That is 1 - 0.99^(1/30) outside for each. With three each is right, and one session in twelve has one
+/// outside.
+pub const ALL_INSIDE: f64 = 3.59;
+/// What a quantity may lie outside with, on either side: as above.
+const OUTSIDE_EACH_SIDE: f64 = 1.67e-4;
+
+/// [`ALL_INSIDE`] where the standard error itself is known from a few independent readings only.
+fn all_inside_of(independent: f64) -> f64 {
+    let freedom = (independent - 1.0).max(1.0);
+    StudentsT::new(0.0, 1.0, freedom).map_or(ALL_INSIDE, |t| t.inverse_cdf(1.0 - OUTSIDE_EACH_SIDE))
+}
+
 impl RestReading {
-    /// Three-sigma uncertainty of the mean; half a step more where noise is too small to carry over it.
+    /// Tolerance of the mean; half a step more where noise is too small to carry over it.
     pub fn tolerance(&self) -> f64 {
-        let error = self.sigma * (self.memory / f64::from(self.count.max(1))).sqrt();
-        3.0 * error + if self.sigma < 0.6 * self.step { 0.5 * self.step } else { 0.0 }
+        let independent = f64::from(self.count.max(1)) / self.memory.max(1.0);
+        // About the mean of the same readings they scatter a little less than about the truth.
+        let error = self.sigma / (independent - 1.0).max(1.0).sqrt();
+        all_inside_of(independent) * error + if self.sigma < 0.6 * self.step { 0.5 * self.step } else { 0.0 }
     }
 }
 
@@ -62,7 +78,7 @@ impl Answer {
 pub struct Breakaway {
     /// Motor torque at which the shaft began to turn, N m.
     pub torque_n_m: f64,
-    /// Its three-sigma uncertainty, N m.
+    /// Its tolerance, N m.
     pub tolerance_n_m: f64,
 }
 
@@ -75,7 +91,7 @@ pub struct Level {
     pub shaft_speed_rad_s: f64,
     /// Thrust above its zero, N; NaN if not measured.
     pub thrust_n: f64,
-    /// Its three-sigma uncertainty: noise, zero, and what still moved, N.
+    /// Its tolerance: noise, zero, and what still moved, N.
     pub thrust_tolerance_n: f64,
     /// Motor current above its zero, A; NaN if not measured.
     pub current_a: f64,

@@ -5,7 +5,7 @@ use kort_thruster::parameters::Parameter;
 use serde::Serialize;
 
 use crate::estimate::Estimate;
-use crate::facts::{Facts, WITNESSES};
+use crate::facts::{ALL_INSIDE, Facts, WITNESSES};
 use crate::stages;
 
 /// A quantity with its tolerance.
@@ -15,8 +15,8 @@ pub struct Stated {
     pub name: String,
     /// Value, in the unit.
     pub value: f64,
-    /// Three-sigma uncertainty, in the unit: of some thirty quantities hardly one lies outside. A rig description's
-    /// `tol` is two sigma.
+    /// How far the true value may lie, in the unit: in 99 sessions of 100 none of some thirty quantities lies outside
+    /// ([`ALL_INSIDE`]). A rig description's `tol` is two sigma.
     pub tolerance: f64,
     /// Unit.
     pub unit: String,
@@ -63,14 +63,14 @@ fn stated(name: impl Into<String>, value: f64, tolerance: f64, unit: &str) -> St
 /// A dead time is known to the servo's period: when within it commands act and sensors are read nobody writes down.
 fn of_fit(p: &ParameterReport, period_s: f64) -> Stated {
     let grain = if p.name == "delay_s" { period_s } else { 0.0 };
-    stated(p.name.clone(), p.value, 3.0 * p.std_error + grain, &p.unit)
+    stated(p.name.clone(), p.value, ALL_INSIDE * p.std_error + grain, &p.unit)
 }
 
-/// The estimated torque constant over the stated one, and its relative three-sigma uncertainty.
+/// The estimated torque constant over the stated one, and its relative tolerance.
 fn torque_constant(estimate: &Estimate) -> Option<(f64, f64)> {
     let name = Parameter::TorqueConstantNmA.name();
     let found = estimate.fit.parameters.iter().find(|p| p.name == name)?;
-    Some((found.value / found.stated?, 3.0 * found.std_error / found.value))
+    Some((found.value / found.stated?, ALL_INSIDE * found.std_error / found.value))
 }
 
 /// What was found, step by step; the estimated together come last.

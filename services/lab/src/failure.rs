@@ -91,13 +91,16 @@ pub fn write_text(path: &Path, text: &str) -> Result<(), Failure> {
     std::fs::write(path, text).map_err(|e| Failure::unwritten(path, e))
 }
 
-/// Whether a file can be written, asked before a long run: what is there already stays.
+/// Whether a file can be written, asked before a long run: what is there already stays, and nothing new is left behind by
+/// a run that fails.
 ///
 /// # Errors
 /// Names the file.
 pub fn check_writable(path: &Path) -> Result<(), Failure> {
+    let there = path.exists();
     let opened = std::fs::OpenOptions::new().append(true).create(true).open(path);
-    opened.map(drop).map_err(|e| Failure::unwritten(path, e))
+    opened.map(drop).map_err(|e| Failure::unwritten(path, e))?;
+    if !there { std::fs::remove_file(path).map_err(|e| Failure::unwritten(path, e)) } else { Ok(()) }
 }
 
 /// Prints to stdout; a closed pipe (`kort … | head`) ends the output quietly.

@@ -1,7 +1,7 @@
 //! The working range: levels ahead and astern that grow, each held until it settles, and quick steps among them.
 
 use super::{Stage, Step, hear, unit};
-use crate::facts::{Facts, Level, WITNESSES};
+use crate::facts::{ALL_INSIDE, Facts, Level, WITNESSES};
 use crate::plan::Plan;
 use crate::session::Seen;
 use crate::stop::Stop;
@@ -141,7 +141,7 @@ impl WorkingRange {
             drive,
             shaft_speed_rad_s: speed,
             thrust_n: mean(1) - rest.mean,
-            thrust_tolerance_n: (3.0 * noise).hypot(rest.tolerance()) + 2.0 * drift(1).abs(),
+            thrust_tolerance_n: (ALL_INSIDE * noise).hypot(rest.tolerance()) + 2.0 * drift(1).abs(),
             current_a: mean(2) - facts.at_rest("current_a").mean,
         });
         // One that stands under a low level shows its noise.

@@ -108,3 +108,35 @@ impl Stage for Zeros {
         Ok(Step::Done)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::*;
+
+    /// A slow meter is read twenty times while the shaft stands: thirty such zeros all lie inside, but in one session of
+    /// a hundred.
+    #[test]
+    fn thirty_zeros_of_few_readings_are_all_inside_but_in_one_session_of_a_hundred() {
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        let mut zero = || {
+            let mut sum = Sum::default();
+            for _ in 0..20 {
+                let noise: f64 = StandardNormal.sample(&mut random);
+                sum.take(1.0 + noise);
+            }
+            sum.reading()
+        };
+        let sessions = 1000;
+        let whole = (0..sessions)
+            .filter(|_| (0..30).map(|_| zero()).filter(|r| (r.mean - 1.0).abs() > r.tolerance()).count() == 0)
+            .count();
+        assert!(whole * 100 >= sessions * 98, "{whole} of {sessions}");
+        // A tolerance that says nothing would hold too.
+        let usual = zero().tolerance();
+        assert!((0.5..2.0).contains(&usual), "{usual} for a standard error of 0.22");
+    }
+}

@@ -79,6 +79,23 @@ fn undamaged_they_read() {
     }
 }
 
+/// What lies behind a damaged stretch is read again, whether or not the log has marks to find it by: this one has none.
+#[test]
+fn a_damaged_stretch_takes_no_more_with_it() {
+    let map = ColumnMap::find("px4-uavcan:bank=1").unwrap();
+    let whole = unpacked(PX4, u64::MAX);
+    let read = |bytes: &[u8]| Recording::decode("log", bytes, Some(&map)).unwrap();
+    let (all, third) = (read(&whole).rows(), whole.len() / 3);
+    let mut overwritten = whole.clone();
+    overwritten[third..third + 2000].fill(0);
+    let missing = [&whole[..third], &whole[third + 3333..]].concat();
+    for bytes in [overwritten, missing] {
+        let damaged = read(&bytes);
+        assert!(damaged.rows() * 100 > all * 95 && damaged.rows() < all, "{} of {all}", damaged.rows());
+        assert!(damaged.losses.iter().any(|loss| loss.contains("passed over")), "{:?}", damaged.losses);
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(80))]
 

@@ -7,11 +7,13 @@ use std::io::{self, BufRead};
 pub(super) struct Stream<R> {
     input: R,
     at: u64,
+    /// Taken and put back.
+    back: Vec<u8>,
 }
 
 impl<R: BufRead> Stream<R> {
     pub fn new(input: R) -> Self {
-        Self { input, at: 0 }
+        Self { input, at: 0, back: Vec::new() }
     }
 
     /// Bytes taken so far.
@@ -24,7 +26,8 @@ impl<R: BufRead> Stream<R> {
     /// # Errors
     /// The reader's own; an end is none.
     pub fn fill(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let mut filled = 0;
+        let mut filled = self.back.len().min(buffer.len());
+        buffer[..filled].iter_mut().zip(self.back.drain(..filled)).for_each(|(to, from)| *to = from);
         while filled < buffer.len() {
             match self.input.read(&mut buffer[filled..]) {
                 Ok(0) => break,
@@ -51,32 +54,41 @@ impl<R: BufRead> Stream<R> {
     /// # Errors
     /// The reader's own.
     pub fn skip(&mut self, count: u64) -> io::Result<u64> {
-        let passed = io::copy(&mut io::Read::take(&mut self.input, count), &mut io::sink())?;
+        let back = self.back.len().min(count as usize);
+        self.back.drain(..back);
+        let left = count - back as u64;
+        let passed = back as u64 + io::copy(&mut io::Read::take(&mut self.input, left), &mut io::sink())?;
         self.at += passed;
         Ok(passed)
     }
 
-    /// Passes over bytes until the pattern has gone by; how many lie before it, and whether it came.
+    /// Bytes that were taken lie ahead again.
+    pub fn put_back(&mut self, bytes: &[u8]) {
+        self.back.splice(0..0, bytes.iter().copied());
+        self.at -= bytes.len() as u64;
+    }
+
+    /// Passes over bytes until so many that lie ahead are what is looked for; how many lie before them, and whether they came.
     ///
     /// # Errors
     /// The reader's own.
-    pub fn seek(&mut self, pattern: &[u8]) -> io::Result<(u64, bool)> {
-        let mut last = Vec::with_capacity(pattern.len());
-        let mut passed = 0_u64;
-        loop {
+    pub fn seek(&mut self, width: usize, is_it: impl Fn(&[u8]) -> bool) -> io::Result<(u64, bool)> {
+        let mut ahead = vec![0; width];
+        let mut passed = self.fill(&mut ahead)? as u64;
+        if passed < width as u64 {
+            return Ok((passed, false));
+        }
+        while !is_it(&ahead) {
             let mut byte = [0];
             if self.fill(&mut byte)? == 0 {
                 return Ok((passed, false));
             }
+            ahead.rotate_left(1);
+            ahead[width - 1] = byte[0];
             passed += 1;
-            if last.len() == pattern.len() {
-                last.remove(0);
-            }
-            last.push(byte[0]);
-            if last == pattern {
-                return Ok((passed - pattern.len() as u64, true));
-            }
         }
+        self.put_back(&ahead);
+        Ok((passed - width as u64, true))
     }
 }
 

@@ -139,6 +139,19 @@ fn a_torn_mcap_opens_up_to_its_last_complete_chunk() {
 }
 
 #[test]
+fn a_damaged_chunk_of_an_mcap_takes_no_more_with_it() {
+    let whole = sample(200_000);
+    let mut bytes = written(&whole, Format::Mcap);
+    let chunks = ::mcap::Summary::read(&bytes).unwrap().unwrap().chunk_indexes;
+    let chunk = &chunks[chunks.len() / 2];
+    bytes[(chunk.chunk_start_offset + chunk.chunk_length / 2) as usize] ^= 0x55;
+    let damaged = decode("rec", bytes.as_slice(), None).unwrap();
+    assert!(damaged.rows() > 100_000 && damaged.rows() < 200_000, "{}", damaged.rows());
+    assert_eq!(damaged.time_s.last(), whole.time_s.last());
+    assert!(damaged.losses.len() == 1 && damaged.losses[0].starts_with("1 of "), "{:?}", damaged.losses);
+}
+
+#[test]
 fn a_flushed_mcap_keeps_its_rows_without_an_end() {
     let mut out = Cursor::new(Vec::new());
     let mut writer = Writer::create(Format::Mcap, "t1", &["thrust_n"], &mut out).unwrap();

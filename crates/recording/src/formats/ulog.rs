@@ -1,7 +1,8 @@
 //! PX4 ULog, version 1, from its public description (docs.px4.io, "ULog File Format").
 //!
 //! Formats and subscriptions stand in the file; every logged message begins with a time stamp in microseconds since the
-//! board started. A record that cannot be one is passed over up to the next synchronisation mark.
+//! board started. Where a record cannot be one, what follows is passed over up to the next synchronisation
+//! mark or the next message of a subscription, whichever comes first: many logs have no marks.
 
 use std::collections::HashMap;
 use std::io::BufRead;
@@ -92,6 +93,9 @@ struct Number {
 struct Layout {
     topic: usize,
     stamp: usize,
+    /// How long they are, and without the filling bytes at their end, which are not written.
+    size: usize,
+    size_written: usize,
     numbers: Vec<Number>,
 }
 
@@ -132,6 +136,14 @@ pub(super) fn log(input: impl BufRead, wanted: Option<&[String]>) -> Result<Log,
     reader.finish()
 }
 
+/// Whether a message of a subscription lies ahead: its letter, its number, and the length that its format has.
+fn begins_message(ahead: &[u8], subscribed: &HashMap<u16, Layout>) -> bool {
+    let number = |at| bytes(ahead, at).map(u16::from_le_bytes);
+    let (Some(size), Some(b'D'), Some(id)) = (number(0), ahead.get(2), number(3)) else { return false };
+    let long = usize::from(size);
+    subscribed.get(&id).is_some_and(|layout| (layout.size_written + 2..=layout.size + 2).contains(&long))
+}
+
 fn broken(message: String) -> Problem {
     Problem::Broken { format: NAME, message }
 }
@@ -154,8 +166,11 @@ impl<R: BufRead> Reader<'_, R> {
         }
         let size = usize::from(u16::from_le_bytes([head[0], head[1]]));
         if !b"BFIMPQARDLCSO".contains(&head[2]) {
-            let (passed, found) = self.stream.seek(SYNC).map_err(super::unreadable)?;
-            self.skipped += passed + 3;
+            self.stream.put_back(&head[1..]);
+            let subscribed = &self.subscribed;
+            let whole = |ahead: &[u8]| ahead == SYNC || begins_message(ahead, subscribed);
+            let (passed, found) = self.stream.seek(SYNC.len(), whole).map_err(super::unreadable)?;
+            self.skipped += passed + 1;
             return Ok(found);
         }
         if let Some(place) = self.next_appended(from, 3 + size) {
@@ -245,6 +260,8 @@ impl<R: BufRead> Reader<'_, R> {
             self.bad += 1;
             return;
         };
+        let filling = flat.iter().rev().take_while(|(name, _, _)| name.contains("_padding"));
+        let size_written = filling.last().map_or(offset, |(_, _, at)| *at);
         let topic = self.gather.topic(if instance == 0 { name } else { format!("{name}[{instance}]") });
         let numbers = flat
             .into_iter()
@@ -253,7 +270,7 @@ impl<R: BufRead> Reader<'_, R> {
                 Number { kind, offset, field: (!plain).then(|| self.gather.field(topic, name, None)) }
             })
             .collect();
-        self.subscribed.insert(id, Layout { topic, stamp, numbers });
+        self.subscribed.insert(id, Layout { topic, stamp, size: offset, size_written, numbers });
     }
 
     /// The numbers of a format and those within it, with their offsets; `None` for a format that cannot be.

@@ -130,7 +130,9 @@ fn missing(log: &Log, map: &ColumnMap, wanted: &str) -> Problem {
     let more = if near.len() > 30 { ", …" } else { "" };
     near.truncate(30);
     let hint = match nearest(wanted, all.iter().map(String::as_str)) {
-        Some(near) => format!("did you mean `{near}`? `kort columns LOG` lists what is in the log"),
+        Some(near) => {
+            format!("did you mean `{near}`? `kort columns LOG` lists what is in the log and which map fits")
+        }
         None => "`kort columns LOG` lists what is in the log and which map fits".into(),
     };
     Problem::MappedColumnMissing {

@@ -204,10 +204,18 @@ fn fit(rule: &Rule, topic: &Topic, field: &Field) -> Option<(bool, usize, bool)>
 pub(super) fn propose(log: &Log) -> (Proposal, Chosen) {
     let table = log.topics.len() == 1 && log.topics[0].name.is_empty();
     let native = log.topics.iter().any(is_native);
-    let shipped: Vec<String> = ColumnMap::shipped()
-        .filter_map(|name| ColumnMap::example(name).filter(|map| suits(map, log, table)))
-        .map(|map| map.call())
-        .collect();
+    let shipped: Vec<String> = if log.format == "candump" {
+        let maps = ColumnMap::shipped()
+            .flat_map(|name| (-0xFF..=0xFF).filter_map(move |on| ColumnMap::of_node(name, on)));
+        maps.filter(|map| map.sources().all(|(source, _)| on_bus(source, log)))
+            .map(|map| map.call())
+            .collect()
+    } else {
+        ColumnMap::shipped()
+            .filter_map(|name| ColumnMap::example(name).filter(|map| suits(map, log, table)))
+            .map(|map| map.call())
+            .collect()
+    };
     let chosen = choose(log, table);
     let map = (!native && !chosen.is_empty()).then(|| toml(log, &chosen, table));
     (Proposal { native, shipped, map }, if native { Chosen::new() } else { chosen })
@@ -216,6 +224,19 @@ pub(super) fn propose(log: &Log) -> (Proposal, Chosen) {
 fn is_native(topic: &Topic) -> bool {
     let mut names = topic.fields.iter().map(|f| f.name.as_str());
     names.clone().any(|n| n == "time_s") && names.all(|n| columns::unit_missing(n).is_none())
+}
+
+/// Whether frames with this identifier are in the log of a bus, and are long enough for the number.
+fn on_bus(source: &str, log: &Log) -> bool {
+    let long_enough = || {
+        let (id, number) = source.split_once('.')?;
+        let (kind, at) = number.strip_suffix(']')?.split_once('[')?;
+        let bits: usize = kind.trim_matches(|c: char| !c.is_ascii_digit()).parse().ok()?;
+        let last = format!("u8[{}]", at.parse::<usize>().ok()? + bits / 8 - 1);
+        let mut frames = log.topics.iter().filter(|topic| topic.name.eq_ignore_ascii_case(id));
+        Some(frames.any(|topic| topic.fields.iter().any(|f| f.samples > 0 && f.name == last)))
+    };
+    long_enough().unwrap_or(false)
 }
 
 /// Every source that the map must have is in the log.
@@ -252,8 +273,11 @@ fn choose(log: &Log, table: bool) -> Chosen {
             let best = candidates
                 .filter(|(place, topic, field)| possible(topic, field, table) && !chosen.contains_key(place))
                 .filter(|(_, topic, field)| {
-                    let names = [words(&topic.name), words(&field.name)].concat();
-                    asked == names.iter().any(|n| ASKED.contains(&n.as_str()))
+                    let own = words(&field.name);
+                    // moteus' control_velocity is what its trajectory asks for.
+                    let control = own.len() > 1 && own[0] == "control";
+                    let names = [words(&topic.name), own].concat();
+                    asked == (control || names.iter().any(|n| ASKED.contains(&n.as_str())))
                 })
                 .filter_map(|(place, topic, field)| Some((fit(rule, topic, field)?, place)))
                 .min();

@@ -73,7 +73,7 @@ pub struct Judged {
     pub name: String,
     /// What was stated.
     pub value: f64,
-    /// Stated three-sigma uncertainty.
+    /// Stated tolerance.
     pub tolerance: f64,
     /// What was concealed.
     pub truth: f64,

@@ -17,7 +17,7 @@ pub fn text(report: &Report) -> String {
         };
         let rows: Vec<Vec<String>> = step.quantities.iter().map(row).collect();
         if !rows.is_empty() {
-            sheet.table(&["", "value", "three sigma", "unit"], &rows);
+            sheet.table(&["", "value", "tolerance", "unit"], &rows);
         }
         step.skipped_because.iter().for_each(|why| sheet.item(&format!("left out: {why}")));
     }

@@ -41,18 +41,12 @@ pub(in crate::formats) fn log(input: impl Read, wanted: Option<&[String]>) -> Re
         messages: 0,
         bad: 0,
     };
-    let torn = records(input, |record| {
+    let damage = records(input, |record| {
         all.take(record);
         Ok(())
     })?;
-    if let Some(why) = torn {
-        if all.gather.is_empty() {
-            return Err(Problem::Mcap { message: why });
-        }
-        all.gather.loss(format!(
-            "the file is cut off ({why}); read up to its last complete chunk: {} messages; what followed is lost",
-            all.messages
-        ));
+    for loss in damage.losses(all.messages)? {
+        all.gather.loss(loss);
     }
     if all.bad > 0 {
         all.gather.loss(format!("{} message(s) do not fit their schema and were skipped", all.bad));
