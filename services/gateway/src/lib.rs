@@ -338,6 +338,17 @@ pub fn run(config: &Config, deployment: &Deployment) -> Result<(), GatewayError>
     ))
 }
 
+/// Waits a moment for the first word of every servo. Whoever asks a gateway that has just started waits for it too, and is
+/// not told of a drive at full thrust that it is disarmed.
+async fn heard_once(app: &App) {
+    let began = std::time::Instant::now();
+    while began.elapsed() < heard::AWAY_AFTER
+        && app.thrusters().iter().any(|thruster| thruster.heard().servo.is_none())
+    {
+        tokio::time::sleep(Duration::from_millis(2)).await;
+    }
+}
+
 async fn serve(
     config: &Config,
     settings: Settings,
@@ -457,6 +468,7 @@ async fn serve(
     tracing::info!("listening on {scheme}://{}", listener.local_addr()?);
     let router = routes::router(Arc::clone(&app));
     let port = serve::Port { router, certificate, connections, stopping };
+    heard_once(&app).await;
     let serving = tokio::spawn(serve::run(listener, port));
     tokio::select! { _ = interrupt.recv() => (), _ = terminate.recv() => (), _ = hangup.recv() => () }
     for thruster in
