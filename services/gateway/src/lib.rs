@@ -289,18 +289,21 @@ pub fn check(settings: &Settings) -> Result<(), GatewayError> {
     Ok(())
 }
 
-/// Could a gateway use this configuration? Reads all that it reads, and touches no address.
-///
-/// # Errors
-/// [`GatewayError`] names file, key, value and what is allowed.
-pub fn check_config(config: &Config) -> Result<(), GatewayError> {
-    let settings = Settings::new(config)?;
-    settings::thrusters(config)?;
-    tokens(&settings)?;
-    if let Some(keys) = settings.tls.as_ref().filter(|keys| !keys.self_signed) {
-        Certificate::open(keys, Vec::new())?;
+/// What is wrong with this configuration for a gateway: reads all that it reads, and touches no address. Each names
+/// file, key, value and what is allowed.
+pub fn check_config(config: &Config) -> Vec<GatewayError> {
+    let mut wrong: Vec<GatewayError> =
+        settings::thrusters(config).err().into_iter().map(Into::into).collect();
+    match Settings::new_unchecked(config) {
+        Err(error) => wrong.push(error.into()),
+        Ok(settings) => {
+            wrong.extend(settings.wrong().into_iter().map(|words| config.error(words).into()));
+            wrong.extend(tokens(&settings).err());
+            let keys = settings.tls.as_ref().filter(|keys| !keys.self_signed);
+            wrong.extend(keys.and_then(|keys| Certificate::open(keys, Vec::new()).err()).map(Into::into));
+        }
     }
-    Ok(())
+    wrong
 }
 
 /// The tokens; beyond this machine there must be one.
