@@ -163,18 +163,25 @@ impl Config {
     /// # Errors
     /// [`ConfigError`] if it cannot be read, holds an unknown key or a value that is not allowed.
     pub fn load(path: Option<&Path>) -> Result<Self, ConfigError> {
+        Self::load_or_all(path).map_err(first)
+    }
+
+    /// As [`Self::load`], with everything that is wrong.
+    ///
+    /// # Errors
+    /// One or more [`ConfigError`].
+    pub fn load_or_all(path: Option<&Path>) -> Result<Self, Vec<ConfigError>> {
         let default = Path::new(DEFAULT_PATH);
         let path = path.or_else(|| default.is_file().then_some(default));
         let Some(path) = path else {
-            return Self::parse(BUILT_IN, None);
+            return Self::read(BUILT_IN, None);
         };
-        let text = std::fs::read_to_string(path).map_err(|e| ConfigError {
-            file: path.display().to_string(),
-            message: format!(
-                "cannot be read: {e}\nhint: a working example is {DEFAULT_PATH} of the repository"
-            ),
+        let text = std::fs::read_to_string(path).map_err(|e| {
+            let message =
+                format!("cannot be read: {e}\nhint: a working example is {DEFAULT_PATH} of the repository");
+            vec![ConfigError { file: path.display().to_string(), message }]
         })?;
-        Self::parse(&text, Some(path))
+        Self::read(&text, Some(path))
     }
 
     /// Reads a deployment from text.
@@ -182,37 +189,41 @@ impl Config {
     /// # Errors
     /// As [`Self::load`].
     pub fn parse(text: &str, file: Option<&Path>) -> Result<Self, ConfigError> {
+        Self::read(text, file).map_err(first)
+    }
+
+    fn read(text: &str, file: Option<&Path>) -> Result<Self, Vec<ConfigError>> {
         let name = file.map_or_else(|| "built-in configuration".into(), |f| f.display().to_string());
         let fail = |message: String| ConfigError { file: name.clone(), message: hinted(message) };
-        let mut config: Self = toml::from_str(text).map_err(|e| fail(with_hint(&e.to_string())))?;
+        let mut config: Self = toml::from_str(text).map_err(|e| vec![fail(with_hint(&e.to_string()))])?;
         config.file = file.map(Path::to_path_buf);
         if config.thrusters.is_empty() {
-            return Err(fail("`thrusters` is empty\nhint: add a section [thrusters.t1]".into()));
+            return Err(vec![fail("`thrusters` is empty\nhint: add a section [thrusters.t1]".into())]);
         }
+        let mut wrong = Vec::new();
         for (id, t) in &config.thrusters {
             if !is_thruster_id(id) {
-                return Err(fail(format!(
+                wrong.push(fail(format!(
                     "`thrusters.{id}`: an id has 1 to 16 lower-case letters, digits, `_` or `-`\nhint: t1, port, bow-2"
                 )));
             }
-            let check = |key: &str, value: f64, low: f64, high: f64, hint: &str| {
-                if value >= low && value <= high {
-                    return Ok(());
+            let mut check = |key: &str, value: f64, low: f64, high: f64, hint: &str| {
+                if !(value >= low && value <= high) {
+                    wrong.push(fail(format!(
+                        "`thrusters.{id}.{key}` = {value} is outside {low} to {high}\nhint: {hint}"
+                    )));
                 }
-                Err(fail(format!(
-                    "`thrusters.{id}.{key}` = {value} is outside {low} to {high}\nhint: {hint}"
-                )))
             };
-            check("servo.rate_hz", t.servo.rate_hz, 100.0, 5000.0, "1000 suits most drives")?;
-            check("servo.priority", t.servo.priority.into(), 0.0, 90.0, "80; 0 leaves the scheduler alone")?;
-            check("controller.priority", t.controller.priority.into(), 0.0, 90.0, "70, below the servo's")?;
+            check("servo.rate_hz", t.servo.rate_hz, 100.0, 5000.0, "1000 suits most drives");
+            check("servo.priority", t.servo.priority.into(), 0.0, 90.0, "80; 0 leaves the scheduler alone");
+            check("controller.priority", t.controller.priority.into(), 0.0, 90.0, "70, below the servo's");
             check(
                 "controller.rate_hz",
                 t.controller.rate_hz,
                 10.0,
                 t.servo.rate_hz,
                 "at most the servo's rate",
-            )?;
+            );
             for (key, cores) in [("servo.cores", &t.servo.cores), ("controller.cores", &t.controller.cores)] {
                 for core in cores {
                     check(
@@ -221,21 +232,15 @@ impl Config {
                         0.0,
                         1023.0,
                         "cores are counted from 0; leave it out for all of them",
-                    )?;
+                    );
                 }
             }
             if let Some(rise_s) = t.controller.setpoint_rise_s {
-                check(
-                    "controller.setpoint_rise_s",
-                    rise_s,
-                    0.0,
-                    60.0,
-                    "leave it out for what suits the law",
-                )?;
+                check("controller.setpoint_rise_s", rise_s, 0.0, 60.0, "leave it out for what suits the law");
             }
             let ratio = t.servo.rate_hz / t.controller.rate_hz;
             if (ratio - ratio.round()).abs() > 1e-6 {
-                return Err(fail(format!(
+                wrong.push(fail(format!(
                     "`thrusters.{id}.controller.rate_hz` = {} does not divide servo.rate_hz = {}\nhint: {} does",
                     t.controller.rate_hz,
                     t.servo.rate_hz,
@@ -243,7 +248,7 @@ impl Config {
                 )));
             }
         }
-        Ok(config)
+        if wrong.is_empty() { Ok(config) } else { Err(wrong) }
     }
 
     /// The thruster of an id.
@@ -316,6 +321,12 @@ impl Config {
             self.file.as_ref().map_or_else(|| "built-in configuration".into(), |f| f.display().to_string());
         ConfigError { file, message: hinted(message) }
     }
+}
+
+/// The one that is told where one is enough.
+fn first(wrong: Vec<ConfigError>) -> ConfigError {
+    let nothing = ConfigError { file: String::new(), message: String::new() };
+    wrong.into_iter().next().unwrap_or(nothing)
 }
 
 /// A message that says no way out points at the file that explains every key.

@@ -192,6 +192,13 @@ impl std::fmt::Display for Names {
     }
 }
 
+impl Fault {
+    /// Is thrust ramped down before it is latched? The stop begins with the ramp then.
+    pub const fn is_ramped(self) -> bool {
+        matches!(self, Self::GatewayLost | Self::GatewayRestarted)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

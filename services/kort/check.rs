@@ -99,21 +99,20 @@ fn described(_: &toml::Table, _: &str, _: &Path) -> Result<(), String> {
 /// Everything that servo, controller and gateway would refuse.
 fn deployment(file: Option<&Path>, problems: &mut Vec<Problem>) {
     let name = file.map_or_else(|| "built-in configuration".to_owned(), |file| file.display().to_string());
-    let config = match Config::load(file) {
+    let config = match Config::load_or_all(file) {
         Ok(config) => config,
-        Err(error) => return problems.push(problem(&name, &error.to_string())),
+        Err(wrong) => return problems.extend(wrong.iter().map(|error| problem(&name, &error.to_string()))),
     };
     let mut said = Vec::new();
     #[cfg(any(feature = "servo", feature = "controller"))]
     for id in config.thrusters.keys() {
         #[cfg(feature = "servo")]
-        said.extend(kort_servo::check(&config, id).err().map(|e| e.to_string()));
+        said.extend(kort_servo::problems(&config, id).iter().map(ToString::to_string));
         #[cfg(feature = "controller")]
         said.extend(kort_controller::check(&config, id).err().map(|e| e.to_string()));
     }
     #[cfg(feature = "gateway")]
-    said.extend(kort_gateway::check_config(&config).err().map(|e| e.to_string()));
-    said.dedup();
+    said.extend(kort_gateway::check_config(&config).iter().map(ToString::to_string));
     for words in said {
         let found = problem(&name, &words);
         if !problems.contains(&found) {

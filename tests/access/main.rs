@@ -3,6 +3,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod slow;
+mod tokens;
 
 use std::io::{Read, Write};
 use std::net::TcpStream;

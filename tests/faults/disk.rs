@@ -125,6 +125,14 @@ pub fn full(table: &mut Table) {
     assert!(lost > 0, "what the disk did not take is counted: {info}");
     let t = stack.watch().next();
     assert!(t.armed == 1 && t.faults == 0, "the thrust is untouched: {t:?}");
+    // The next gateway knows it too, though there was no space to write it down in a new file.
+    let first = stack.process_of("gateway");
+    kill(first, "KILL");
+    wait("a successor", || stack.process("gateway").filter(|process| *process != first));
+    let after = wait("the list", || recording(&stack, "full"));
+    for key in ["state", "cause", "rows", "lost_samples"] {
+        assert_eq!(after[key], info[key], "{key}: {after}");
+    }
     table.row(
         fault,
         "recording ends with its cause, reads, thrust untouched",

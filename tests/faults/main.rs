@@ -47,6 +47,9 @@ fn every_fault_ends_within_its_bound() {
     });
     println!("{table}");
     assert!(table.holds(), "a bound does not hold:\n{table}");
+    let page = include_str!("../../docs/operations.md");
+    let missing = table.missing_from(page);
+    assert!(missing.is_empty(), "docs/operations.md promises something else than {missing:#?}");
 }
 
 /// One fault after the other. A bound that does not hold, or a trial that fails, while the machine stood still says

@@ -67,6 +67,20 @@ impl Table {
     }
 }
 
+impl Table {
+    /// Rows that the table of a page lacks, or promises otherwise.
+    pub fn missing_from(&self, page: &str) -> Vec<String> {
+        let plain = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
+        let lines: Vec<String> = page.lines().map(plain).collect();
+        let promise = |row: &Row| {
+            // Where nothing may be mounted a limit stands in for the small disk.
+            let fault = row.fault.replace("files may not grow", "disk full");
+            plain(&format!("| {fault} | {} | {} {} |", row.what, row.bound, row.unit))
+        };
+        self.0.iter().map(promise).filter(|row| !lines.iter().any(|line| line.starts_with(row))).collect()
+    }
+}
+
 impl fmt::Display for Table {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "| fault | what follows | promised | worst | times | beyond |")?;

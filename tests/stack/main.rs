@@ -5,6 +5,7 @@
 mod common;
 mod inherited;
 mod refusals;
+mod shown;
 mod strangers;
 mod system;
 

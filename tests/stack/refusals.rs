@@ -36,6 +36,42 @@ fn a_configuration_that_holds_nothing_is_no_sound_one() {
 }
 
 #[test]
+fn everything_that_is_wrong_is_said_at_once() {
+    let site = Site::new();
+    let text = std::fs::read_to_string(site.config()).unwrap();
+    let text = text
+        .replace("full_drive_s = 0.005", "temperature_c = -300, continuous_current_a = 100")
+        .replace("limits = {", "checks = { frozn_s = 1 }\nlimits = {")
+        .replace("amplifier = \"simulated\"", "amplifier = \"simulatd\"")
+        .replace("velocity_servo", "velocity");
+    std::fs::write(site.config(), text).unwrap();
+    site.add("[gateway]", "hosts = [\"http://here\"]\nrecording = { files_max = 0, time_max_s = 0 }");
+    let out = run(std::process::Command::new(common::KORT).arg("check").arg(site.config()));
+    let words = String::from_utf8_lossy(&out.stdout);
+    assert_eq!(out.status.code(), Some(2), "{words}");
+    for wrong in [
+        "limits.temperature_c",
+        "limits.continuous_current_a",
+        "did you mean `frozen_s`",
+        "\"simulatd\" is no drive",
+        "known are static_map",
+        "gateway.hosts",
+        "recording.files_max",
+        "recording.time_max_s",
+    ] {
+        assert_eq!(words.matches(wrong).count(), 1, "{wrong} in: {words}");
+    }
+    let more = std::fs::read_to_string(site.config()).unwrap();
+    let more = more.replace("rate_hz = 500", "rate_hz = 9000, priority = 99");
+    std::fs::write(site.config(), more).unwrap();
+    let out = run(std::process::Command::new(common::KORT).arg("check").arg(site.config()));
+    let words = String::from_utf8_lossy(&out.stdout);
+    for wrong in ["servo.rate_hz", "servo.priority"] {
+        assert!(words.contains(&format!("thrusters.t1.{wrong}")), "{wrong} in: {words}");
+    }
+}
+
+#[test]
 fn what_others_could_write_is_not_trusted() {
     use std::os::unix::fs::PermissionsExt;
     let site = Site::new();

@@ -15,6 +15,7 @@ use std::time::{Duration, Instant};
 
 use kort_proto::events::{Before, Event, EventKind};
 use kort_proto::faults::Fault;
+use kort_proto::limits::Limit;
 use kort_proto::messages::{ControllerState, Setpoint as SetpointMessage, SetpointKind, Telemetry, Trip};
 use kort_proto::transport::{
     Deployment, GatewayPorts, Latched, Ticker, TransportError, Watched, monotonic_ns, realtime,
@@ -117,6 +118,9 @@ struct Bridge {
     mismatch_path: u32,
     /// What the thruster did when it was last heard armed.
     before: Option<Before>,
+    /// And before it was ramped down: a lost gateway's stop begins there.
+    before_ramp: Option<Before>,
+    ramping: bool,
     /// Until when answers are looked for between two ticks.
     errands_until: Option<Instant>,
 }
@@ -136,6 +140,8 @@ impl Bridge {
             latched: [None; 2],
             mismatch_path: 0,
             before: None,
+            before_ramp: None,
+            ramping: false,
             errands_until: None,
         }
     }
@@ -233,7 +239,9 @@ impl Bridge {
             let detail = format!("{} (code {}): {}", fault.name(), fault.code(), fault.help());
             let event = Event::now(EventKind::Tripped, Some(id), process, detail).fault(fault);
             let trip = tripped.filter(|trip| trip.at_ns != 0);
-            let before = self.before.or(trip.map(|trip| Before::of(trip.thrust_n, trip.shaft_speed_rad_s)));
+            let driven = self.before_ramp.filter(|_| fault.is_ramped());
+            let before = driven.or(self.before);
+            let before = before.or(trip.map(|trip| Before::of(trip.thrust_n, trip.shaft_speed_rad_s)));
             // What came while no gateway looked, the supervisor saw come.
             let seen = known.is_none().then(|| self.seen_by_supervisor(fault)).flatten();
             let (since, before) = seen.map_or((None, before), |s| (Some(s.since), s.before.or(before)));
@@ -241,6 +249,7 @@ impl Bridge {
         }
         if faults == 0 && known.is_some_and(|known| known != 0) {
             self.before = None;
+            self.before_ramp = None;
         }
     }
 
@@ -286,6 +295,7 @@ impl Bridge {
             if telemetry.armed != 0 {
                 let shown = self.held.fill(telemetry).signals;
                 self.before = Some(Before::of(shown.thrust_n, shown.shaft_speed_rad_s));
+                self.before_ramp = self.before_ramp.filter(|_| self.ramping).or(self.before);
             }
             self.tell_tripped(0, telemetry.faults, Some(&telemetry.tripped));
             last = Some(telemetry);
@@ -293,6 +303,7 @@ impl Bridge {
         let state = ports.state.latest();
         if let Some(state) = &state {
             self.link.tally.controller(state);
+            self.ramping = state.limits & Limit::LeaseRamp.bit() != 0;
             self.tell_tripped(1, state.faults, None);
             self.tell_mismatch(state);
         }

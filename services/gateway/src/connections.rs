@@ -33,7 +33,8 @@ pub struct Caps {
 #[derive(Debug)]
 pub struct Slot {
     number: u64,
-    peer: IpAddr,
+    /// Who is at its other end.
+    pub peer: IpAddr,
     /// Only stop and disarm are answered here.
     pub reserved: bool,
     /// Milliseconds since the table began at which it fell idle; zero while a request is worked on.

@@ -26,6 +26,7 @@ pub struct Events {
     outbox: SyncSender<Event>,
     waiting: AtomicU64,
     at_hand: Mutex<VecDeque<Event>>,
+    recorder: Arc<Recorder>,
 }
 
 impl Events {
@@ -33,20 +34,21 @@ impl Events {
     pub fn start(folder: &Path, recorder: Arc<Recorder>) -> std::io::Result<Arc<Events>> {
         let log = EventLog::open(folder)?;
         let (outbox, inbox) = sync_channel(QUEUE);
-        let events = Arc::new(Events { outbox, waiting: AtomicU64::new(0), at_hand: Mutex::default() });
+        let waiting = AtomicU64::new(0);
+        let events = Arc::new(Events { outbox, waiting, at_hand: Mutex::default(), recorder });
         // What is known comes first: faults that stand there need not be told again.
         let mark = log.end();
-        events.learn(log.read(), &recorder);
+        events.learn(log.read());
         let theirs = Arc::clone(&events);
-        std::thread::Builder::new()
-            .name("events".into())
-            .spawn(move || keep(&log, mark, &inbox, &theirs, &recorder))?;
+        std::thread::Builder::new().name("events".into()).spawn(move || keep(&log, mark, &inbox, &theirs))?;
         Ok(events)
     }
 
-    /// Notes an event; never waits.
+    /// Notes an event; never waits. It is known at once, whatever time the disk takes: a fault that is shown in the
+    /// next moment has its time and what was before it.
     pub fn note(&self, event: Event) {
         tracing::info!(thruster = event.thruster, who = event.who, "{}", event.detail);
+        self.learn(vec![event.clone()]);
         self.waiting.fetch_add(1, Ordering::Relaxed);
         if self.outbox.try_send(event).is_err() {
             self.waiting.fetch_sub(1, Ordering::Relaxed);
@@ -83,14 +85,14 @@ impl Events {
     }
 
     /// Takes over what is new, in the order of ids.
-    fn learn(&self, events: Vec<Event>, recorder: &Recorder) {
+    fn learn(&self, events: Vec<Event>) {
         let mut at_hand = lock(&self.at_hand);
         for event in events {
             let place = at_hand.partition_point(|known| known.id < event.id);
             if at_hand.get(place).is_some_and(|known| known.id == event.id) {
                 continue;
             }
-            recorder.note(&event);
+            self.recorder.note(&event);
             at_hand.insert(place, event);
         }
         while at_hand.len() > AT_HAND {
@@ -100,7 +102,7 @@ impl Events {
 }
 
 /// Writes what comes and reads what others wrote, until the gateway ends.
-fn keep(log: &EventLog, mut mark: Mark, inbox: &Receiver<Event>, events: &Events, recorder: &Recorder) {
+fn keep(log: &EventLog, mut mark: Mark, inbox: &Receiver<Event>, events: &Events) {
     let mut complained = false;
     loop {
         let event = match inbox.recv_timeout(LOOK_EVERY) {
@@ -118,12 +120,11 @@ fn keep(log: &EventLog, mut mark: Mark, inbox: &Receiver<Event>, events: &Events
                 }
                 Err(_) => (),
             }
-            events.learn(vec![event], recorder);
             events.waiting.fetch_sub(1, Ordering::Relaxed);
         }
         let end = log.end();
         if end != mark {
-            events.learn(log.read_after(mark), recorder);
+            events.learn(log.read_after(mark));
             mark = end;
         }
     }

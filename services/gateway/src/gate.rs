@@ -1,6 +1,7 @@
 //! The gate in front of every route: is it meant for us, who asks, and may they?
 
-use std::net::SocketAddr;
+use std::hash::BuildHasher;
+use std::net::{IpAddr, SocketAddr};
 use std::sync::Arc;
 
 use axum::extract::{Request, State};
@@ -12,11 +13,14 @@ use tokio::sync::Semaphore;
 use crate::App;
 use crate::hosts::Hosts;
 use crate::problem::{Kind, Problem};
-use crate::serve::Reserved;
+use crate::serve::{Peer, Reserved};
 use crate::token::{Identity, Role, Tokens};
 
 /// A browser cannot send `Authorization` with a WebSocket: it offers its token as a subprotocol.
 const TOKEN_PROTOCOL: &str = "bearer.";
+
+/// Lanes before argon2: peers of one lane wait for each other.
+const LANES: usize = 64;
 
 /// What the gate knows.
 #[derive(Debug)]
@@ -26,27 +30,65 @@ pub struct Gate {
     required: bool,
     /// Argon2 is heavy on purpose: one at a time, so that wrong tokens cannot take the machine.
     work: Semaphore,
+    /// One of each lane waits for it: a flood of wrong tokens holds up its own peer, and no stop of another's.
+    lanes: [Semaphore; LANES],
+    /// Says which lane; nobody outside knows who shares one.
+    lots: std::hash::RandomState,
 }
 
 impl Gate {
     /// A gate for an address.
     pub fn new(bind: SocketAddr, hosts: &[String], tokens: Tokens, required: bool) -> Gate {
-        Gate { hosts: Hosts::new(bind, hosts), tokens, required, work: Semaphore::new(1) }
+        Gate {
+            hosts: Hosts::new(bind, hosts),
+            tokens,
+            required,
+            work: Semaphore::new(1),
+            lanes: std::array::from_fn(|_| Semaphore::new(1)),
+            lots: std::hash::RandomState::new(),
+        }
+    }
+
+    /// Is what somebody was let in by still in force?
+    pub fn stands(&self, identity: &Identity) -> bool {
+        self.tokens.stands(identity)
+    }
+
+    /// The lane of a peer; of IPv6 a whole subnet, for a host has as many addresses there as it likes.
+    fn lane(&self, peer: Option<IpAddr>) -> Option<&Semaphore> {
+        let subnet = peer.map(|peer| match peer.to_canonical() {
+            IpAddr::V4(address) => u128::from(u32::from(address)),
+            IpAddr::V6(address) => u128::from(address) >> 64,
+        });
+        self.lanes.get(self.lots.hash_one(subnet) as usize % LANES)
     }
 
     /// Who asks.
-    async fn identify(&self, app: &Arc<App>, headers: &HeaderMap) -> Result<Identity, Problem> {
+    async fn identify(
+        &self,
+        app: &Arc<App>,
+        headers: &HeaderMap,
+        peer: Option<IpAddr>,
+    ) -> Result<Identity, Problem> {
         let Some(token) = shown(headers)? else {
             if self.required {
                 return Err(Problem::new(Kind::TokenRequired, "no token is shown")
                     .hint("send Authorization: Bearer TOKEN; `kort token new NAME --role viewer|pilot|admin` makes one"));
             }
-            return Ok(Identity { name: "local".into(), role: Role::Admin });
+            return Ok(Identity { name: "local".into(), role: Role::Admin, hash: None });
         };
         if let Some(identity) = self.tokens.remembered(&token) {
             return Ok(identity);
         }
+        let _first_of_its_lane = match self.lane(peer) {
+            Some(lane) => lane.acquire().await.ok(),
+            None => None,
+        };
         let _one_at_a_time = self.work.acquire().await;
+        // Accepted while this one waited, on another connection.
+        if let Some(identity) = self.tokens.remembered(&token) {
+            return Ok(identity);
+        }
         let theirs = Arc::clone(app);
         let found =
             tokio::task::spawn_blocking(move || theirs.gate().tokens.verify(&token)).await.ok().flatten();
@@ -112,7 +154,8 @@ pub async fn check(
         .hint("close connections that are not used, and try again"));
     }
     if let Some(role) = needed(request.method(), path) {
-        let identity = gate.identify(&app, request.headers()).await?;
+        let peer = request.extensions().get::<Peer>().map(|Peer(address)| *address);
+        let identity = gate.identify(&app, request.headers(), peer).await?;
         if identity.role < role {
             return Err(Problem::new(
                 Kind::RoleTooLow,

@@ -289,18 +289,21 @@ pub fn check(settings: &Settings) -> Result<(), GatewayError> {
     Ok(())
 }
 
-/// Could a gateway use this configuration? Reads all that it reads, and touches no address.
-///
-/// # Errors
-/// [`GatewayError`] names file, key, value and what is allowed.
-pub fn check_config(config: &Config) -> Result<(), GatewayError> {
-    let settings = Settings::new(config)?;
-    settings::thrusters(config)?;
-    tokens(&settings)?;
-    if let Some(keys) = settings.tls.as_ref().filter(|keys| !keys.self_signed) {
-        Certificate::open(keys, Vec::new())?;
+/// What is wrong with this configuration for a gateway: reads all that it reads, and touches no address. Each names
+/// file, key, value and what is allowed.
+pub fn check_config(config: &Config) -> Vec<GatewayError> {
+    let mut wrong: Vec<GatewayError> =
+        settings::thrusters(config).err().into_iter().map(Into::into).collect();
+    match Settings::new_unchecked(config) {
+        Err(error) => wrong.push(error.into()),
+        Ok(settings) => {
+            wrong.extend(settings.wrong().into_iter().map(|words| config.error(words).into()));
+            wrong.extend(tokens(&settings).err());
+            let keys = settings.tls.as_ref().filter(|keys| !keys.self_signed);
+            wrong.extend(keys.and_then(|keys| Certificate::open(keys, Vec::new()).err()).map(Into::into));
+        }
     }
-    Ok(())
+    wrong
 }
 
 /// The tokens; beyond this machine there must be one.
@@ -336,6 +339,17 @@ pub fn run(config: &Config, deployment: &Deployment) -> Result<(), GatewayError>
         thrusters,
         deployment.clone(),
     ))
+}
+
+/// Waits a moment for the first word of every servo. Whoever asks a gateway that has just started waits for it too, and is
+/// not told of a drive at full thrust that it is disarmed.
+async fn heard_once(app: &App) {
+    let began = std::time::Instant::now();
+    while began.elapsed() < heard::AWAY_AFTER
+        && app.thrusters().iter().any(|thruster| thruster.heard().servo.is_none())
+    {
+        tokio::time::sleep(Duration::from_millis(2)).await;
+    }
 }
 
 async fn serve(
@@ -457,6 +471,7 @@ async fn serve(
     tracing::info!("listening on {scheme}://{}", listener.local_addr()?);
     let router = routes::router(Arc::clone(&app));
     let port = serve::Port { router, certificate, connections, stopping };
+    heard_once(&app).await;
     let serving = tokio::spawn(serve::run(listener, port));
     tokio::select! { _ = interrupt.recv() => (), _ = terminate.recv() => (), _ = hangup.recv() => () }
     for thruster in

@@ -389,7 +389,7 @@ impl Recorder {
 
     /// Writes `NAME.json`; where the disk refuses, the list tells the truth from memory.
     fn note_info(&self, info: &RecordingInfo) {
-        match write_info(&self.folder, info) {
+        match kept::write_info(&self.folder, info) {
             Ok(()) => drop(lock(&self.unwritten).remove(&info.name)),
             Err(_) => drop(lock(&self.unwritten).insert(info.name.clone(), info.clone())),
         }
@@ -463,13 +463,4 @@ pub fn check_new_name(field: &str, name: &str) -> Result<(), Problem> {
         );
     }
     Ok(())
-}
-
-/// Writes `NAME.json` at once or not at all.
-fn write_info(folder: &Path, info: &RecordingInfo) -> io::Result<()> {
-    let (draft, file) =
-        (folder.join(format!(".{}.draft", info.name)), folder.join(format!("{}.json", info.name)));
-    fs::write(&draft, serde_json::to_vec_pretty(info)?)
-        .and_then(|()| fs::rename(&draft, file))
-        .inspect_err(|_| drop(fs::remove_file(&draft)))
 }

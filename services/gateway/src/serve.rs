@@ -39,6 +39,10 @@ const CONNECTIONS_KEPT_BACK: usize = 16;
 #[derive(Clone, Copy, Debug)]
 pub struct Reserved;
 
+/// Where a request comes from.
+#[derive(Clone, Copy, Debug)]
+pub struct Peer(pub IpAddr);
+
 /// What the port needs.
 pub struct Port {
     /// Where requests go.
@@ -141,6 +145,7 @@ where
         async move {
             let arriving = Arc::clone(&slot);
             let mut request = request.map(|body| Body::new(Arriving { body, slot: arriving }));
+            request.extensions_mut().insert(Peer(slot.peer));
             if slot.reserved {
                 request.extensions_mut().insert(Reserved);
             }

@@ -153,9 +153,11 @@ impl Settings {
     /// # Errors
     /// [`ConfigError`] names an unknown key or a value that is not allowed.
     pub fn new(config: &Config) -> Result<Settings, ConfigError> {
-        let settings: Settings = config.section("gateway", &config.gateway)?;
-        settings.check().map_err(|words| config.error(words))?;
-        Ok(settings)
+        let settings = Settings::new_unchecked(config)?;
+        match settings.wrong().into_iter().next() {
+            Some(words) => Err(config.error(words)),
+            None => Ok(settings),
+        }
     }
 
     /// Reads the section without asking whether a gateway could run with it: a token can be made first.
@@ -167,23 +169,24 @@ impl Settings {
     }
 
     /// What each value alone may be, and what an address beyond this machine needs beside it.
-    fn check(&self) -> Result<(), String> {
+    pub fn wrong(&self) -> Vec<String> {
+        let mut wrong = Vec::new();
         if self.bind.port() == 0 {
-            return Err("`gateway.bind` has port 0; allowed are 1 to 65535\nhint: \"127.0.0.1:8080\"".into());
+            wrong.push("`gateway.bind` has port 0; allowed are 1 to 65535\nhint: \"127.0.0.1:8080\"".into());
         }
         if let Some(odd) = self.hosts.iter().find(|host| !hosts::is_host(host)) {
-            return Err(format!(
+            wrong.push(format!(
                 "`gateway.hosts` holds {odd:?}; allowed are names and addresses without scheme, port or path\nhint: \"thruster.example.org\""
             ));
         }
         if let Some(bind) = self.foxglove {
             if !bind.ip().is_loopback() || self.require_tokens {
-                return Err(format!(
+                wrong.push(format!(
                     "`gateway.foxglove` = {bind} asks nobody for a token; allowed are addresses of this machine, without require_tokens\nhint: \"127.0.0.1:8765\", and a tunnel from elsewhere"
                 ));
             }
             if !cfg!(feature = "foxglove") {
-                return Err("`gateway.foxglove`: this program was built without the feature `foxglove`\nhint: leave the key out".into());
+                wrong.push("`gateway.foxglove`: this program was built without the feature `foxglove`\nhint: leave the key out".into());
             }
         }
         let limits = &self.recording;
@@ -194,7 +197,7 @@ impl Settings {
             ("free_bytes_min", limits.free_bytes_min as f64, 0.0, 1e15),
         ] {
             if !(low..=high).contains(&value) {
-                return Err(format!(
+                wrong.push(format!(
                     "`gateway.recording.{key}` = {value} is outside {low} to {high}\nhint: leave the key out for the usual value"
                 ));
             }
@@ -206,21 +209,18 @@ impl Settings {
             ("kept_max", diagnosis.kept_max as f64, 1.0, 10_000.0),
         ] {
             if !(low..=high).contains(&value) {
-                return Err(format!(
+                wrong.push(format!(
                     "`gateway.diagnosis.{key}` = {value} is outside {low} to {high}\nhint: leave the key out for the usual value"
                 ));
             }
         }
-        if self.bind.ip().is_loopback() {
-            return Ok(());
-        }
-        if self.tls.is_none() && !self.behind_tls_proxy {
-            return Err(format!(
+        if !self.bind.ip().is_loopback() && self.tls.is_none() && !self.behind_tls_proxy {
+            wrong.push(format!(
                 "`gateway.bind` = {} is reached from other machines, and `gateway.tls` is missing\nhint: name certificate and key in [gateway.tls] (self_signed = true makes them), or say behind_tls_proxy = true where a proxy does it",
                 self.bind
             ));
         }
-        Ok(())
+        wrong
     }
 
     /// Must every request bring a token?

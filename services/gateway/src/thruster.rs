@@ -2,6 +2,7 @@
 
 mod calibration;
 mod command;
+mod faults;
 mod law;
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, mpsc};
@@ -25,8 +26,8 @@ use crate::lease::{Lease, Wanted};
 use crate::problem::{Kind, Problem};
 use crate::rig::Trial;
 use crate::view::{
-    BeforeView, DiagnosisStep, Estimated, FaultView, LeaseView, LimitView, MismatchView, ParameterEstimate,
-    Setpoint, SetpointRange, ThrusterState, Values,
+    DiagnosisStep, Estimated, LeaseView, LimitView, MismatchView, ParameterEstimate, Setpoint, SetpointRange,
+    ThrusterState, Values,
 };
 
 /// Servo and controller answer a request within this time, or are taken to be away.
@@ -280,7 +281,9 @@ impl Thruster {
                 elapsed_s: playing.elapsed_s(now),
                 duration_s: playing.signal.duration_s,
             }),
-            faults: Fault::in_set(heard.shown_faults(now)).map(|fault| self.fault_view(fault)).collect(),
+            faults: Fault::in_set(heard.shown_faults(now))
+                .map(|fault| self.fault_view(fault, &heard, now))
+                .collect(),
             limits: Limit::in_set(heard.limits(now))
                 .map(|limit| LimitView {
                     name: limit.name(),
@@ -294,21 +297,6 @@ impl Thruster {
             }),
             time_s: heard.servo.map_or(0.0, |(_, t)| t.time_ns as f64 * 1e-9),
             age_s: heard.servo.map(|(at, _)| now.saturating_duration_since(at).as_secs_f64()),
-        }
-    }
-
-    /// A fault with what the event log knows of how it came.
-    fn fault_view(&self, fault: Fault) -> FaultView {
-        let came = self.events.latched(&self.id, fault);
-        FaultView {
-            code: fault.code(),
-            name: fault.name(),
-            help: fault.help(),
-            since: came.as_ref().map(|event| event.since.as_ref().unwrap_or(&event.time).clone()),
-            before: came.and_then(|event| event.before).map(|before| BeforeView {
-                thrust_n: before.thrust_n,
-                shaft_speed_rad_s: before.shaft_speed_rad_s,
-            }),
         }
     }
 

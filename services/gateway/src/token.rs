@@ -6,7 +6,7 @@ use std::fs;
 use std::io::Write;
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 use std::time::SystemTime;
 
 use argon2::password_hash::{PasswordHash, PasswordHasher, PasswordVerifier, SaltString};
@@ -51,6 +51,8 @@ pub struct Identity {
     pub name: String,
     /// What it allows.
     pub role: Role,
+    /// Hash of the token it was known by; none where none is asked for.
+    pub hash: Option<Arc<str>>,
 }
 
 /// Why the file of tokens cannot be used.
@@ -96,6 +98,15 @@ impl Book {
             Err(error) => return Err(fail(error.to_string())),
         };
         toml::from_str(&text).map_err(|error| fail(error.to_string().trim_end().to_owned()))
+    }
+}
+
+impl Book {
+    /// Does an identity stand here as it was let in?
+    fn holds(&self, identity: &Identity) -> bool {
+        let Some(hash) = &identity.hash else { return true };
+        let entry = self.tokens.get(&identity.name);
+        entry.is_some_and(|entry| entry.hash == **hash && entry.role == identity.role)
     }
 }
 
@@ -214,13 +225,22 @@ impl Tokens {
         let hash = entry.as_ref().map_or(NOBODY, |entry| entry.hash.as_str());
         let matches = PasswordHash::new(hash)
             .is_ok_and(|hash| argon2().verify_password(secret.as_bytes(), &hash).is_ok());
-        let identity = Identity { name: name.to_owned(), role: entry?.role };
-        if !matches {
+        let Entry { role, hash } = entry.filter(|_| matches)?;
+        let identity = Identity { name: name.to_owned(), role, hash: Some(hash.into()) };
+        let digest: [u8; 32] = Sha256::digest(token.as_bytes()).into();
+        let mut known = lock(&self.known);
+        // The file may have changed meanwhile.
+        if !known.book.holds(&identity) {
             return None;
         }
-        let digest: [u8; 32] = Sha256::digest(token.as_bytes()).into();
-        lock(&self.known).accepted.push((digest, identity.clone()));
+        known.accepted.push((digest, identity.clone()));
         Some(identity)
+    }
+
+    /// Is what somebody was let in by still in force? A stream outlives many a change of the file.
+    pub fn stands(&self, identity: &Identity) -> bool {
+        self.refresh();
+        lock(&self.known).book.holds(identity)
     }
 }
 
@@ -242,9 +262,11 @@ mod tests {
         assert!(!kept.contains(token.split_once('.').unwrap().1) && kept.contains("$argon2id$"), "{kept}");
         let tokens = Tokens::open(&file).unwrap();
         assert_eq!(tokens.remembered(&token), None);
-        let bridge = Some(Identity { name: "bridge".into(), role: Role::Pilot });
-        assert_eq!(tokens.verify(&token), bridge);
-        assert_eq!(tokens.remembered(&token), bridge);
+        let bridge = tokens.verify(&token).unwrap();
+        assert_eq!((bridge.name.as_str(), bridge.role), ("bridge", Role::Pilot));
+        assert_eq!(tokens.remembered(&token), Some(bridge.clone()));
+        make(&file, "bench", Role::Viewer).unwrap();
+        assert!(tokens.stands(&bridge), "another token is no reason");
         for wrong in
             ["bridge.", "bridge", "", "nobody.abc", &format!("{token}0"), &token.replace("bridge", "bench")]
         {
@@ -255,6 +277,7 @@ mod tests {
         assert!(make(&file, "a b", Role::Admin).unwrap_err().to_string().contains("hint:"));
         fs::write(&file, "").unwrap();
         assert_eq!(tokens.remembered(&token), None, "revoked without a restart");
+        assert!(!tokens.stands(&bridge), "and whoever is in by it is out");
     }
 
     #[test]

@@ -4,6 +4,7 @@ use std::time::{Duration, Instant, SystemTime};
 
 use kort_proto::events::Before;
 use kort_proto::faults::Fault;
+use kort_proto::limits::Limit;
 use kort_proto::messages::{Request, RequestKind, Trip};
 use kort_proto::transport::{Deployment, Latched, Stood, SupervisorPorts, monotonic_ns};
 
@@ -24,6 +25,9 @@ pub struct Watch {
     /// How it stood when it was last heard.
     pub stood: Stood,
     tripped: Trip,
+    /// What it did when it was last heard armed and not ramped down.
+    driven: Option<Before>,
+    ramping: bool,
     thrust_max_n: f64,
     speed_max_rad_s: f64,
     heard: Option<Instant>,
@@ -49,6 +53,8 @@ impl Watch {
             tried: None,
             stood,
             tripped: Trip::default(),
+            driven: None,
+            ramping: false,
             thrust_max_n: f64::NAN,
             speed_max_rad_s: f64::NAN,
             heard: None,
@@ -82,10 +88,15 @@ impl Watch {
             self.stood.shaft_speed_rad_s =
                 there(telemetry.signals.shaft_speed_rad_s, self.stood.shaft_speed_rad_s);
             self.tripped = telemetry.tripped;
+            if self.stood.armed && !self.ramping {
+                let (thrust_n, shaft_speed_rad_s) = (self.stood.thrust_n, self.stood.shaft_speed_rad_s);
+                self.driven = Some(Before { thrust_n, shaft_speed_rad_s });
+            }
         }
         if let Some(state) = ports.state.latest() {
             beats.controller = true;
             self.stood.controller_faults = state.faults;
+            self.ramping = state.limits & Limit::LeaseRamp.bit() != 0;
             self.thrust_max_n = state.thrust_max_n;
             self.speed_max_rad_s = state.speed_max_rad_s;
         }
@@ -107,7 +118,8 @@ impl Watch {
                 latched.push(Latched {
                     code: fault.code(),
                     since: humantime::format_rfc3339_micros(SystemTime::now()).to_string(),
-                    before: stopped.map(|trip| Before::of(trip.thrust_n, trip.shaft_speed_rad_s)),
+                    before: (self.driven.filter(|_| fault.is_ramped()))
+                        .or(stopped.map(|trip| Before::of(trip.thrust_n, trip.shaft_speed_rad_s))),
                 });
             }
         }

@@ -21,4 +21,4 @@ pub mod settings;
 pub mod tick;
 
 #[cfg(feature = "process")]
-pub use process::{Inherited, ServoError, check, run};
+pub use process::{Inherited, ServoError, check, problems, run};

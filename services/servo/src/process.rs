@@ -68,6 +68,28 @@ pub fn check(config: &Config, id: &str) -> Result<(), ServoError> {
     read(config, id).map(drop)
 }
 
+/// Everything that keeps the servo of this thruster from starting; each names file, key, value and what is allowed.
+pub fn problems(config: &Config, id: &str) -> Vec<ServoError> {
+    let rig = || {
+        let thruster = config.thruster(id)?;
+        let (file, text) = config.rig_text(id, thruster)?;
+        let rig = Rig::from_toml(&text).map_err(|error| ServoError::Rig { file, error })?;
+        Ok::<_, ServoError>((thruster, rig))
+    };
+    let (thruster, rig) = match rig() {
+        Ok(there) => there,
+        Err(error) => return vec![error],
+    };
+    let mut wrong = Vec::new();
+    let settings = Settings::read(config, id, thruster, &rig, &mut wrong);
+    // Bounds that are crossed by a value that is wrong already are told by that one.
+    let settings = settings.err().filter(|_| wrong.is_empty());
+    wrong.extend(settings);
+    wrong.extend(drives::choose(config, id, thruster, &rig).err());
+    wrong.extend(sensors::choose(config, id, thruster).err());
+    wrong.into_iter().map(Into::into).collect()
+}
+
 /// All that the configuration says of the thruster's servo; nothing is opened yet.
 fn read(config: &Config, id: &str) -> Result<(Settings, drives::Chosen, Vec<sensors::Chosen>), ServoError> {
     let thruster = config.thruster(id)?;

@@ -120,9 +120,30 @@ impl Settings {
     /// # Errors
     /// [`ConfigError`] names file, key, value and what is allowed.
     pub fn new(config: &Config, id: &str, thruster: &Thruster, rig: &Rig) -> Result<Self, ConfigError> {
+        let mut wrong = Vec::new();
+        let read = Self::read(config, id, thruster, rig, &mut wrong);
+        match wrong.into_iter().next() {
+            Some(first) => Err(first),
+            None => read,
+        }
+    }
+
+    /// The same, with everything that is wrong with sections and bounds; an error where reading ended.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn read(
+        config: &Config,
+        id: &str,
+        thruster: &Thruster,
+        rig: &Rig,
+        wrong: &mut Vec<ConfigError>,
+    ) -> Result<Self, ConfigError> {
         let section = |part: &str| format!("thrusters.{id}.{part}");
-        let keys: LimitKeys = config.section(&section("limits"), &thruster.limits)?;
-        let checks: CheckKeys = config.section(&section("checks"), &thruster.checks)?;
+        let keys = config.section(&section("limits"), &thruster.limits);
+        let keys: LimitKeys = keys.map_err(|error| wrong.push(error)).unwrap_or_default();
+        let checks = config.section(&section("checks"), &thruster.checks);
+        let checks: CheckKeys = checks.map_err(|error| wrong.push(error)).unwrap_or_default();
         let rig_current_a = Some(rig.amplifier.current_limit_a).filter(|a| a.is_finite()).unwrap_or(10_000.0);
         let rig_supply_v = rig.amplifier.supply_v.filter(|v| v.is_finite()).unwrap_or(10_000.0);
         // Twice the speed at which the back EMF is all of the supply: a stream may drive the shaft beyond that speed.
@@ -204,7 +225,7 @@ impl Settings {
         ];
         for (key, value, low, high, hint) in bounds {
             if let Some(value) = value.filter(|v| !(low..=high).contains(v)) {
-                return Err(config.error(format!(
+                wrong.push(config.error(format!(
                     "`thrusters.{id}.{key}` = {value} is outside {low} to {high}\nhint: {hint}"
                 )));
             }

@@ -1,7 +1,8 @@
 //! What becomes of recordings that are there: they are tagged and deleted.
 
 use std::fs;
-use std::io;
+use std::io::{self, Write};
+use std::path::Path;
 use std::time::Duration;
 
 use kort_proto::events::EventKind;
@@ -92,4 +93,19 @@ impl Recorder {
                 .hint("GET /v1/recordings lists them")
         })
     }
+}
+
+/// Writes `NAME.json`, at once or not at all. On a full disk it is written over where it lies: its block has room for
+/// that, and how a recording ended must outlive this process.
+pub fn write_info(folder: &Path, info: &RecordingInfo) -> io::Result<()> {
+    let (draft, file) =
+        (folder.join(format!(".{}.draft", info.name)), folder.join(format!("{}.json", info.name)));
+    let text = serde_json::to_vec_pretty(info)?;
+    let replaced = fs::write(&draft, &text).and_then(|()| fs::rename(&draft, &file));
+    replaced.or_else(|error| {
+        let _ = fs::remove_file(&draft);
+        let mut there = fs::OpenOptions::new().write(true).open(&file).map_err(|_| error)?;
+        there.write_all(&text)?;
+        there.set_len(text.len() as u64)
+    })
 }

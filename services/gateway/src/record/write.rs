@@ -13,7 +13,8 @@ use kort_proto::messages::Telemetry;
 use kort_proto::signals::{SIGNALS, Signals};
 use kort_recording::LiveMcap;
 
-use super::{ENDING, Recorder, RecordingInfo, RecordingState, Subject, write_info};
+use super::kept::write_info;
+use super::{ENDING, Recorder, RecordingInfo, RecordingState, Subject};
 use crate::settings::RecordingLimits;
 use crate::thin::Thin;
 use crate::thruster::lock;

@@ -70,8 +70,8 @@ pub struct Incoming {
 ///
 /// The client may send `{"setpoint": {"thrust_n": 25.0}, "lease_id": "…"}`; what is refused is answered by one
 /// problem document. `{"stop": true}` stops every thruster and is answered by `{"stopped": [ids]}`. The gateway pings
-/// each second; states that the client does not keep up with are left out, and a client that misses three pings is
-/// closed. A plain GET, without the WebSocket handshake, is answered by one state.
+/// each second; states that the client does not keep up with are left out, and a client that misses three pings, or
+/// whose token was revoked, is closed. A plain GET, without the WebSocket handshake, is answered by one state.
 #[utoipa::path(get, path = "/v1/thrusters/{id}/stream", tag = "thrusters",
     params(("id" = String, Path, description = "Name of the thruster", example = "t1"), Rate),
     responses(
@@ -163,8 +163,11 @@ impl Session {
         }
     }
 
-    /// The next ping, or the end of a client that missed too many.
+    /// The next ping, or the end of a client that missed too many, or whose token is no more.
     fn ask(&mut self) -> Option<Message> {
+        if !self.app.gate().stands(&self.who) {
+            return Some(revoked());
+        }
         if self.asked_at.is_some() {
             self.missed += 1;
             return (self.missed >= MISSED_MAX).then(|| close(1008, "three pings were not answered"));
@@ -209,6 +212,9 @@ impl Session {
     }
 
     async fn command(&mut self, body: &str) -> Result<Option<Message>, Problem> {
+        if !self.app.gate().stands(&self.who) {
+            return Ok(Some(revoked()));
+        }
         let incoming = parse(body)?;
         if self.who.role < Role::Pilot {
             return Err(Problem::new(
@@ -262,6 +268,11 @@ fn why_closed(error: &axum::Error) -> Message {
     } else {
         close(1002, "the message breaks the WebSocket protocol")
     }
+}
+
+/// What let it in is no more.
+fn revoked() -> Message {
+    close(1008, "the token was revoked")
 }
 
 fn close(code: u16, reason: &'static str) -> Message {

@@ -1,0 +1,43 @@
+//! What the state says in the first moments after a kill is as true as later.
+
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+
+use crate::LEASE_MS;
+use crate::common::{self, Stack, kill};
+
+/// Every fault that is ever shown has its time and what was before it, and a gateway that just began does not speak of a
+/// drive that it has not heard.
+#[test]
+fn no_state_is_shown_that_is_not_known_yet() {
+    common::in_real_time(|| {
+        for role in ["servo", "controller", "gateway"] {
+            let mut stack = Stack::start();
+            stack.thrust(80.0, LEASE_MS);
+            kill(stack.process_of(role), "KILL");
+            let killed = Instant::now();
+            let mut faults = 0;
+            while killed.elapsed() < Duration::from_millis(2500) {
+                let Some(state) = stack.state() else { continue };
+                assert!(
+                    !state["age_s"].is_null(),
+                    "{role}: a servo that was never heard is not disarmed: {state}"
+                );
+                for fault in state["faults"].as_array().expect("faults") {
+                    faults += 1;
+                    let thrust = fault["before"]["thrust_n"].as_f64();
+                    assert!(fault["since"].is_string(), "{role}: {fault}");
+                    assert!(thrust.is_some_and(|n| n > 50.0), "{role}: it drove at 80 N: {fault}");
+                }
+            }
+            assert!(faults > 0, "{role}: no fault was shown");
+            let tripped = |event: &&Value| event["kind"] == "tripped";
+            let events = stack.get("/v1/events").expect("events");
+            for event in events.as_array().expect("a list").iter().filter(tripped) {
+                let thrust = event["before"]["thrust_n"].as_f64();
+                assert!(thrust.is_some_and(|n| n > 50.0), "{role}: it drove at 80 N: {event}");
+            }
+        }
+    });
+}
