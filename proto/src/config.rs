@@ -208,7 +208,7 @@ impl Config {
                 )));
             }
             let mut check = |key: &str, value: f64, low: f64, high: f64, hint: &str| {
-                if !(value >= low && value <= high) {
+                if !(low..=high).contains(&value) {
                     wrong.push(fail(format!(
                         "`thrusters.{id}.{key}` = {value} is outside {low} to {high}\nhint: {hint}"
                     )));
