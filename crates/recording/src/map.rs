@@ -179,31 +179,24 @@ impl ColumnMap {
         Self::from_toml(name, text).ok()
     }
 
-    /// A shipped map of a CAN bus as another node has it: what it asks for is its example's, with the identifiers so many
-    /// nodes on. `None` where there is no such node.
-    pub(crate) fn of_node(name: &str, on: i32) -> Option<Self> {
+    /// A shipped map of a CAN bus for this node: the identifiers that it asks for are its example's, of that node. `None`
+    /// for a map of no bus, and where there is no such node.
+    pub(crate) fn of_node(name: &str, node: i32) -> Option<Self> {
         let (_, text) = shipped::ALL.iter().find(|(n, _)| *n == name)?;
-        let example = Self::from_toml(name, text).ok()?;
-        let mut moved = false;
+        let sources = || text.lines().filter(|line| line.starts_with("source = \"0x"));
+        sources().next()?;
         let mut given = Vec::new();
-        for (key, value) in &example.given {
-            let place = format!("{{{key}}}");
-            if !text.lines().any(|line| line.starts_with("source = \"0x") && line.contains(&place)) {
+        for (key, value) in Self::from_toml(name, text).ok()?.given {
+            if !sources().any(|line| line.contains(&format!("{{{key}}}"))) {
                 given.push(format!("{key}={value}"));
                 continue;
             }
             // Three digits are CANopen's: four bits of function, and nodes 1 to 127. Two are a number by themselves.
             let (digits, nodes) = (value.len(), if value.len() == 3 { 1..=0x7F } else { 0..=0xFF });
-            let id = i32::from_str_radix(value, 16).ok()?;
-            let node = (id & nodes.end()) + on;
-            if !nodes.contains(&node) {
-                return None;
-            }
+            let id = i32::from_str_radix(&value, 16).ok().filter(|_| nodes.contains(&node))?;
             given.push(format!("{key}={:0digits$X}", id & !nodes.end() | node));
-            moved = true;
         }
-        let asked = Asked::parse(&given.join(","));
-        moved.then(|| read::map(name, text, Some(&asked)).ok()).flatten()
+        read::map(name, text, Some(&Asked::parse(&given.join(",")))).ok()
     }
 
     /// How it is called for behind `--columns`, with all that it asks for.

@@ -1,7 +1,7 @@
 //! A column map for a log that nobody has mapped yet, from the names and units of its fields. It is shown, never used
 //! unasked: a name is a claim, and a person must check it.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
 use super::survey::Proposal;
@@ -205,8 +205,13 @@ pub(super) fn propose(log: &Log) -> (Proposal, Chosen) {
     let table = log.topics.len() == 1 && log.topics[0].name.is_empty();
     let native = log.topics.iter().any(is_native);
     let shipped: Vec<String> = if log.format == "candump" {
+        let ids = log
+            .topics
+            .iter()
+            .filter_map(|t| i32::from_str_radix(t.name.get(t.name.len().checked_sub(2)?..)?, 16).ok());
+        let nodes: BTreeSet<i32> = ids.flat_map(|id| [id, id & 0x7F]).collect();
         let maps = ColumnMap::shipped()
-            .flat_map(|name| (-0xFF..=0xFF).filter_map(move |on| ColumnMap::of_node(name, on)));
+            .flat_map(|name| nodes.iter().filter_map(move |node| ColumnMap::of_node(name, *node)));
         maps.filter(|map| map.sources().all(|(source, _)| on_bus(source, log)))
             .map(|map| map.call())
             .collect()
