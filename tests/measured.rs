@@ -67,6 +67,30 @@ fn a_brake_moved_in_mid_run_is_found_when_and_where_it_was() {
 }
 
 #[test]
+fn a_clock_that_does_not_begin_at_zero_shifts_what_is_placed_in_time_and_nothing_else() {
+    const SHIFT_S: f64 = 1000.0;
+    let recording = "tests/recordings/rosa-rotor-air-d439.csv";
+    let shifted = format!("{}/rosa-rotor-air-shifted.csv", env!("CARGO_TARGET_TMPDIR"));
+    let shift = |line: &str| match line.split_once(',') {
+        Some((stamp, rest)) if stamp != "t_ms" => {
+            format!("{},{rest}\n", stamp.parse::<f64>().unwrap() + 1000.0 * SHIFT_S)
+        }
+        _ => format!("{line}\n"),
+    };
+    let text: String = std::fs::read_to_string(recording).unwrap().lines().map(shift).collect();
+    std::fs::write(&shifted, text).unwrap();
+
+    let [here, there] = [recording, &shifted].map(|recording| {
+        changes_told(&diagnose(recording, "config/thrusters/rosa-rotor.toml", "rosa-rotor-air"))
+    });
+    assert_eq!(here.len(), there.len(), "{here:?} {there:?}");
+    for (here, there) in here.iter().zip(&there) {
+        assert!((there.1 - here.1 - SHIFT_S).abs() < 0.05, "{here:?} {there:?}");
+        assert!((there.0 - here.0).abs() < 0.05 * here.0.abs(), "{here:?} {there:?}");
+    }
+}
+
+#[test]
 fn a_log_of_commands_alone_says_what_it_lacks_and_that_the_supply_sags() {
     let recording = "tests/recordings/vortex-auv-pool-heave-1.csv";
     let columns = ["--columns", "vortex-auv-pool"];

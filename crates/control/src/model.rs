@@ -201,6 +201,7 @@ impl ControlModel {
             inertia_kg_m2: self.inertia_kg_m2,
             tick_s: self.period_s,
             duration_s,
+            clock_s: [0.0, duration_s],
             angle_recorded: true,
             reverses: true,
         }

@@ -1,7 +1,7 @@
 //! What the posterior comes to: names, rivals, verdict. One pure function; words come later and decide nothing.
 
 use crate::flexible::is_term;
-use crate::posterior::{Explanation, presence};
+use crate::posterior::{Explanation, presence, told};
 use crate::report::Verdict;
 use crate::search::Set;
 
@@ -21,9 +21,9 @@ pub struct Named {
 pub struct Decision {
     /// The outcome.
     pub verdict: Verdict,
-    /// Names, members of the likeliest set each followed by its rivals.
+    /// Names, members of the told set each followed by its rivals.
     pub named: Vec<Named>,
-    /// The nameless term that the likeliest set holds, if it is more likely there than not.
+    /// The nameless term that the told set holds, if any.
     pub term: Option<&'static str>,
 }
 
@@ -37,28 +37,27 @@ const PRACTICAL: f64 = 0.1;
 /// What is known before deciding.
 #[derive(Clone, Debug, Default)]
 pub struct Circumstances {
-    /// Members of the likeliest set that do less than our equations may err by: nothing to state.
+    /// Members of the told set that do less than our equations may err by: nothing to state.
     pub negligible: Vec<&'static str>,
     /// The recordings have too little in them.
     pub thin: bool,
-    /// Members of the likeliest set that do the same all the time: of one operating point they tell one number.
+    /// Members of the told set that do the same all the time: of one operating point they tell one number.
     pub steady: Vec<&'static str>,
     /// The simulation breaks down on the stated rig.
     pub broke_down: bool,
-    /// Share of the squared error above the noise that the likeliest set's names leave.
+    /// Share of the squared error above the noise that the told set's names leave.
     pub left: f64,
     /// Factor on names beside what has no name: a nameless term, or more error than noise.
     pub beside_unknown: f64,
-    /// Whether the likeliest set leaves more than noise of such sensors can be.
+    /// Whether the told set leaves more than noise of such sensors can be.
     pub more_than_noise: bool,
 }
 
 /// Decides from the posterior over sets, likeliest first.
 pub fn decide(explanations: &[Explanation], circumstances: &Circumstances) -> Decision {
     let empty: Set = Vec::new();
-    let best = explanations.first().map_or(&empty, |e| &e.set);
-    let more_likely_than_not = |id: &&str| presence(explanations, id, 1.0) >= 0.5;
-    let term = best.iter().copied().find(|id| is_term(id)).filter(more_likely_than_not);
+    let best = told(explanations).map_or(&empty, |e| &e.set);
+    let term = best.iter().copied().find(|id| is_term(id));
     let stands = |id: &&'static str| !is_term(id) && !circumstances.negligible.contains(id);
     let members: Vec<&'static str> = best.iter().copied().filter(stands).collect();
     // How likely a name is among all that was fitted, and whether it stands in a world that the catalogue holds.
@@ -120,7 +119,7 @@ pub fn decide(explanations: &[Explanation], circumstances: &Circumstances) -> De
 /// to be stated.
 fn rivals(explanations: &[Explanation], best: &Set, member: &str) -> Vec<&'static str> {
     let rest: Vec<&str> = best.iter().copied().filter(|id| *id != member).collect();
-    let likely = explanations.first().map_or(0.0, |e| e.probability);
+    let likely = told(explanations).map_or(0.0, |e| e.probability);
     let mut out = Vec::new();
     for other in explanations {
         let new: Vec<&'static str> = other.set.iter().copied().filter(|id| !best.contains(id)).collect();

@@ -11,6 +11,7 @@ use kort_thruster::rig::Rig;
 
 use crate::decide::Decision;
 use crate::flexible::is_term;
+use crate::load_steps::LOAD_STEPS;
 use crate::report::NextExperiment;
 use crate::search::{Search, Set};
 
@@ -100,7 +101,7 @@ fn why(search: &Search, chosen: &Descriptor, rival: &Descriptor, difference: f64
 /// A real mismatch without a name: the richest signal there is, both ways.
 fn unexplained(search: &Search, decision: &Decision) -> Option<NextExperiment> {
     let term = search.descriptor(decision.term?)?;
-    let why = if term.id == "unknown_shaft_step" {
+    let why = if term.id == LOAD_STEPS.id {
         "with the change in force and without it, current recorded: a load takes the same torque at every level, a drive that loses gain a share of it".to_string()
     } else {
         format!(

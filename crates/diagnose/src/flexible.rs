@@ -141,7 +141,7 @@ macro_rules! term {
         const $const: Descriptor = nameless! {
             id: $id,
             path: Path::$path,
-            what: "a term without a name",
+            what: "a term that bends to anything",
             equation: $equation,
             parameters: $parameters,
             starts: one_start,
@@ -186,7 +186,7 @@ term!(
     Shaft,
     "shaft torque [N m] over time_s",
     free_shaft,
-    |s| heights("N m", 0.1 * s.torque_n_m, [0.0, s.duration_s]),
+    |s| heights("N m", 0.1 * s.torque_n_m, s.clock_s),
     ShaftOverTime
 );
 term!(
@@ -195,7 +195,7 @@ term!(
     Drive,
     "relative addition to the command over time_s",
     commanded,
-    |s| heights("1", 0.1, [0.0, s.duration_s]),
+    |s| heights("1", 0.1, s.clock_s),
     DriveOverTime
 );
 term!(
@@ -240,7 +240,7 @@ term!(
     Sensor,
     "addition to the thrust reading [N] over time_s",
     thrust_measured,
-    |s| heights("N", 0.1 * s.thrust_n, [0.0, s.duration_s]),
+    |s| heights("N", 0.1 * s.thrust_n, s.clock_s),
     SensorOverTime
 );
 
@@ -264,9 +264,6 @@ pub fn expression(term: &Descriptor, values: &[f64]) -> String {
 
 /// What a term enters, and over what.
 pub fn enters(term: &Descriptor) -> (&'static str, &'static str) {
-    if term.id == load_steps::LOAD_STEPS.id {
-        return ("shaft torque [N m]", "time_s");
-    }
     term.equation.split_once(" over ").unwrap_or((term.equation, "time_s"))
 }
 

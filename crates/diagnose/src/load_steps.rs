@@ -43,7 +43,7 @@ pub const LOAD_STEPS: Descriptor = Descriptor {
         id: "unknown_shaft_step",
         path: Path::Shaft,
         what: "a load that changes at instants",
-        equation: "shaft torque [N m] from instants on",
+        equation: "shaft torque [N m] over time_s",
         parameters: specs,
         starts: one_start,
         needs: free_shaft,
@@ -55,13 +55,18 @@ fn specs(scale: &Scale) -> Vec<Spec> {
     let most = scale.torque_n_m;
     let of_change = |k: usize| {
         let size = Spec::strength(SIZES[k], "N m", SMALL * most, -most, most).sigma(0.1 * most);
-        // What it was before and what it is after must both be seen: a load throughout is no change.
-        let [first, last] = [MARGIN, 1.0 - MARGIN].map(|share| share * scale.duration_s);
-        [size, Spec::shape(BEGINNINGS[k], "s", 0.5 * scale.duration_s, first, last)]
+        let [first, last] = within(scale);
+        [size, Spec::shape(BEGINNINGS[k], "s", 0.5 * (first + last), first, last)]
     };
     let [least, usual, longest] = RISE_S;
     let rise = Spec::shape("rise_s", "s", usual, least, longest);
     std::iter::once(rise).chain((0..MOST).flat_map(of_change)).collect()
+}
+
+/// When a change may be: what was before it and what is after it must both be seen, a load throughout is no change.
+fn within(scale: &Scale) -> [f64; 2] {
+    let [from_s, to_s] = scale.clock_s;
+    [MARGIN, 1.0 - MARGIN].map(|share| from_s + share * (to_s - from_s))
 }
 
 /// The load that is tried, as a share of the largest torque.
@@ -106,14 +111,14 @@ pub fn regime(problem: &Problem, fit: &Fit) -> (String, Vec<[f64; 2]>) {
     let members = problem.members(&fit.hypothesis, &fit.values);
     let values =
         members.into_iter().find(|m| m.effect.id == LOAD_STEPS.id).map_or_else(Vec::new, |m| m.values);
-    let spans = spans(&values, problem.scale.duration_s);
+    let spans = spans(&values, problem.scale.clock_s[1]);
     let instants: Vec<String> = spans.iter().map(|span| format!("{:.2} s", span[0])).collect();
     (format!("from t = {} on", instants.join(", ")), spans)
 }
 
-fn spans(values: &[f64], duration_s: f64) -> Vec<[f64; 2]> {
+fn spans(values: &[f64], end_s: f64) -> Vec<[f64; 2]> {
     let changes = in_order(values);
-    let ends = changes.iter().skip(1).map(|c| c[1]).chain([duration_s]);
+    let ends = changes.iter().skip(1).map(|c| c[1]).chain([end_s]);
     changes.iter().zip(ends).map(|(change, end)| [change[1], end]).collect()
 }
 
@@ -134,9 +139,12 @@ fn changes(scale: &Scale, sizes: &[f64], instants: &[f64]) -> Member {
 /// there.
 pub fn promise(problem: &Problem, parent: &Fit) -> Option<(f64, Hypothesis)> {
     let looking = Looking::new(problem, parent);
-    let step_s = problem.scale.duration_s / INSTANTS as f64;
-    let grid: Vec<Change> =
-        (0..INSTANTS).into_par_iter().filter_map(|k| looking.change((k as f64 + 0.5) * step_s)).collect();
+    let [first, last] = within(&problem.scale);
+    let step_s = (last - first) / INSTANTS as f64;
+    let grid: Vec<Change> = (0..INSTANTS)
+        .into_par_iter()
+        .filter_map(|k| looking.change(first + (k as f64 + 0.5) * step_s))
+        .collect();
     let mut changes: Vec<Change> = Vec::new();
     let mut best: Option<(Promise, Vec<f64>)> = None;
     let mut in_vain = 0;
@@ -266,7 +274,7 @@ impl<'a> Looking<'a> {
 
     /// Moves each change to where they leave least together.
     fn place(&self, changes: &mut [Change], step_s: f64) -> Promise {
-        let [first, last] = [MARGIN, 1.0 - MARGIN].map(|share| share * self.problem.scale.duration_s);
+        let [first, last] = within(&self.problem.scale);
         let mut least = self.promise(changes);
         for halving in 1..=HALVINGS {
             let by = step_s * 0.5_f64.powi(halving);

@@ -29,6 +29,17 @@ pub fn posterior(costs: Vec<(Set, f64)>, temper: f64, surprise: f64) -> Vec<Expl
     all
 }
 
+/// The set that is told: the likeliest, unless it needs what has no name and that is no likelier there than not. Then it
+/// is the likeliest that needs nothing without a name.
+pub fn told(explanations: &[Explanation]) -> Option<&Explanation> {
+    let likeliest = explanations.first()?;
+    let term = likeliest.set.iter().find(|id| is_term(id));
+    if term.is_none_or(|term| presence(explanations, term, 1.0) >= 0.5) {
+        return Some(likeliest);
+    }
+    explanations.iter().find(|e| !e.set.iter().any(|id| is_term(id)))
+}
+
 /// Probability that an effect is present: the sum over the sets that hold it, those that need a nameless term
 /// counted by `beside_unknown`.
 pub fn presence(explanations: &[Explanation], effect: &str, beside_unknown: f64) -> f64 {
@@ -58,6 +69,16 @@ mod tests {
         assert!((presence(&all, "a", 0.7) - 0.48).abs() < 1e-12);
         assert!((presence(&all, "b", 0.7) - 0.48).abs() < 1e-12);
         assert!(all[2].probability < 1e-12);
+    }
+
+    #[test]
+    fn what_has_no_name_is_told_where_it_is_likelier_there_than_not() {
+        let at = |cost: f64| {
+            posterior(vec![(vec!["unknown_x"], 0.0), (vec![], cost), (vec!["a"], cost)], 3.0, 0.03)
+        };
+        assert_eq!(told(&at(0.5)).unwrap().set, Set::new());
+        assert_eq!(told(&at(60.0)).unwrap().set, ["unknown_x"]);
+        assert_eq!(told(&[]), None);
     }
 
     #[test]

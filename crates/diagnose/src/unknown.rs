@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use crate::flexible::TERMS;
 use crate::load_steps::{self, LOAD_STEPS};
-use crate::search::{Search, Set};
+use crate::search::{Search, Set, with};
 
 /// Looks for what has no name beside a set, and keeps the sets with it that do better, or as well with fewer
 /// names.
@@ -34,23 +34,20 @@ pub fn look(
     }
 }
 
-/// Terms that are fitted on top of a set at most.
-const EXACT: usize = 3;
-
 /// Fits the terms that promise most on top of a set; the best set with one, if a promise may earn its price.
 fn put_on(search: &mut Search, set: &Set, terms: &[&'static Descriptor]) -> Option<Set> {
     let parent = search.fits.get(set)?.clone();
     let mut promised: Vec<(f64, &'static Descriptor, Hypothesis)> =
         terms.par_iter().filter_map(|term| promise(search, &parent, term)).collect();
-    let near = |cost: &f64| parent.cost() + search.doubt(parent.cost() - cost);
-    promised.retain(|(cost, term, _)| cost + search.price_of(term.id) < near(cost));
-    promised.sort_by(|a, b| a.0.total_cmp(&b.0));
-    promised.truncate(EXACT);
+    let best = promised.iter().map(|p| p.0).fold(f64::INFINITY, f64::min);
+    let doubt = search.doubt(parent.cost() - best);
+    let may = |cost: f64, term: &Descriptor| {
+        cost < best + doubt && cost + search.price_of(term.id) < parent.cost() + doubt
+    };
+    promised.retain(|(cost, term, _)| may(*cost, term));
     let mut larger: Vec<Set> = Vec::new();
     for (_, term, hypothesis) in promised {
-        let mut set = set.clone();
-        set.push(term.id);
-        set.sort_unstable();
+        let set = with(set, term.id);
         search.fit_set(set.clone(), &hypothesis, &parent.columns);
         leave_out_changes(search, &set);
         larger.push(set);

@@ -163,8 +163,8 @@ pub struct Told<'a> {
     pub mismatch: &'a [Mismatch],
     /// What is known without a name.
     pub term: Option<&'a EmpiricalTerm>,
-    /// Whether that term is a load that changes at instants.
-    pub load_changes: bool,
+    /// What that term is, in words.
+    pub without_name: &'a str,
     /// What is left.
     pub remainder: Option<&'a Remainder>,
     /// What to run next.
@@ -241,13 +241,9 @@ pub fn summary(told: &Told) -> String {
                 } else {
                     "removes nothing on held-out data: where to look, and no more".into()
                 };
-                let what = if told.load_changes {
-                    "A load that changes in mid-run"
-                } else {
-                    "A term that bends to anything"
-                };
                 text.push_str(&format!(
-                    " {what} describes it: {} over {}: {} ({held_out}).",
+                    " Described by {}: {} over {}: {} ({held_out}).",
+                    told.without_name,
                     term.enters,
                     term.variables.join(", "),
                     term.expression,

@@ -18,7 +18,7 @@ use crate::left::{self, Rest};
 use crate::load_steps;
 use crate::locate::{self, locate};
 use crate::place;
-use crate::posterior::{Explanation, presence};
+use crate::posterior::{Explanation, presence, told};
 use crate::report::{Alternative, Baseline, Finding, Mismatch, Remainder, Report, SetReport, Verdict};
 use crate::search::{Search, Set};
 use crate::traces::{Traces, traces};
@@ -60,7 +60,7 @@ impl<'a, 'p> Writer<'a, 'p> {
         options: &'a Options,
     ) -> Self {
         let problem = search.problem;
-        let best = explanations.first().map_or_else(Set::new, |e| e.set.clone());
+        let best = told(&explanations).map_or_else(Set::new, |e| e.set.clone());
         let (baseline, last) = (&search.fits[&Set::new()], &search.fits[&best]);
         let held = held_out_rows(problem, &[&last.hypothesis]);
         let floor = scores::noise_floor(problem, &problem.residual(&last.hypothesis, &last.values));
@@ -154,8 +154,8 @@ impl<'a, 'p> Writer<'a, 'p> {
             rows.iter().map(|rows| rows.iter().map(|s| s.true_speed_rad_s).collect()).collect();
 
         let (mut findings, mut mismatch) = (Vec::new(), Vec::new());
-        let told = |id: &&str| decision.term == Some(*id) || decision.named.iter().any(|n| n.effect == *id);
-        let members = self.best.iter().copied().filter(told);
+        let stated = |id: &&str| decision.term == Some(*id) || decision.named.iter().any(|n| n.effect == *id);
+        let members = self.best.iter().copied().filter(stated);
         let empty_cost = self.search.cost(&Set::new());
         for member in members {
             let smaller = self.without(&self.best, member);
@@ -263,7 +263,7 @@ impl<'a, 'p> Writer<'a, 'p> {
             findings: &findings,
             mismatch: &mismatch,
             term: empirical_term.as_ref(),
-            load_changes: decision.term == Some(load_steps::LOAD_STEPS.id),
+            without_name: decision.term.and_then(|id| self.search.descriptor(id)).map_or("", |d| d.what),
             remainder: remainder.as_ref(),
             next: next_experiment.as_ref(),
             baseline: &baseline,
@@ -378,7 +378,11 @@ impl<'a, 'p> Writer<'a, 'p> {
             .map(|(probability, cost, effect)| Alternative {
                 effect: effect.into(),
                 probability,
-                why_not: words::why_not(cost - best_cost, empty_cost - best_cost, self.best.is_empty()),
+                why_not: words::why_not(
+                    (cost - best_cost).max(0.0),
+                    empty_cost - best_cost,
+                    self.best.is_empty(),
+                ),
             })
             .collect()
     }

@@ -69,6 +69,7 @@ fn levels(paper: &Paper, effect: &str) -> Vec<Level> {
         inertia_kg_m2: 0.01,
         tick_s: 0.002,
         duration_s: SETTLE_S,
+        clock_s: [0.0, SETTLE_S],
         angle_recorded: true,
         reverses: true,
     };

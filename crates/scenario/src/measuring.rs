@@ -95,6 +95,7 @@ mod tests {
             inertia_kg_m2: 0.01,
             tick_s: 0.002,
             duration_s: 10.0,
+            clock_s: [0.0, 10.0],
             angle_recorded: true,
             reverses: true,
         }

@@ -271,6 +271,7 @@ pub fn scale(rig: &Rig, p: &Parameters, peak: f64, tick_s: f64, duration_s: f64)
         inertia_kg_m2: p.get(Parameter::InertiaKgM2),
         tick_s,
         duration_s,
+        clock_s: [0.0, duration_s],
         angle_recorded: true,
         reverses: true,
     }

@@ -136,6 +136,7 @@ fn bench(name: &'static str, text: &str) -> Bench {
             inertia_kg_m2: parameters.get(P::InertiaKgM2),
             tick_s: TICK_S,
             duration_s: DURATION_S,
+            clock_s: [0.0, DURATION_S],
             angle_recorded: true,
             reverses: true,
         },

@@ -343,7 +343,7 @@ impl<'a, 'p> Search<'a, 'p> {
 }
 
 /// A set with one more effect.
-fn with(set: &Set, id: &'static str) -> Set {
+pub fn with(set: &Set, id: &'static str) -> Set {
     let mut larger = set.clone();
     larger.push(id);
     larger.sort_unstable();

@@ -64,6 +64,10 @@ pub fn scale(all: &[Prepared], rig: &Rig) -> Scale {
         inertia_kg_m2,
         tick_s: all.first().map_or(0.002, |p| p.tick_s),
         duration_s: all.iter().map(Prepared::duration_s).fold(0.0, f64::max),
+        clock_s: [
+            all.iter().map(|p| p.time_s[0]).fold(f64::INFINITY, f64::min),
+            all.iter().map(|p| p.time_s[p.time_s.len() - 1]).fold(f64::NEG_INFINITY, f64::max),
+        ],
         reverses: goes_astern(all, speed, command),
         angle_recorded: all.iter().all(|p| p.stimulus.ticks.iter().any(|t| t.shaft_angle_rad.is_some())),
     }

@@ -25,6 +25,8 @@ pub struct Scale {
     pub tick_s: f64,
     /// Length of the recording, s.
     pub duration_s: f64,
+    /// First and last instant of the recordings on their own clocks, s: a log need not begin at zero.
+    pub clock_s: [f64; 2],
     /// Whether the shaft angle was recorded, so that what follows it can be kept in phase.
     pub angle_recorded: bool,
     /// Whether command or shaft speed ever went astern.
@@ -50,6 +52,7 @@ impl Scale {
         inertia_kg_m2: 1.0,
         tick_s: 0.002,
         duration_s: 1.0,
+        clock_s: [0.0, 1.0],
         angle_recorded: true,
         reverses: true,
     };

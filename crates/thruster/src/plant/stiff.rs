@@ -5,8 +5,9 @@
 //! extrapolated to order 2 (Deuflhard 1985, SIAM Review 27:505): stable at any stiffness, and what settles
 //! within the tick is followed to where it settles. The derivative may be rough without costing order; it is
 //! taken by differences where the shaft's acceleration leads: from rest, blades that do not turn yet would
-//! show no slope. Whether a plant takes this step is
-//! settled once from the stated rig, so that a response stays smooth in the parameters.
+//! show no slope. The shaft's own is the steeper of there and here: a drive at its limit shows no back-EMF.
+//! Whether a plant takes this step is settled once from the stated rig, so that a response stays smooth in the
+//! parameters.
 
 use super::drive::Course;
 use super::{ANGLE, Balance, FLOW, OWN, Plant, Rub, SPEED, SWIRL, Tick, each};
@@ -25,10 +26,13 @@ const STABLE: f64 = 2.0;
 /// Part of the slower decay that one implicit step may take: the loads go with the square of the speed, and a
 /// straight line through them leads far off where the speed changes by more than itself.
 const RESOLVED: f64 = 0.4;
-/// Part of the faster decay that one implicit step may pass over, for the same reason at a jump from rest.
-const PASSED: f64 = 25.0;
+/// Part of the faster decay, back-EMF and flow together, that one implicit step may pass over, for the same reason
+/// at a jump from rest.
+const PASSED: f64 = 10.0;
 /// Most implicit steps a tick.
 const MOST_STEPS: f64 = 64.0;
+/// Step of differences, as a part of what is moved.
+const DIFFERENCE: f64 = 1e-6;
 
 /// Blade tip speed that bounds a rig whose drive states no limit, m/s: cavitation in water, sound in air.
 const TIP_M_S: (f64, f64) = (25.0, 250.0);
@@ -66,7 +70,7 @@ impl Stiff {
             }
             _ => wet_1_s(&p, top_rad_s),
         };
-        let steps = (slow_1_s * tick_s / RESOLVED).max(fast_1_s * tick_s / PASSED);
+        let steps = (slow_1_s * tick_s / RESOLVED).max((fast_1_s + shaft_1_s) * tick_s / PASSED);
         let steps = steps.ceil().clamp(1.0, MOST_STEPS);
         let rate = (shaft_1_s + fast_1_s) * tick_s;
         (rate > EXPLICIT || rate > STABLE * lightest_share).then_some(Self {
@@ -131,7 +135,11 @@ fn top_speed_rad_s(rig: &Rig, p: &Parameters) -> f64 {
     let tip = if gas { TIP_M_S.1 } else { TIP_M_S.0 } / p.get(P::RadiusM);
     let by_supply = rig.amplifier.supply_v.map_or(f64::INFINITY, |v| v / kt);
     let (_, load_nm_s2) = p.bollard_coefficients();
-    let by_current = (kt * rig.amplifier.current_limit_a / load_nm_s2.max(1e-12)).sqrt();
+    let by_current = match rig.amplifier.kind {
+        // Its speed is as commanded, whatever that takes.
+        AmplifierKind::Speed => f64::INFINITY,
+        _ => (kt * rig.amplifier.current_limit_a / load_nm_s2.max(1e-12)).sqrt(),
+    };
     tip.min(by_supply).min(by_current)
 }
 
@@ -183,7 +191,9 @@ impl<T: Real> Plant<T> {
             let least = from[SPEED].abs();
             if led < 0.0 { led.min(-least) } else { led.max(least) }
         });
-        let slopes = self.slopes(tick, drive, &about, end);
+        let mut slopes = self.slopes(tick, drive, &about, end);
+        let here = self.speed_slope(tick, drive, from, end);
+        slopes.by_speed[SPEED] = slopes.by_speed[SPEED].min(here);
         let mut advance = |from: &[T; N], until: f64, step_s: f64| {
             let mut x = *from;
             let speed = imposed(until);
@@ -222,6 +232,15 @@ impl<T: Real> Plant<T> {
         self.rates::<true, true, N>(x, &at, balance)
     }
 
+    /// Derivative of the shaft's acceleration by its speed, by differences.
+    fn speed_slope<const N: usize>(&self, tick: &Tick, drive: &Course<T>, at: &[T; N], part: f64) -> T {
+        let acceleration = |x: &[T; N]| self.rates_at(tick, drive, x, part, &mut Balance::default())[SPEED];
+        let by = DIFFERENCE * at[SPEED].re().abs().max(1.0);
+        let mut moved = *at;
+        moved[SPEED] = moved[SPEED] + by;
+        (acceleration(&moved) - acceleration(at)) / by
+    }
+
     /// Derivative of the rates by differences about a state.
     fn slopes<const N: usize>(
         &self,
@@ -233,8 +252,9 @@ impl<T: Real> Plant<T> {
         let mut balance = Balance::default();
         let here = self.rates_at(tick, drive, about, part, &mut balance);
         let mut difference = |moves: &dyn Fn(usize) -> bool, least: f64| {
-            let by =
-                each::<T, N>(|i| T::from(if moves(i) { 1e-6 * about[i].re().abs().max(least) } else { 0.0 }));
+            let by = each::<T, N>(|i| {
+                T::from(if moves(i) { DIFFERENCE * about[i].re().abs().max(least) } else { 0.0 })
+            });
             let moved: [T; N] = each(|i| about[i] + by[i]);
             (by, self.rates_at(tick, drive, &moved, part, &mut balance))
         };

@@ -69,6 +69,7 @@ impl Bench {
             inertia_kg_m2: 0.01,
             tick_s: TICK_S,
             duration_s: DURATION_S,
+            clock_s: [0.0, DURATION_S],
             angle_recorded: true,
             reverses: true,
         };

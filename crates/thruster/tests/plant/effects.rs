@@ -148,6 +148,7 @@ fn cogging_has_several_orders_at_once() {
         inertia_kg_m2: INERTIA,
         tick_s: TICK_S,
         duration_s: 10.0,
+        clock_s: [0.0, 10.0],
         angle_recorded: true,
         reverses: true,
     };

@@ -209,3 +209,73 @@ proptest! {
         }
     }
 }
+
+/// A very light shaft on a strong back-EMF, which its drive's limit hides wherever the shaft is led to.
+const BRAKED_AT_ONCE: &str = r#"
+[propeller]
+radius_m = 0.0186
+duct_length_m = 0.0026
+pitch_rad = 0.345
+lift_max = 0.302
+drag_max = 0.413
+[flow]
+density_kg_m3 = 998
+flux_coefficient = 0.3
+added_mass_coefficient = 0.886
+[motor]
+inertia_kg_m2 = 4.44e-9
+torque_constant_nm_a = 0.00255
+winding_resistance_ohm = 0.0206
+[amplifier]
+kind = "voltage"
+supply_v = 4.12
+current_limit_a = 20
+"#;
+
+/// A speed that is set whatever current it takes, where the stated limit would allow a fifth of it.
+const SET_SPEED: &str = r#"
+[propeller]
+radius_m = 0.0367
+duct_length_m = 0.0046
+pitch_rad = 0.77
+lift_max = 1.57
+drag_max = 1.0
+[flow]
+density_kg_m3 = 998
+flux_coefficient = 3.75
+added_mass_coefficient = 3.47
+[motor]
+inertia_kg_m2 = 3.6e-4
+torque_constant_nm_a = 0.0197
+[amplifier]
+kind = "speed"
+supply_v = 16.1
+current_limit_a = 20
+"#;
+
+#[test]
+fn what_a_limit_hides_still_settles_where_a_finer_step_does() {
+    for (text, commands, tick_s) in
+        [(BRAKED_AT_ONCE, [0.13, 1.67, 0.0], 0.02), (SET_SPEED, [490.0, -490.0, 270.0], 0.0013)]
+    {
+        let rig = Rig::from_toml(text).unwrap();
+        let mut parameters = Parameters::<Dual>::lift(&Parameters::stated(&rig));
+        parameters.set(P::LiftMax, Dual::parameter(parameters.get(P::LiftMax).value, 0));
+        let mut plant = Plant::new(ModelName::Model2, &rig, &parameters, &[], tick_s);
+        let mut finer: Plant =
+            Plant::new(ModelName::Model2, &rig, &Parameters::stated(&rig), &[], tick_s / FINER as f64);
+        for command in commands {
+            for _ in 0..100 {
+                plant.step(&Tick { command, ..Tick::default() });
+                (0..FINER).for_each(|_| {
+                    finer.step(&Tick { command, ..Tick::default() });
+                });
+            }
+            let (a, b) = (plant.truth(), finer.truth());
+            let a = [a.thrust_n.value, a.shaft_speed_rad_s.value];
+            assert!((a[0] - b.thrust_n).abs() < 0.01 * b.thrust_n.abs() + 1e-3, "{command}: {a:?} {b:?}");
+            assert!((a[1] - b.shaft_speed_rad_s).abs() < 0.01 * b.shaft_speed_rad_s.abs() + 0.1, "{command}");
+            assert!(plant.truth().thrust_n.slopes()[0].abs() < 100.0 * b.thrust_n.abs() + 1.0, "{command}");
+        }
+    }
+}
