@@ -290,6 +290,7 @@ impl<T: Real> Plant<T> {
         let hooked = blade || !self.balance_hooks.is_empty();
         match (self.stiff, hooked, blade, self.used_states) {
             (Some(stiff), .., ..=OWN) => self.step_stiff::<OWN>(tick, stiff),
+            (Some(stiff), .., ..=SOME) => self.step_stiff::<SOME>(tick, stiff),
             (Some(stiff), ..) => self.step_stiff::<STATES>(tick, stiff),
             (_, false, ..) => self.step_as::<false, false, OWN>(tick),
             (_, _, false, ..=OWN) => self.step_as::<true, false, OWN>(tick),

@@ -143,6 +143,16 @@ fn top_speed_rad_s(rig: &Rig, p: &Parameters) -> f64 {
     tip.min(by_supply).min(by_current)
 }
 
+/// A state, and what moves it.
+#[derive(Clone, Copy)]
+struct Push<T, const N: usize> {
+    x: [T; N],
+    rates: [T; N],
+    /// What each load takes of its rate by the square of its own state.
+    squares: [T; OWN],
+    rub: Rub<T>,
+}
+
 /// Derivative of the rates, as far as it is fast: by shaft speed and axial flow of all states, and of each
 /// other state by itself.
 struct Slopes<T, const N: usize> {
@@ -176,39 +186,30 @@ impl<T: Real> Plant<T> {
         drive: &Course<T>,
         from: &[T; N],
         (start, end): (f64, f64),
-        Stiff { top_rad_s, load_nm_s2, .. }: Stiff,
+        stiff: Stiff,
         balance: &mut Balance<T>,
     ) -> [T; N] {
         let step_s = (end - start) * self.tick_s;
         let imposed = |part: f64| drive.speed_rad_s.map(|(a, b)| a + (b - a) * part);
-        let rates = self.rates_at(tick, drive, from, end, balance);
-        let rub = Rub::of(balance);
-        let mut about = *from;
-        about[SPEED] = imposed(end).unwrap_or_else(|| {
-            let reach = T::from(top_rad_s);
-            let led = from[SPEED] + (rates[SPEED] * step_s).clamp(-reach, reach);
-            // A reversal passes rest, where nothing is fast, but does not stay there.
-            let least = from[SPEED].abs();
-            if led < 0.0 { led.min(-least) } else { led.max(least) }
-        });
-        let mut slopes = self.slopes(tick, drive, &about, end);
-        let here = self.speed_slope(tick, drive, from, end);
-        slopes.by_speed[SPEED] = slopes.by_speed[SPEED].min(here);
-        let mut advance = |from: &[T; N], until: f64, step_s: f64| {
-            let mut x = *from;
-            let speed = imposed(until);
-            x[SPEED] = speed.unwrap_or(x[SPEED]);
+        let mut push = |x: &[T; N], until: f64| {
+            let mut x = *x;
+            x[SPEED] = imposed(until).unwrap_or(x[SPEED]);
             let rates = self.rates_at(tick, drive, &x, until, balance);
             let mut squares = [T::ZERO; OWN];
-            squares[SPEED] = T::from(load_nm_s2) / balance.inertia_kg_m2;
+            squares[SPEED] = T::from(stiff.load_nm_s2) / balance.inertia_kg_m2;
             squares[FLOW] = balance.flux_kg_m / balance.added_mass_kg;
             squares[SWIRL] = self.constants.swirl.flux_kg_m / self.constants.swirl.mass_kg;
-            let rub = rub.mean(Rub::of(balance));
-            slopes.advance(&x, &rates, squares, step_s, rub, speed.is_some())
+            Push { x, rates, squares, rub: Rub::of(balance) }
         };
-        let whole = advance(from, end, step_s);
-        let half = advance(from, 0.5 * (start + end), 0.5 * step_s);
-        let halves = advance(&half, end, 0.5 * step_s);
+        let whole = push(from, end);
+        let slopes = self.slopes_ahead(tick, drive, &whole, (end, step_s), stiff.top_rad_s);
+        let rub = whole.rub;
+        let advance = |push: Push<T, N>, step_s: f64| {
+            slopes.advance(&push, step_s, rub.mean(push.rub), drive.speed_rad_s.is_some())
+        };
+        let half = advance(push(from, 0.5 * (start + end)), 0.5 * step_s);
+        let halves = advance(push(&half, end), 0.5 * step_s);
+        let whole = advance(whole, step_s);
         let mut x: [T; N] = each(|i| halves[i] * 2.0 - whole[i]);
         x[SPEED] = match imposed(end) {
             Some(speed) => speed,
@@ -217,6 +218,34 @@ impl<T: Real> Plant<T> {
             None => x[SPEED],
         };
         x
+    }
+
+    /// Derivative of the rates where the shaft is led, and of its own acceleration also here, whichever is steeper.
+    fn slopes_ahead<const N: usize>(
+        &self,
+        tick: &Tick,
+        drive: &Course<T>,
+        here: &Push<T, N>,
+        (end, step_s): (f64, f64),
+        top_rad_s: f64,
+    ) -> Slopes<T, N> {
+        let mut about = here.x;
+        if drive.speed_rad_s.is_some() {
+            return self.slopes(tick, drive, &about, end);
+        }
+        let reach = T::from(top_rad_s);
+        let led = about[SPEED] + (here.rates[SPEED] * step_s).clamp(-reach, reach);
+        // A reversal passes rest, where nothing is fast, but does not stay there.
+        let least = about[SPEED].abs();
+        about[SPEED] = if led < 0.0 { led.min(-least) } else { led.max(least) };
+        let mut slopes = self.slopes(tick, drive, &about, end);
+
+        let by = DIFFERENCE * here.x[SPEED].re().abs().max(1.0);
+        let mut moved = here.x;
+        moved[SPEED] = moved[SPEED] + by;
+        let there = self.rates_at(tick, drive, &moved, end, &mut Balance::default());
+        slopes.by_speed[SPEED] = slopes.by_speed[SPEED].min((there[SPEED] - here.rates[SPEED]) / by);
+        slopes
     }
 
     /// Rates at a state under the inputs `part` of the tick after its start.
@@ -230,15 +259,6 @@ impl<T: Real> Plant<T> {
     ) -> [T; N] {
         let at = self.local_at(x, self.current_at(tick, drive, part, x[SPEED]), part, tick);
         self.rates::<true, true, N>(x, &at, balance)
-    }
-
-    /// Derivative of the shaft's acceleration by its speed, by differences.
-    fn speed_slope<const N: usize>(&self, tick: &Tick, drive: &Course<T>, at: &[T; N], part: f64) -> T {
-        let acceleration = |x: &[T; N]| self.rates_at(tick, drive, x, part, &mut Balance::default())[SPEED];
-        let by = DIFFERENCE * at[SPEED].re().abs().max(1.0);
-        let mut moved = *at;
-        moved[SPEED] = moved[SPEED] + by;
-        (acceleration(&moved) - acceleration(at)) / by
     }
 
     /// Derivative of the rates by differences about a state.
@@ -263,11 +283,12 @@ impl<T: Real> Plant<T> {
             each(|i| (there[i] - here[i]) / by[place])
         };
         let (by_speed, by_flow) = (column(SPEED, 1.0), column(FLOW, 0.1));
-        // The others all at once: what they do to each other is left to be followed.
-        let (by, there) = difference(&|i| i > ANGLE, 0.1);
-        let mut by_itself: [T; N] = each(|i| if i > ANGLE { (there[i] - here[i]) / by[i] } else { T::ZERO });
-        for slope in &mut by_itself {
-            *slope = slope.min(T::ZERO);
+        let mut by_itself = [T::ZERO; N];
+        if N > OWN || self.model == ModelName::RotationalFlow {
+            // The others all at once: what they do to each other is left to be followed.
+            let (by, there) = difference(&|i| i > ANGLE, 0.1);
+            by_itself =
+                each(|i| if i > ANGLE { ((there[i] - here[i]) / by[i]).min(T::ZERO) } else { T::ZERO });
         }
         Slopes { by_speed, by_flow, by_itself }
     }
@@ -277,9 +298,7 @@ impl<T: Real, const N: usize> Slopes<T, N> {
     /// One linearly implicit step, with dry friction at its end: `(1 - h J) (x1 - x) = h x'`.
     fn advance(
         &self,
-        x: &[T; N],
-        rates: &[T; N],
-        squares: [T; OWN],
+        Push { x, rates, squares, .. }: &Push<T, N>,
         step_s: f64,
         rub: Rub<T>,
         imposed: bool,
