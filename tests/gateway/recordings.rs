@@ -50,6 +50,9 @@ fn a_recording_holds_its_context_and_is_deleted_by_name() {
     common::in_real_time(|| {
         let mut stack = Stack::start_at(Site::new().with_t2());
         let port = stack.site.port;
+        let nobody = send(port, "POST", "/v1/recordings", &[JSON], b"{}");
+        assert_problem(&nobody, 422, "invalid-field", "of two thrusters neither is meant");
+        assert_eq!(nobody.json()["allowed"], json!(["t1", "t2"]));
         for (thruster, name) in [("t1", "one"), ("t2", "two")] {
             let body = json!({"thruster": thruster, "name": name, "rate_hz": 200}).to_string();
             assert_eq!(send(port, "POST", "/v1/recordings", &[JSON], body.as_bytes()).status, 201);

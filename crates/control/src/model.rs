@@ -202,7 +202,7 @@ impl ControlModel {
             tick_s: self.period_s,
             duration_s,
             clock_s: [0.0, duration_s],
-            angle_recorded: true,
+            angle_known: true,
             reverses: true,
         }
     }

@@ -22,8 +22,8 @@ use crate::nameless::nameless;
 
 /// Most changes in a recording.
 const MOST: usize = 4;
-/// Instants of the grid.
-const INSTANTS: usize = 40;
+/// Instants of the grid: a change begun a third of a second off shows little, so no coarser.
+const INSTANTS: usize = 80;
 /// Share of the recording before the first change, and after the last, at least.
 const MARGIN: f64 = 0.02;
 /// How long a change takes, s: least (long against a tick), usually, and most.
@@ -139,11 +139,11 @@ fn changes(scale: &Scale, sizes: &[f64], instants: &[f64]) -> Member {
 /// there.
 pub fn promise(problem: &Problem, parent: &Fit) -> Option<(f64, Hypothesis)> {
     let looking = Looking::new(problem, parent);
-    let [first, last] = within(&problem.scale);
-    let step_s = (last - first) / INSTANTS as f64;
+    let [from_s, to_s] = problem.scale.clock_s;
+    let step_s = (to_s - from_s) / INSTANTS as f64;
     let grid: Vec<Change> = (0..INSTANTS)
         .into_par_iter()
-        .filter_map(|k| looking.change(first + (k as f64 + 0.5) * step_s))
+        .filter_map(|k| looking.change(from_s + (k as f64 + 0.5) * step_s))
         .collect();
     let mut changes: Vec<Change> = Vec::new();
     let mut best: Option<(Promise, Vec<f64>)> = None;

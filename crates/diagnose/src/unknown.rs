@@ -24,26 +24,30 @@ pub fn look(
 ) {
     let terms: Vec<&'static Descriptor> =
         TERMS.iter().copied().filter(|t| (t.needs)(rig, offered).is_ok()).collect();
-    let Some(beside) = put_on(search, best, &terms) else { return };
-    // Names that only stood for it, and names that show once it is there.
-    search.refine(&beside);
+    let beside = put_on(search, best, &terms, best);
+    if let Some(beside) = &beside {
+        // Names that only stood for it, and names that show once it is there.
+        search.refine(beside);
+    }
+    // Where nothing pays on top of the names, only what does about as well as they do can stand in their place.
+    let place = if beside.is_some() { Set::new() } else { best.clone() };
     if !best.is_empty()
-        && let Some(alone) = put_on(search, &Set::new(), &terms)
+        && let Some(alone) = put_on(search, &Set::new(), &terms, &place)
     {
         search.climb(alone, progress);
     }
 }
 
-/// Fits the terms that promise most on top of a set; the best set with one, if a promise may earn its price.
-fn put_on(search: &mut Search, set: &Set, terms: &[&'static Descriptor]) -> Option<Set> {
+/// Fits the terms that promise most on top of a set; the best set with one, if a promise may earn its price and do as
+/// well as what is to be beaten.
+fn put_on(search: &mut Search, set: &Set, terms: &[&'static Descriptor], beaten: &Set) -> Option<Set> {
     let parent = search.fits.get(set)?.clone();
     let mut promised: Vec<(f64, &'static Descriptor, Hypothesis)> =
         terms.par_iter().filter_map(|term| promise(search, &parent, term)).collect();
     let best = promised.iter().map(|p| p.0).fold(f64::INFINITY, f64::min);
     let doubt = search.doubt(parent.cost() - best);
-    let may = |cost: f64, term: &Descriptor| {
-        cost < best + doubt && cost + search.price_of(term.id) < parent.cost() + doubt
-    };
+    let most = search.cost(beaten).min(parent.cost()) + doubt;
+    let may = |cost: f64, term: &Descriptor| cost < best + doubt && cost + search.price_of(term.id) < most;
     promised.retain(|(cost, term, _)| may(*cost, term));
     let mut larger: Vec<Set> = Vec::new();
     for (_, term, hypothesis) in promised {

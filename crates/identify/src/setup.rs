@@ -7,7 +7,7 @@ use kort_thruster::parameters::Parameters;
 use kort_thruster::rig::Rig;
 
 use crate::checks;
-use crate::data::{DataError, Driving, Prepared, Response, Series, possible_drivers, spread};
+use crate::data::{DataError, Driving, Prepared, Response, Series, counted_angle, possible_drivers, spread};
 use crate::excerpt;
 use crate::held;
 use crate::hypothesis::{Hypothesis, Inputs, UNSTATED_TOL, nothing_stated};
@@ -94,6 +94,15 @@ impl<'a> Setup<'a> {
                 prepared.time_s.iter().zip(&mut rows).for_each(|(t, m)| *m |= *t < until);
             }
             masked.push(rows);
+        }
+        let counted = |(one, prepared): (&Series, &Prepared)| {
+            prepared.driving != Driving::Speed && counted_angle(one, rig).is_some()
+        };
+        if series.iter().zip(&recordings).any(counted) {
+            notes.push(
+                "the shaft angle is not recorded: what follows it is looked for at the angle counted from the recorded speed"
+                    .into(),
+            );
         }
         if nothing_stated(rig) {
             notes.push(format!(

@@ -70,7 +70,7 @@ fn levels(paper: &Paper, effect: &str) -> Vec<Level> {
         tick_s: 0.002,
         duration_s: SETTLE_S,
         clock_s: [0.0, SETTLE_S],
-        angle_recorded: true,
+        angle_known: true,
         reverses: true,
     };
     // Twice the size at which a fit would start: a few percent of the loads.

@@ -96,7 +96,7 @@ mod tests {
             tick_s: 0.002,
             duration_s: 10.0,
             clock_s: [0.0, 10.0],
-            angle_recorded: true,
+            angle_known: true,
             reverses: true,
         }
     }

@@ -272,7 +272,7 @@ pub fn scale(rig: &Rig, p: &Parameters, peak: f64, tick_s: f64, duration_s: f64)
         tick_s,
         duration_s,
         clock_s: [0.0, duration_s],
-        angle_recorded: true,
+        angle_known: true,
         reverses: true,
     }
 }

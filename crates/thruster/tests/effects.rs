@@ -137,7 +137,7 @@ fn bench(name: &'static str, text: &str) -> Bench {
             tick_s: TICK_S,
             duration_s: DURATION_S,
             clock_s: [0.0, DURATION_S],
-            angle_recorded: true,
+            angle_known: true,
             reverses: true,
         },
         rig,

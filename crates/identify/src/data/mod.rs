@@ -8,6 +8,7 @@ use crate::refuse;
 mod channel;
 mod columns;
 mod command;
+mod counted;
 mod driving;
 mod error;
 mod fill;
@@ -17,6 +18,7 @@ mod start;
 
 pub use channel::{Channel, rates};
 pub use columns::{KNOWN, possible_drivers, spread};
+pub use counted::counted_angle;
 pub use error::DataError;
 pub use pauses::pause_s;
 pub use scale::{COLUMN, available, scale};
@@ -318,7 +320,8 @@ impl Prepared {
         let mut pauses = self.pauses().into_iter().peekable();
         let ambient = series.column("ambient_m_s").map(filled);
         let supply = series.column("supply_v").map(filled);
-        let angle = series.column("shaft_angle_rad").map(filled);
+        let recorded_angle = series.column("shaft_angle_rad").map(filled);
+        let angle = recorded_angle.clone().or_else(|| counted_angle(series, rig));
         let depth = series.column("depth_m").map(filled);
         let temperature = series.column("temperature_c").map(filled);
         // A speed without its sign would pull the shaft the wrong way.
@@ -358,7 +361,7 @@ impl Prepared {
                 temperature_c: temperature.as_deref().map(|d| at(d, time_s)),
                 extra: 0.0,
                 released: enabled.as_deref().is_some_and(|e| e[row] < 0.5),
-                observed_angle_rad: angle.as_deref().map(|a| at(a, next_s)),
+                observed_angle_rad: recorded_angle.as_deref().map(|a| at(a, next_s)),
                 observed_speed_rad_s: measured_speed.as_deref().map(|s| at(s, next_s)),
                 course: Course::Any,
             });

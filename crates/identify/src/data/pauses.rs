@@ -15,6 +15,12 @@ pub fn pause_s(time_s: &[f64]) -> f64 {
     SILENT_S.max(INTERVALS * median_interval(time_s))
 }
 
+/// Whether a log ever paused.
+pub(super) fn has_paused(time_s: &[f64]) -> bool {
+    let most_s = pause_s(time_s);
+    time_s.windows(2).any(|t| t[1] - t[0] > most_s)
+}
+
 /// Control ticks that nobody looks at.
 pub(super) struct Pause {
     /// The first row after it.

@@ -1,6 +1,6 @@
 //! Sizes in use, and what recordings offer to effects.
 
-use kort_thruster::effects::{Available, Scale};
+use kort_thruster::effects::{ANGLE_KNOWN, Available, Scale};
 use kort_thruster::models::ModelName;
 use kort_thruster::rig::{AmplifierKind, Rig};
 
@@ -69,8 +69,13 @@ pub fn scale(all: &[Prepared], rig: &Rig) -> Scale {
             all.iter().map(|p| p.time_s[p.time_s.len() - 1]).fold(f64::NEG_INFINITY, f64::max),
         ],
         reverses: goes_astern(all, speed, command),
-        angle_recorded: all.iter().all(|p| p.stimulus.ticks.iter().any(|t| t.shaft_angle_rad.is_some())),
+        angle_known: angle_known(all),
     }
+}
+
+/// Whether every recording holds the shaft angle, or a speed that it was counted from.
+fn angle_known(all: &[Prepared]) -> bool {
+    all.iter().all(|p| p.stimulus.ticks.iter().any(|t| t.shaft_angle_rad.is_some()))
 }
 
 /// Whether command or shaft speed ever went astern by more than a trifle.
@@ -97,6 +102,9 @@ pub fn available(model: ModelName, series: &[Series], all: &[Prepared]) -> Avail
         .collect();
     if all.iter().any(|p| p.extra.is_some()) {
         columns.push(COLUMN.into());
+    }
+    if angle_known(all) {
+        columns.push(ANGLE_KNOWN.into());
     }
     columns.sort();
     columns.dedup();

@@ -2,7 +2,7 @@
 
 use super::memory::FirstOrder;
 use super::{
-    Available, Descriptor, Effect, Hooks, Path, Scale, Spec, angle_recorded, one_start, speed_measured,
+    Available, Descriptor, Effect, Hooks, Path, Scale, Spec, angle_known, one_start, speed_measured,
 };
 use crate::plant::{Sensed, Tick};
 use crate::real::Real;
@@ -47,7 +47,7 @@ fn parameters(_: &Scale) -> Vec<Spec> {
 
 fn needs(rig: &Rig, available: &Available) -> Result<(), &'static str> {
     speed_measured(rig, available)?;
-    angle_recorded(rig, available)
+    angle_known(rig, available)
 }
 
 struct Eccentricity<T> {

@@ -199,8 +199,8 @@ mod needs;
 mod spec;
 
 pub use needs::{
-    Available, EXTRA, always, angle_recorded, commanded, flow_measured, free_shaft, geared, speed_measured,
-    thrust_measured, wet,
+    ANGLE_KNOWN, Available, EXTRA, always, angle_known, commanded, flow_measured, free_shaft, geared,
+    speed_measured, thrust_measured, wet,
 };
 pub use spec::{Scale, Spec, Stretch};
 

@@ -29,6 +29,9 @@ impl Available {
 /// Name under which [`Available`] lists a recorded signal laid into [`Tick::extra`].
 pub const EXTRA: &str = "extra";
 
+/// Name under which [`Available`] lists that the shaft angle is known: recorded, or counted from the recorded speed.
+pub const ANGLE_KNOWN: &str = "shaft angle";
+
 /// Can always be fitted.
 pub fn always(_: &Rig, _: &Available) -> Result<(), &'static str> {
     Ok(())
@@ -84,12 +87,16 @@ pub fn speed_measured(_: &Rig, available: &Available) -> Result<(), &'static str
     }
 }
 
-/// Needs the recorded shaft angle: an integrated model speed loses the phase within seconds.
-pub fn angle_recorded(_: &Rig, available: &Available) -> Result<(), &'static str> {
-    if available.has("shaft_angle_rad") {
+/// Needs the shaft angle, or a recorded speed to count it from: an integrated model speed loses the phase within
+/// seconds.
+pub fn angle_known(_: &Rig, available: &Available) -> Result<(), &'static str> {
+    if available.has(ANGLE_KNOWN) {
         Ok(())
     } else {
-        Err("the shaft angle is not recorded, so what follows the angle cannot be kept in phase")
+        Err(
+            "the shaft angle is not recorded and cannot be counted from a recorded speed, so what follows the angle \
+             cannot be kept in phase",
+        )
     }
 }
 

@@ -24,7 +24,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: |scale| {
         let mean = 0.06 * scale.torque_n_m;
-        if !scale.angle_recorded {
+        if !scale.angle_known {
             return vec![vec![mean, 0.0, 0.0, 0.0, 0.0]];
         }
         vec![vec![mean, 0.4, 0.4, 0.1, 0.1], vec![mean, -0.4, -0.4, 0.1, 0.1]]
@@ -39,13 +39,13 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     }),
 };
 
-/// Where no angle was recorded, a simulated one loses the phase within seconds: only the mean is left, which dry
+/// Where no angle is known, a simulated one loses the phase within seconds: only the mean is left, which dry
 /// friction has too.
 fn parameters(scale: &Scale) -> Vec<Spec> {
     let torque = scale.torque_n_m;
     let wave = |name| {
         let spec = Spec::shape(name, "1", 0.3, -2.0, 2.0).prior(0.0, 0.5);
-        if scale.angle_recorded { spec } else { Spec { start: 0.0, held: true, ..spec } }
+        if scale.angle_known { spec } else { Spec { start: 0.0, held: true, ..spec } }
     };
     vec![
         Spec::strength("mean_friction_n_m", "N m", 0.05 * torque, 0.0, torque).sigma(0.1 * torque),

@@ -27,8 +27,8 @@ pub struct Scale {
     pub duration_s: f64,
     /// First and last instant of the recordings on their own clocks, s: a log need not begin at zero.
     pub clock_s: [f64; 2],
-    /// Whether the shaft angle was recorded, so that what follows it can be kept in phase.
-    pub angle_recorded: bool,
+    /// Whether the shaft angle was recorded, or counted from a recorded speed, so that what follows it can be kept in phase.
+    pub angle_known: bool,
     /// Whether command or shaft speed ever went astern.
     pub reverses: bool,
 }
@@ -53,7 +53,7 @@ impl Scale {
         tick_s: 0.002,
         duration_s: 1.0,
         clock_s: [0.0, 1.0],
-        angle_recorded: true,
+        angle_known: true,
         reverses: true,
     };
 }

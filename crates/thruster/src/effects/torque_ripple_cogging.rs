@@ -1,6 +1,6 @@
 //! Torque that varies with the angle of the rotor.
 
-use super::{Available, Context, Descriptor, Effect, Hooks, Path, Scale, Spec, angle_recorded, free_shaft};
+use super::{Available, Context, Descriptor, Effect, Hooks, Path, Scale, Spec, angle_known, free_shaft};
 use crate::plant::{Balance, Local};
 use crate::real::Real;
 use crate::rig::Rig;
@@ -91,7 +91,7 @@ fn starts(scale: &Scale) -> Vec<Vec<f64>> {
 
 fn needs(rig: &Rig, available: &Available) -> Result<(), &'static str> {
     free_shaft(rig, available)?;
-    angle_recorded(rig, available)
+    angle_known(rig, available)
 }
 
 /// Orders at which nothing acts, and nothing is asked how it would, are left out.

@@ -70,7 +70,7 @@ impl Bench {
             tick_s: TICK_S,
             duration_s: DURATION_S,
             clock_s: [0.0, DURATION_S],
-            angle_recorded: true,
+            angle_known: true,
             reverses: true,
         };
         Self { rig, stimulus: Stimulus { ticks, logs }, scale }

@@ -149,7 +149,7 @@ fn cogging_has_several_orders_at_once() {
         tick_s: TICK_S,
         duration_s: 10.0,
         clock_s: [0.0, 10.0],
-        angle_recorded: true,
+        angle_known: true,
         reverses: true,
     };
     let mut values = vec![0.0; (cogging.parameters)(&scale).len()];

@@ -30,12 +30,12 @@ pub fn routes() -> OpenApiRouter<Arc<App>> {
     OpenApiRouter::new().routes(routes!(list, start, stop)).routes(routes!(fetch, tag, remove))
 }
 
-/// What to record. Every field may be left out, and so may the whole body.
+/// What to record. Every field may be left out where there is one thruster, and so may the whole body.
 #[derive(Default, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 #[schema(example = json!({"thruster": "t1", "name": "step-100-n", "rate_hz": 100}))]
 pub struct RecordingRequest {
-    /// Thruster to record; the first of the configuration if left out.
+    /// Thruster to record; may be left out where there is one alone.
     #[serde(default)]
     thruster: Option<String>,
     /// Name of the recording; made of thruster and time if left out.
@@ -167,8 +167,17 @@ async fn start(
     let tags = check_tags(request.tags)?;
     let rate_hz = request.rate_hz.unwrap_or(RATE_DEFAULT_HZ);
     check_rate(rate_hz)?;
-    let first = || app.thrusters().first().map(|thruster| thruster.id.clone()).unwrap_or_default();
-    let subject = app.subject(&request.thruster.unwrap_or_else(first))?;
+    let thruster = match (request.thruster, app.thrusters()) {
+        (Some(id), _) => id,
+        (None, [alone]) => alone.id.clone(),
+        (None, several) => {
+            let words = format!("missing field `thruster`: there are {}", several.len());
+            return Err(Problem::new(Kind::InvalidField, words)
+                .hint("name one, or record all with POST /v1/recording-sets")
+                .allowed(several.iter().map(|thruster| thruster.id.clone())));
+        }
+    };
+    let subject = app.subject(&thruster)?;
     let recorder = Arc::clone(app.recorder());
     let info = blocking(move || recorder.start(subject, &who, request.name, tags, rate_hz, None)).await??;
     Ok((StatusCode::CREATED, axum::Json(info)))

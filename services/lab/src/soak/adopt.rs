@@ -131,7 +131,8 @@ fn one(loaded: &Loaded, seed: u64) -> Result<Done, SoakError> {
         let rms = |outcome: &Outcome| outcome.scores.get("thrust_rms_n").copied().unwrap_or(f64::NAN);
         let (first, second) = (rms(&before), after.as_ref().map_or(rms(&before), rms));
         let ratio = second / first;
-        let cause = if ratio > WORSE { Some(case.cause(config, &found, second)?) } else { None };
+        let errors = Errors { first, second, told: rms(&told) };
+        let cause = if ratio > WORSE { Some(case.cause(config, &found, errors)?) } else { None };
         done.adoptions.push(Adoption {
             scenario: scenario.name.clone(),
             rig: loaded.rig.name.clone(),
@@ -141,7 +142,7 @@ fn one(loaded: &Loaded, seed: u64) -> Result<Done, SoakError> {
             adopted: found.iter().map(|(known, probability)| Found::of_known(known, *probability)).collect(),
             before: first,
             after: second,
-            truth_told: rms(&told),
+            truth_told: errors.told,
             adaptive: adaptive.as_ref().map(rms),
             ratio,
             cause,
@@ -149,6 +150,14 @@ fn one(loaded: &Loaded, seed: u64) -> Result<Done, SoakError> {
         done.first.push(before);
     }
     Ok(done)
+}
+
+/// Thrust errors of a law, N: with the stated rig, with what was adopted, and told the truth.
+#[derive(Clone, Copy)]
+struct Errors {
+    first: f64,
+    second: f64,
+    told: f64,
 }
 
 impl Case<'_> {
@@ -209,7 +218,7 @@ impl Case<'_> {
         &self,
         config: &ControllerConfig,
         found: &[(KnownEffect, f64)],
-        rms_n: f64,
+        errors: Errors,
     ) -> Result<String, SoakError> {
         let mut best: Option<(f64, &KnownEffect)> = None;
         for (k, (known, _)) in found.iter().enumerate() {
@@ -217,7 +226,7 @@ impl Case<'_> {
                 found.iter().enumerate().filter(|(i, _)| *i != k).map(|(_, f)| f.clone()).collect();
             let outcome = self.run(config, Knows::Rig(&self.adopted(&rest)?))?;
             let without = outcome.scores.get("thrust_rms_n").copied().unwrap_or(f64::INFINITY);
-            if without < best.map_or(rms_n, |(least, _)| least) {
+            if without < best.map_or(errors.second, |(least, _)| least) {
                 best = Some((without, known));
             }
         }
@@ -225,7 +234,14 @@ impl Case<'_> {
             return Ok("no single one of the findings: they err together".into());
         };
         let there = self.drawn.iter().any(|d| d.hooked.0.id == known.effect);
-        let what = if there { "is there, but its size is wrong" } else { "is not there" };
+        let what = match there {
+            false => "is not there".to_owned(),
+            // Right or wrong in size, it does the law no good.
+            true if errors.told > errors.first => {
+                format!("is there, and told the truth the law does worse too ({:.3} N)", errors.told)
+            }
+            true => "is there, but its size is wrong".to_owned(),
+        };
         Ok(format!("{} {what}: without it the error is {without:.3} N", known.effect))
     }
 }
