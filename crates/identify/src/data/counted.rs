@@ -29,12 +29,13 @@ pub fn counted_angle(series: &Series, rig: &Rig) -> Option<Vec<f64>> {
 mod tests {
     use super::*;
 
-    fn series(columns: &[(&str, fn(f64) -> f64)], pause_s: f64) -> Series {
+    /// A column's name, and its value at a time, s.
+    type Column = (&'static str, fn(f64) -> f64);
+
+    fn series(columns: &[Column], pause_s: f64) -> Series {
         let time_s: Vec<f64> =
             (0..400).map(|k| 0.01 * f64::from(k) + if k > 200 { pause_s } else { 0.0 }).collect();
-        let column = |(name, of): &(&str, fn(f64) -> f64)| {
-            ((*name).to_owned(), time_s.iter().map(|t| of(*t)).collect())
-        };
+        let column = |(name, of): &Column| ((*name).to_owned(), time_s.iter().map(|t| of(*t)).collect());
         Series { name: "a".into(), columns: columns.iter().map(column).collect(), time_s }
     }
 
@@ -50,7 +51,7 @@ mod tests {
              [sensors]\nspeed_filter_time_constant_s = 0.05\n",
         )
         .unwrap();
-        let speed: (&str, fn(f64) -> f64) = ("shaft_speed_rad_s", shown);
+        let speed: Column = ("shaft_speed_rad_s", shown);
         let one = series(&[speed], 0.0);
         let angle = counted_angle(&one, &rig).unwrap();
         for (q, t) in angle.iter().zip(&one.time_s) {
@@ -59,7 +60,7 @@ mod tests {
         assert_eq!(counted_angle(&series(&[speed], 100.0), &rig), None, "a pause loses the count");
         assert_eq!(counted_angle(&series(&[speed, ("shaft_angle_rad", f64::sin)], 0.0), &rig), None);
         assert_eq!(counted_angle(&series(&[("thrust_n", f64::sin)], 0.0), &rig), None);
-        let unsigned: [(&str, fn(f64) -> f64); 2] =
+        let unsigned: [Column; 2] =
             [("shaft_speed_rad_s", |t| (30.0 * (2.0 * t).cos()).abs()), ("current_a", |t| (2.0 * t).cos())];
         assert_eq!(counted_angle(&series(&unsigned, 0.0), &rig), None, "a speed without its sign");
     }
