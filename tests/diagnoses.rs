@@ -303,7 +303,7 @@ fn what_cannot_be_diagnosed_is_refused_with_the_reason() {
         refused(json!({"last_s": 60, "with": ["magic"]}), 422, "out-of-range");
         refused(json!({"minutes": 5}), 422, "invalid-field");
         assert_eq!(record("DELETE", None), 200);
-        assert_eq!(record("POST", Some(json!({"name": "mine"}))), 201);
+        assert_eq!(record("POST", Some(json!({"name": "mine", "thruster": "t1"}))), 201);
         refused(json!({"recording": "mine"}), 409, "recording-active");
         assert_eq!(stack.http("GET", "/diagnoses/t1-none", None).unwrap().0, 404);
         assert_eq!(stack.http("DELETE", "/diagnoses/t1-none", None).unwrap().0, 404);
