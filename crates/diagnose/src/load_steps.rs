@@ -22,7 +22,7 @@ use crate::nameless::nameless;
 
 /// Most changes in a recording.
 const MOST: usize = 4;
-/// Instants of the grid: a change begun a third of a second off shows little, so no coarser.
+/// Instants of the grid; from each the true one is found by halving the step.
 const INSTANTS: usize = 80;
 /// Share of the recording before the first change, and after the last, at least.
 const MARGIN: f64 = 0.02;
