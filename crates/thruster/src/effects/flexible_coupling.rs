@@ -1,5 +1,6 @@
 //! A belt, a long shaft or a magnetic coupling between motor and load.
 
+use super::memory::EncoderAhead;
 use super::{Context, Descriptor, Effect, Hooks, Path, Scale, Spec, free_shaft};
 use crate::blade::{Inflow, REFERENCE_RADIUS};
 use crate::parameters::Parameter as P;
@@ -75,6 +76,7 @@ pub(crate) struct Coupling<T> {
     torque_constant_nm_a: T,
     twist_rad: T,
     relative_rad_s: T,
+    encoder: EncoderAhead<T>,
 }
 
 /// The coupling of a rig's two masses ([`crate::rig::Load::TwoMass`]).
@@ -107,6 +109,7 @@ impl<T: Real> Coupling<T> {
             torque_constant_nm_a: context.parameters.get(P::TorqueConstantNmA),
             twist_rad: T::ZERO,
             relative_rad_s: T::ZERO,
+            encoder: EncoderAhead::new(context),
         }
     }
 }
@@ -149,7 +152,8 @@ impl<T: Real> Effect<T> for Coupling<T> {
 
     /// The encoder sits on the motor.
     fn sense(&mut self, _: &Tick, sensed: &mut Sensed<T>) {
-        sensed.shaft_speed_rad_s += self.share * self.relative_rad_s;
-        sensed.shaft_angle_rad += self.share * self.twist_rad;
+        let ahead_rad = self.share * self.twist_rad;
+        sensed.shaft_speed_rad_s += self.encoder.step(ahead_rad, self.share * self.relative_rad_s);
+        sensed.shaft_angle_rad += ahead_rad;
     }
 }

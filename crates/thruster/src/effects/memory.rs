@@ -1,5 +1,6 @@
 //! What effects remember from tick to tick: a past signal, a first-order lag, and both in a row.
 
+use super::Context;
 use crate::real::Real;
 
 /// The past of a signal sampled once a tick. Before the first sample the signal is taken as
@@ -87,6 +88,38 @@ impl<T: Real> FirstOrder<T> {
             self.output = input;
             input + behind * lag_s / tick_s
         }
+    }
+}
+
+/// The measuring chain of an encoder that runs ahead of the shaft by an angle of its own: differenced from tick to tick,
+/// then filtered, as the plant does with the shaft's own angle; its rate itself on a rig that states neither.
+pub(super) struct EncoderAhead<T> {
+    last_rad: T,
+    speed_rad_s: T,
+    /// What a tick leaves of a filter's error; none where nothing is differenced.
+    left: Option<f64>,
+    tick_s: f64,
+}
+
+impl<T: Real> EncoderAhead<T> {
+    /// Level with the shaft.
+    pub fn new(context: &Context<T>) -> Self {
+        let sensors = &context.rig.sensors;
+        let left = match sensors.speed_filter_time_constant_s {
+            Some(lag_s) if lag_s > 0.0 => Some((-context.tick_s / lag_s).exp()),
+            _ => sensors.encoder_counts_per_rev.map(|_| 0.0),
+        };
+        Self { last_rad: T::ZERO, speed_rad_s: T::ZERO, left, tick_s: context.tick_s }
+    }
+
+    /// What is shown on top of the shaft's speed, rad/s, at the end of a tick at which the encoder is so far ahead and
+    /// gains so fast.
+    pub fn step(&mut self, ahead_rad: T, rate_rad_s: T) -> T {
+        let Some(left) = self.left else { return rate_rad_s };
+        let raw = (ahead_rad - self.last_rad) / self.tick_s;
+        self.last_rad = ahead_rad;
+        self.speed_rad_s = raw + (self.speed_rad_s - raw) * left;
+        self.speed_rad_s
     }
 }
 

@@ -16,21 +16,23 @@ impl<T: Real> Plant<T> {
     }
 
     /// At the end of a tick: `Om += w^2 dt e, q += 1.4 w dt e` by the angle's error, `Om += w dt e` by the
-    /// speed's alone. The encoder does not see the angle's pull as motion.
+    /// speed's alone. The error is of what the sensors show: a late encoder, or one on the motor's side of a spring, does not
+    /// say where the shaft is. The encoder does not see the angle's pull as motion.
     #[inline(always)]
     pub(super) fn pull(&mut self, tick: &Tick) {
         let reach = self.observer_rad_s * self.tick_s;
         if reach == 0.0 {
             return;
         }
+        let shown = self.sensed();
         if let Some(angle) = tick.observed_angle_rad {
-            let behind = T::from(angle) - self.x[ANGLE];
+            let behind = T::from(angle) - shown.shaft_angle_rad;
             let by = behind * (1.4 * reach).min(1.0);
             self.x[SPEED] += behind * (reach * self.observer_rad_s);
             self.x[ANGLE] += by;
             self.filters.last_angle_rad += by;
         } else if let Some(speed) = tick.observed_speed_rad_s {
-            let behind = T::from(speed) - self.x[SPEED];
+            let behind = T::from(speed) - shown.shaft_speed_rad_s;
             self.x[SPEED] += behind * reach.min(1.0);
         } else {
             return;

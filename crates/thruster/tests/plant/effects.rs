@@ -185,3 +185,30 @@ fn a_voltage_drive_stops_at_its_supply() {
     let sagging = top(&[("supply_sag", &[4.0, 0.0, 1.0])], None);
     assert!(sagging < 0.999 * free && sagging > 0.8 * free, "{sagging} {free}");
 }
+
+/// A speed is differenced from the encoder's angle and filtered, whatever moves the encoder.
+#[test]
+fn a_motor_that_moves_against_its_load_is_seen_through_the_speed_filter() {
+    let rig = Rig::from_toml(
+        "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = 0.01\ntorque_constant_nm_a = 1.0\n\
+         [sensors]\nspeed_filter_time_constant_s = 0.02\n",
+    )
+    .unwrap();
+    let soft: (&str, &[f64]) = ("flexible_coupling", &[2.0, 0.5, 0.1]);
+    let loose: (&str, &[f64]) = ("gear_backlash", &[0.5, 0.4, 60.0, 0.5]);
+    for effect in [soft, loose] {
+        let mut plant = plant(&rig, &[effect], TICK_S);
+        let (mut filtered, mut last, mut apart) = (0.0, 0.0, 0.0_f64);
+        for k in 0..2000 {
+            let time_s = k as f64 * TICK_S;
+            plant.step(&Tick { time_s, command: (9.0 * time_s).sin(), ..Tick::default() });
+            let seen = plant.sensed();
+            let raw = (seen.shaft_angle_rad - last) / TICK_S;
+            last = seen.shaft_angle_rad;
+            filtered = raw + (filtered - raw) * (-TICK_S / 0.02_f64).exp();
+            assert!((seen.shaft_speed_rad_s - filtered).abs() < 1e-9, "{} {k}", effect.0);
+            apart = apart.max((seen.shaft_speed_rad_s - plant.truth().shaft_speed_rad_s).abs());
+        }
+        assert!(apart > 0.5, "{} moves the encoder: {apart}", effect.0);
+    }
+}

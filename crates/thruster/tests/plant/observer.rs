@@ -81,3 +81,37 @@ fn the_angle_is_a_response_of_a_dry_shaft_from_its_start() {
         assert!((plant.sensed().shaft_angle_rad - wanted).abs() < 1e-9, "{k}");
     }
 }
+
+/// What an effect makes the sensors show says where the shaft is, not that it is elsewhere: under the physics that made
+/// the recording nothing is pulled.
+#[test]
+fn a_recording_of_the_same_effect_pulls_nothing() {
+    let rig = Rig::from_toml(
+        "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = 0.01\ntorque_constant_nm_a = 1.0\n\
+         [sensors]\nspeed_filter_time_constant_s = 0.02\n",
+    )
+    .unwrap();
+    let late: (&str, &[f64]) = ("clock_skew", &[0.0, 0.02, 0.0, 0.0, 0.0]);
+    let soft: (&str, &[f64]) = ("flexible_coupling", &[2.0, 0.5, 0.1]);
+    let loose: (&str, &[f64]) = ("gear_backlash", &[0.5, 0.4, 60.0, 0.5]);
+    for effect in [late, soft, loose] {
+        for by_angle in [true, false] {
+            let mut recorded = plant(&rig, &[effect], TICK_S);
+            let mut ours = plant(&rig, &[effect], TICK_S).with_observer(6.3);
+            for k in 0..2000 {
+                let time_s = k as f64 * TICK_S;
+                let mut tick = Tick { time_s, command: (9.0 * time_s).sin(), ..Tick::default() };
+                recorded.step(&tick);
+                let seen = recorded.sensed();
+                if by_angle {
+                    tick.observed_angle_rad = Some(seen.shaft_angle_rad);
+                } else {
+                    tick.observed_speed_rad_s = Some(seen.shaft_speed_rad_s);
+                }
+                ours.step(&tick);
+                let off = (ours.truth().shaft_angle_rad - recorded.truth().shaft_angle_rad).abs();
+                assert!(off < 1e-9, "{} {by_angle} {k}: {off}", effect.0);
+            }
+        }
+    }
+}
