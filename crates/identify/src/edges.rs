@@ -120,6 +120,23 @@ impl Prepared {
         ((self.time_s[row] - self.time_s[row - 1]) / self.tick_s).round().max(1.0) as usize
     }
 
+    /// What a log that is slower than the control hides of when the drive acted, in words; none where every step of the
+    /// command has its tick.
+    pub fn hidden_between_rows(&self) -> Option<String> {
+        let placed = self.edges.iter().filter(|row| self.ticks_before(**row) > 1);
+        let gaps: Vec<f64> = placed.map(|row| self.time_s[*row] - self.time_s[*row - 1]).collect();
+        if self.driving == Driving::Speed || gaps.is_empty() {
+            return None;
+        }
+        let usual_s = gaps.iter().sum::<f64>() / gaps.len() as f64;
+        Some(format!(
+            "{}: {} of {} steps of the command fall between rows, {usual_s:.3} s apart in the mean; where each lay is fitted, so a delay of the drive within that shows only in part: log the command at the control rate",
+            self.name,
+            gaps.len(),
+            self.edges.len(),
+        ))
+    }
+
     /// Places that are tried for a step: every tick of a log interval, as many in a gap.
     fn places(&self) -> usize {
         let longest = self.edges.iter().map(|row| self.ticks_before(*row)).max().unwrap_or(1);
@@ -183,6 +200,8 @@ mod tests {
     fn a_step_is_looked_for_on_every_tick_of_its_interval_and_all_over_a_gap() {
         let recording = prepared();
         assert_eq!(recording.edges, [50, 150]);
+        let hidden = recording.hidden_between_rows().unwrap();
+        assert!(hidden.contains("2 of 2 steps") && hidden.contains("0.260 s"), "{hidden}");
         let places: Vec<Vec<usize>> = (0..recording.places()).map(|p| recording.edges_at(p)).collect();
         let first: Vec<usize> = places.iter().map(|p| p[0]).collect();
         let in_gap: Vec<usize> = places.iter().map(|p| p[1]).collect();

@@ -141,6 +141,7 @@ impl<'a> Setup<'a> {
             notes.extend(hidden.words(&problem.recordings));
             problem = problem.without(&hidden.rows);
         }
+        notes.extend(problem.recordings.iter().filter_map(Prepared::hidden_between_rows));
         if let Some(name) = telling_column(series, &problem, &baseline) {
             let sizes = spread(series, &name);
             for (one, recording) in series.iter().zip(&mut problem.recordings) {
