@@ -95,6 +95,9 @@ pub(super) fn recorded(available: &Available) -> bool {
     available.supply_sag_share.is_some_and(|share| share > 2.0 * LEAST_SHARE)
 }
 
+/// Least voltage of a supply that powers come from, V.
+const LEAST_V: f64 = 1e-3;
+
 struct SupplySag<T> {
     source_ohm: T,
     recovery_s: T,
@@ -110,7 +113,8 @@ impl<T: Real> Effect<T> for SupplySag<T> {
     }
 
     fn drive(&mut self, _: &Tick, drive: &mut Drive<T>) {
-        drive.supply_v *= self.supply_factor;
+        // A log that begins before its volt meter does says 0.
+        drive.supply_v = (drive.supply_v * self.supply_factor).max(T::from(LEAST_V));
         let winding_v = drive.resistance_ohm * drive.current_a + drive.back_emf_v;
         // Bus and winding exchange power; a braking drive does not lift the bus here.
         let bus_a = (drive.current_a * winding_v).max(T::ZERO) / drive.supply_v;

@@ -173,6 +173,8 @@ impl<T: Real> Plant<T> {
             let h = e.effect.hooks();
             (h.drive || h.sense) && (h.inflow || h.foil || h.balance)
         };
+        // Before anything is measured too: a log that begins with no voltage would stop every drive.
+        let nominal_supply_v = rig.amplifier.supply_v.unwrap_or(f64::INFINITY);
         let lightest_share = effects.iter().map(|e| e.effect.lightest_share()).fold(1.0, f64::min);
         Self {
             model,
@@ -183,7 +185,7 @@ impl<T: Real> Plant<T> {
             sensors: rig.sensors,
             amplifier: rig.amplifier.kind,
             current_limit_a: rig.amplifier.current_limit_a,
-            nominal_supply_v: rig.amplifier.supply_v.unwrap_or(f64::INFINITY),
+            nominal_supply_v,
             tick_s,
             drive_hooks: hooked(|h| h.drive),
             inflow_hooks: hooked(|h| h.inflow),
@@ -198,8 +200,8 @@ impl<T: Real> Plant<T> {
             current_a: T::ZERO,
             time_s: 0.0,
             filters: Filters::still(),
-            sensed: Sensed::default(),
-            supply_v: 0.0,
+            sensed: Sensed { supply_v: T::from(nominal_supply_v), ..Sensed::default() },
+            supply_v: nominal_supply_v,
             true_thrust_n: T::ZERO,
             at: Local::default(),
             last_rates: [[T::ZERO; STATES]; 2],

@@ -44,3 +44,22 @@ fn the_back_emf_is_not_late_by_a_tick() {
         assert!((coarse - fine).abs() < 0.005 * fine, "{lag_s}: {coarse} {fine}");
     }
 }
+
+/// What is shown before the first tick is the stated supply, and a log that begins with no voltage leaves numbers.
+#[test]
+fn the_supply_is_there_before_the_first_tick() {
+    let rig = Rig::from_toml(
+        "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = 0.01\ntorque_constant_nm_a = 1.0\n\
+         winding_resistance_ohm = 5.0\n[amplifier]\nkind = \"voltage\"\nsupply_v = 24.0\n",
+    )
+    .unwrap();
+    let sag: (&str, &[f64]) = ("supply_sag", &[0.5, 0.01, 1.0]);
+    for effects in [&[][..], &[sag]] {
+        let mut plant = plant(&rig, effects, 0.002);
+        assert_eq!(plant.sensed().supply_v, 24.0);
+        plant.step(&Tick { command: 6.0, supply_v: Some(0.0), ..Tick::default() });
+        plant.step(&Tick { time_s: 0.002, command: 6.0, supply_v: Some(24.0), ..Tick::default() });
+        let seen = plant.sensed();
+        assert!(seen.shaft_speed_rad_s.is_finite() && seen.current_a > 0.0, "{seen:?}");
+    }
+}
