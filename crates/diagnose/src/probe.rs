@@ -243,18 +243,8 @@ fn of_form(
             narrowed = model.scaled(free_len(parent), *liveliness);
             &narrowed
         };
-        // From nothing and from the size that was probed. What strikes or sticks is another motion there: weighed by the
-        // noise of the set without it, each blow a little off in time speaks against all of them.
-        let mut probed = DVector::zeros(free.len());
-        if form.len() <= MOST_ALONE {
-            (free_len(parent)..free.len()).for_each(|k| probed[k] = 1.0 / free[k].sigma);
-        }
-        let least = |begin: DVector<f64>| {
-            let found = model.minimise_from(begin, &parent.floor, &free, &values, 0.0);
-            (found.misfit + found.penalty + model.price(&found.noise), found)
-        };
-        let (from_nothing, from_probe) = (least(DVector::zeros(free.len())), least(probed));
-        let (cost, found) = if from_probe.0 < from_nothing.0 { from_probe } else { from_nothing };
+        let found = model.minimise(&parent.floor, &free, &values, 0.0);
+        let cost = found.misfit + found.penalty + model.price(&found.noise);
         (cost, *liveliness, found, free)
     });
     let (cost, liveliness, found, free) = tried.min_by(|a, b| a.0.total_cmp(&b.0))?;

@@ -146,19 +146,6 @@ impl<'a> Quadratic<'a> {
     /// Minimises misfit and priors from the point, where the parameters have these `values`; each step is
     /// damped by `damping`.
     pub fn minimise(&self, floor: &Floor, free: &[Free], values: &[f64], damping: f64) -> Minimum {
-        self.minimise_from(DVector::zeros(free.len()), floor, free, values, damping)
-    }
-
-    /// The same, begun at a step from the point: the noise learnt there weighs the bands otherwise, and a minimum beyond
-    /// may be another one.
-    pub fn minimise_from(
-        &self,
-        begin: DVector<f64>,
-        floor: &Floor,
-        free: &[Free],
-        values: &[f64],
-        damping: f64,
-    ) -> Minimum {
         let n = free.len();
         let z0 = DVector::from_fn(n, |k, _| (values[k] - free[k].mean) / free[k].sigma);
         let at = |step: &DVector<f64>| {
@@ -167,12 +154,12 @@ impl<'a> Quadratic<'a> {
             let penalty = (&z0 + step).norm_squared();
             (powers, noise, penalty)
         };
-        let mut step = begin;
+        let mut step = DVector::zeros(n);
         let (mut powers, mut noise, mut penalty) = at(&step);
         // What holds the whole step back, however many rounds it takes.
         let drag = self.information(&noise).diagonal().add_scalar(1.0) * damping;
         let held_back = |step: &DVector<f64>| step.component_mul(step).dot(&drag);
-        let mut merit = noise.misfit + penalty + held_back(&step);
+        let mut merit = noise.misfit + penalty;
         for _ in 0..ROUNDS {
             let normal = self.information(&noise) + DMatrix::from_diagonal(&drag.add_scalar(1.0));
             let mut gradient = -(&z0 + &step) - drag.component_mul(&step);

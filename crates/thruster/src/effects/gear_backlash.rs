@@ -51,7 +51,7 @@ const MOST_RAD: f64 = 9.0;
 /// When a blow falls moves with the play, and with it every later one: a fit finds its way from a play nearby only.
 fn starts(_: &Scale) -> Vec<Vec<f64>> {
     let plays =
-        std::iter::successors(Some(0.002), |play| Some(play * 1.12)).take_while(|play| *play < MOST_RAD);
+        std::iter::successors(Some(0.002), |play| Some(play * 1.5)).take_while(|play| *play < MOST_RAD);
     plays.flat_map(|play| [0.3, 0.55].map(|share| vec![play, share, 60.0, 0.5])).collect()
 }
 

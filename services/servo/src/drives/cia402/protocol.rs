@@ -32,6 +32,8 @@ const OPERATIONAL: u8 = 0x05;
 
 /// Questions without an answer before the reason is said.
 const ASKED_IN_VAIN: u32 = 10;
+/// Turns of asking that a refusal stands.
+const REFUSED_FOR: u32 = 20;
 /// Time that the drive may take to `operation enabled`, s.
 const ENTERING_S: f64 = 2.0;
 /// Exchanges between two SDO questions while it is driven, and between the edges of a fault reset.
@@ -47,7 +49,7 @@ enum Stage {
     /// All is set; its heartbeat must say that it is in operation.
     Starting,
     Guarded,
-    /// Not to be driven, for a reason that was said.
+    /// Not to be driven, as was said; asked again after a while: a wire that turns a bit of an answer looks like that too.
     Refused,
 }
 
@@ -125,6 +127,7 @@ impl Protocol {
 
     fn refuse(&mut self, words: String, heard: &mut dyn FnMut(Heard)) {
         self.stage = Stage::Refused;
+        self.asked = 0;
         heard(Heard::Unguarded(words));
     }
 
@@ -325,8 +328,11 @@ impl link::Protocol for Protocol {
     }
 
     fn ask(&mut self, out: &mut Vec<u8>, heard: &mut dyn FnMut(Heard)) {
-        if matches!(self.stage, Stage::Guarded | Stage::Refused) {
-            return;
+        match self.stage {
+            Stage::Guarded => return,
+            Stage::Refused if self.asked < REFUSED_FOR => return self.asked += 1,
+            Stage::Refused => self.begin(),
+            Stage::Setup(_) | Stage::Starting => (),
         }
         if self.asked == ASKED_IN_VAIN {
             heard(Heard::Unguarded(match self.stage {
