@@ -193,6 +193,33 @@ mod tests {
         }
     }
 
+    /// A wire that turns a bit of an answer looks like a drive that is not to be driven.
+    #[test]
+    fn a_refused_drive_is_asked_again_after_a_while() {
+        let keys = "port = \"/dev/ttyACM0\"\naddress = 5\nbitrate = 500000";
+        let Ok(Chosen::OnWire(_, mut protocol)) = chosen(keys) else { panic!("on a wire") };
+        let mut said = |bytes: &[u8]| {
+            let (mut out, mut words) = (Vec::new(), Vec::new());
+            let mut heard = |what| {
+                if let crate::link::Heard::Unguarded(why) = what {
+                    words.push(why);
+                }
+            };
+            if bytes.is_empty() {
+                protocol.ask(&mut out, &mut heard);
+            } else {
+                protocol.hear(bytes, &mut heard);
+            }
+            (String::from_utf8_lossy(&out).contains("t6058400010"), words)
+        };
+        assert!(said(&[]).0, "its device type is asked for");
+        // Profile 403 in the place of 402.
+        let (_, words) = said(b"t58584300100093010200\r");
+        assert!(words.iter().any(|why| why.contains("profile 403")), "{words:?}");
+        let silent = (0..100).take_while(|_| !said(&[]).0).count();
+        assert_eq!(silent, 20, "turns of asking that the refusal stands");
+    }
+
     #[test]
     fn each_bad_key_is_named_with_a_hint() {
         for (keys, words) in [
