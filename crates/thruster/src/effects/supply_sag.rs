@@ -95,7 +95,7 @@ pub(super) fn recorded(available: &Available) -> bool {
     available.supply_sag_share.is_some_and(|share| share > 2.0 * LEAST_SHARE)
 }
 
-/// Least voltage of a supply that powers come from, V.
+/// Least bus voltage that a power is divided by, V.
 const LEAST_V: f64 = 1e-3;
 
 struct SupplySag<T> {

@@ -4,7 +4,7 @@ use kort_thruster::effects::{Descriptor, Scale, find};
 use kort_thruster::plant::Tick;
 use kort_thruster::rig::Rig;
 
-use crate::{dry, plant};
+use crate::{dry, dry_filtered, plant};
 
 const TICK_S: f64 = 0.002;
 const INERTIA: f64 = 0.01;
@@ -189,11 +189,7 @@ fn a_voltage_drive_stops_at_its_supply() {
 /// A speed is differenced from the encoder's angle and filtered, whatever moves the encoder.
 #[test]
 fn a_motor_that_moves_against_its_load_is_seen_through_the_speed_filter() {
-    let rig = Rig::from_toml(
-        "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = 0.01\ntorque_constant_nm_a = 1.0\n\
-         [sensors]\nspeed_filter_time_constant_s = 0.02\n",
-    )
-    .unwrap();
+    let rig = dry_filtered();
     let soft: (&str, &[f64]) = ("flexible_coupling", &[2.0, 0.5, 0.1]);
     let loose: (&str, &[f64]) = ("gear_backlash", &[0.5, 0.4, 60.0, 0.5]);
     for effect in [soft, loose] {

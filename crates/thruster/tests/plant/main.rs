@@ -22,6 +22,13 @@ fn dry() -> Rig {
     .expect("a rig")
 }
 
+/// The same, its speed read through a filter of 20 ms.
+fn dry_filtered() -> Rig {
+    let mut rig = dry();
+    rig.sensors.speed_filter_time_constant_s = Some(0.02);
+    rig
+}
+
 /// A plant with effects by name.
 fn plant(rig: &Rig, effects: &[(&str, &[f64])], tick_s: f64) -> Plant {
     let effects: Vec<(&Descriptor, &[f64])> =

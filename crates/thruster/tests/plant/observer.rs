@@ -3,7 +3,7 @@
 use kort_thruster::plant::{Sensed, Tick};
 use kort_thruster::rig::Rig;
 
-use crate::{dry, plant};
+use crate::{dry, dry_filtered, plant};
 
 const TICK_S: f64 = 0.002;
 
@@ -86,11 +86,7 @@ fn the_angle_is_a_response_of_a_dry_shaft_from_its_start() {
 /// the recording nothing is pulled.
 #[test]
 fn a_recording_of_the_same_effect_pulls_nothing() {
-    let rig = Rig::from_toml(
-        "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = 0.01\ntorque_constant_nm_a = 1.0\n\
-         [sensors]\nspeed_filter_time_constant_s = 0.02\n",
-    )
-    .unwrap();
+    let rig = dry_filtered();
     let late: (&str, &[f64]) = ("clock_skew", &[0.0, 0.02, 0.0, 0.0, 0.0]);
     let soft: (&str, &[f64]) = ("flexible_coupling", &[2.0, 0.5, 0.1]);
     let loose: (&str, &[f64]) = ("gear_backlash", &[0.5, 0.4, 60.0, 0.5]);
