@@ -9,13 +9,21 @@ use crate::checks::is_unsigned_speed;
 
 /// Shaft angle at every row, rad, zero at the first: the recorded speed integrated over time, the stated filter's lag
 /// taken back (`y + tau y' = Om`, so `q = int y dt + tau (y - y0)`). None where the angle itself is recorded, and
-/// where no count can be kept: no speed, one without its sign, or a log that paused.
+/// where no count can be kept: no speed, one without its sign, or a log that paused. None too where the shaft usually turns
+/// by more than half a turn from row to row: what repeats once a turn is not sampled twice in it then, and a count over so
+/// many turns has lost its phase.
 pub fn counted_angle(series: &Series, rig: &Rig) -> Option<Vec<f64>> {
     let recorded = series.column("shaft_angle_rad").is_some();
     if recorded || is_unsigned_speed(series) || has_paused(&series.time_s) {
         return None;
     }
     let speed = filled(series.column("shaft_speed_rad_s")?);
+    let mut turns: Vec<f64> =
+        (series.time_s.windows(2).zip(&speed)).map(|(t, y)| (y * (t[1] - t[0])).abs()).collect();
+    turns.sort_by(f64::total_cmp);
+    if turns.get(turns.len() / 2).is_none_or(|usual_rad| *usual_rad > std::f64::consts::PI) {
+        return None;
+    }
     let lag_s = rig.sensors.speed_filter_time_constant_s.unwrap_or(0.0);
     let mut turned = 0.0;
     let rest = series.time_s.windows(2).zip(speed.windows(2)).map(|(t, y)| {
@@ -60,6 +68,8 @@ mod tests {
         assert_eq!(counted_angle(&series(&[speed], 100.0), &rig), None, "a pause loses the count");
         assert_eq!(counted_angle(&series(&[speed, ("shaft_angle_rad", f64::sin)], 0.0), &rig), None);
         assert_eq!(counted_angle(&series(&[("thrust_n", f64::sin)], 0.0), &rig), None);
+        let fast: Column = ("shaft_speed_rad_s", |t| 400.0 + t.sin());
+        assert_eq!(counted_angle(&series(&[fast], 0.0), &rig), None, "four radians from row to row");
         let unsigned: [Column; 2] =
             [("shaft_speed_rad_s", |t| (30.0 * (2.0 * t).cos()).abs()), ("current_a", |t| (2.0 * t).cos())];
         assert_eq!(counted_angle(&series(&unsigned, 0.0), &rig), None, "a speed without its sign");
