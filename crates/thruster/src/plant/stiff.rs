@@ -31,6 +31,9 @@ const RESOLVED: f64 = 0.4;
 const PASSED: f64 = 10.0;
 /// Most implicit steps a tick.
 const MOST_STEPS: f64 = 64.0;
+/// Part of the largest speed and flow that a tick may move them by for one implicit step to do: its error is a part of
+/// that again, and where a plant has settled every step ends at the same place.
+const CALM: f64 = 1e-3;
 /// Step of differences, as a part of what is moved.
 const DIFFERENCE: f64 = 1e-6;
 
@@ -44,9 +47,11 @@ const GAS_KG_M3: f64 = 100.0;
 pub(super) struct Stiff {
     /// Largest shaft speed, rad/s.
     top_rad_s: f64,
+    /// Largest axial flow, m/s: in bollard pull.
+    top_m_s: f64,
     /// Blade torque over its square, N m s^2; zero without blades.
     load_nm_s2: f64,
-    /// Steps a tick: as many as its slower decay asks for.
+    /// Steps a tick that moves: as many as its slower decay asks for.
     steps: usize,
 }
 
@@ -75,6 +80,7 @@ impl Stiff {
         let rate = (shaft_1_s + fast_1_s) * tick_s;
         (rate > EXPLICIT || rate > STABLE * lightest_share).then_some(Self {
             top_rad_s,
+            top_m_s: if rig.propeller.is_some() { bollard_flow_m_s(&p, top_rad_s) } else { 0.0 },
             load_nm_s2: if rig.propeller.is_some() { p.bollard_coefficients().1 } else { 0.0 },
             steps: steps as usize,
         })
@@ -107,15 +113,20 @@ fn wet_1_s(p: &Parameters, speed_rad_s: f64) -> (f64, f64) {
 /// Decay of the swirl in bollard pull, washed out and resisted by the blades, 1/s.
 fn swirl_1_s(p: &Parameters, speed_rad_s: f64) -> f64 {
     let (row, swirl) = (BladeRow::new(p), Swirl::new(p));
-    let (thrust, _) = p.bollard_coefficients();
-    let flux = p.get(P::FluxCoefficient) * p.get(P::DensityKgM3) * p.area_m2();
-    let flow = speed_rad_s * (thrust / flux).max(0.0).sqrt();
+    let flow = bollard_flow_m_s(p, speed_rad_s);
     let rate = |us: f64| {
         let load = row.load(row.lever_m * speed_rad_s - us, flow);
         swirl.acceleration(load.torque_n_m, flow, us, 0.0)
     };
     let by = 1e-6 * row.lever_m * speed_rad_s;
     ((rate(by) - rate(0.0)) / by).abs()
+}
+
+/// Axial flow in bollard pull, m/s.
+fn bollard_flow_m_s(p: &Parameters, speed_rad_s: f64) -> f64 {
+    let (thrust, _) = p.bollard_coefficients();
+    let flux = p.get(P::FluxCoefficient) * p.get(P::DensityKgM3) * p.area_m2();
+    speed_rad_s * (thrust / flux).max(0.0).sqrt()
 }
 
 /// The largest eigenvalue of a matrix by size.
@@ -166,10 +177,12 @@ impl<T: Real> Plant<T> {
         let drive = self.drive_over(tick);
         let mut balance = Balance::default();
         let mut x: [T; N] = each(|i| self.x[i]);
-        let part = 1.0 / stiff.steps as f64;
-        for step in 0..stiff.steps {
+        let calm = N == OWN && stiff.steps > 1 && self.is_calm(tick, &drive, &x, stiff);
+        let steps = if calm { 1 } else { stiff.steps };
+        let part = 1.0 / steps as f64;
+        for step in 0..steps {
             let from = step as f64 * part;
-            let until = if step + 1 == stiff.steps { 1.0 } else { from + part };
+            let until = if step + 1 == steps { 1.0 } else { from + part };
             x = self.stiff_part(tick, &drive, &x, (from, until), stiff, &mut balance);
         }
         let current = self.current_at(tick, &drive, 1.0, x[SPEED]);
@@ -177,6 +190,13 @@ impl<T: Real> Plant<T> {
         self.rates::<true, true, N>(&x, &end, &mut balance);
         self.moving = false;
         self.arrive(tick, &x, end, &balance);
+    }
+
+    /// Whether a tick hardly moves the shaft and the water.
+    fn is_calm<const N: usize>(&self, tick: &Tick, drive: &Course<T>, x: &[T; N], stiff: Stiff) -> bool {
+        let rates = self.rates_at(tick, drive, x, 1.0, &mut Balance::default());
+        let moves = |place: usize, top: f64| rates[place].re().abs() * self.tick_s > CALM * top;
+        !moves(SPEED, stiff.top_rad_s) && !moves(FLOW, stiff.top_m_s)
     }
 
     /// One extrapolated step between two parts of the tick.
