@@ -22,7 +22,7 @@ pub struct Criterion {
     pub own_form_error: f64,
     /// Most independent facts about a frequency of a channel, in all recordings.
     pub facts_a_band: f64,
-    /// Standard deviation of time stamps, s.
+    /// Standard deviation of time stamps at most, s.
     pub timing_s: f64,
 }
 
@@ -88,7 +88,8 @@ impl Floor {
             starts = !band.continues;
             moving = moving.max(band.signal * band.hz * band.hz);
             let form = criterion.form_error.powi(2) * moving / (band.hz * band.hz);
-            let timing_s = criterion.timing_s.hypot(band.stale_s);
+            // Rows stand in order: their stamps are off by less than an instant anywhere in a row would be.
+            let timing_s = criterion.timing_s.min(band.row_s / 12.0_f64.sqrt()).hypot(band.stale_s);
             let timing = (std::f64::consts::TAU * band.hz * timing_s).powi(2) * band.signal;
             floor.push(band.quantisation + form + timing + ROUNDING);
         }
@@ -164,6 +165,7 @@ mod tests {
                 alike: 10,
                 signal: if k == 3 { 1.0 } else { 1e-12 },
                 quantisation: 0.0,
+                row_s: 0.01,
                 stale_s: 0.0,
                 continues: k < 11,
             })
@@ -176,6 +178,19 @@ mod tests {
         assert!(floor.0[2] < 1e-12, "{:?}", floor.0);
         assert!((floor.0[3] / 1e-4 - 1.0).abs() < 0.01);
         assert!((floor.0[5] / floor.0[3] * 1.585_f64.powi(4) - 1.0).abs() < 0.01);
+    }
+
+    #[test]
+    fn stamps_of_a_fast_log_are_doubted_by_no_more_than_a_row() {
+        let level = |row_s: f64| {
+            let bands: Vec<Band> = bands().into_iter().map(|b| Band { signal: 1.0, row_s, ..b }).collect();
+            Floor::of_signal(&bands, &Criterion { form_error: 0.0, ..CRITERION }).0[11]
+        };
+        assert!((level(0.1) / level(0.01) - 1.0).abs() < 1e-9, "a slow log: what the criterion says");
+        assert!(
+            (level(0.01) / level(1e-4) / 1200.0 - 1.0).abs() < 1e-6,
+            "a fast one: a row over the root of twelve"
+        );
     }
 
     #[test]

@@ -29,6 +29,8 @@ pub struct Band {
     pub signal: f64,
     /// Variance of the channel's quantisation, in full scales.
     pub quantisation: f64,
+    /// Interval between the recording's rows, s.
+    pub row_s: f64,
     /// Doubt of the samples' instants beyond that of the stamps, s: a sensor slower than the log shows each
     /// sample at the next row.
     pub stale_s: f64,
@@ -104,6 +106,7 @@ impl Spectrum {
                         alike: range.len(),
                         signal: power / range.len() as f64,
                         quantisation,
+                        row_s,
                         stale_s,
                         continues: i + 1 < ranges.len(),
                     });
@@ -255,6 +258,7 @@ mod tests {
             alike: lines,
             signal: 0.0,
             quantisation: 0.0,
+            row_s: 0.01,
             stale_s: 0.0,
             continues: true,
         };

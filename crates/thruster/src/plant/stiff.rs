@@ -31,9 +31,9 @@ const RESOLVED: f64 = 0.4;
 const PASSED: f64 = 10.0;
 /// Most implicit steps a tick.
 const MOST_STEPS: f64 = 64.0;
-/// Part of the largest speed and flow that a tick may move them by for one implicit step to do: its error is a part of
-/// that again, and where a plant has settled every step ends at the same place.
-const CALM: f64 = 1e-3;
+/// Part of the largest speed and flow that a tick may move them by for one implicit step to do: its error is a hundredth of
+/// that, and where a plant has settled every step ends at the same place.
+const CALM: f64 = 1e-2;
 /// Step of differences, as a part of what is moved.
 const DIFFERENCE: f64 = 1e-6;
 
@@ -46,13 +46,13 @@ const GAS_KG_M3: f64 = 100.0;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stiff {
     /// Largest shaft speed, rad/s.
-    top_rad_s: f64,
+    pub(super) top_rad_s: f64,
     /// Largest axial flow, m/s: in bollard pull.
-    top_m_s: f64,
+    pub(super) top_m_s: f64,
     /// Blade torque over its square, N m s^2; zero without blades.
     load_nm_s2: f64,
     /// Steps a tick that moves: as many as its slower decay asks for.
-    steps: usize,
+    pub(super) steps: usize,
 }
 
 impl Stiff {

@@ -105,3 +105,41 @@ fn a_disturbance_dies_at_the_rate_that_is_told() {
     let dies = (1.0 - (disturbed - calm) / 1e-3) / 1e-4;
     assert!(told > 0.9 * dies && told < 2.0 * dies, "{told} {dies}");
 }
+
+/// A propeller of 76 mm in air on a voltage drive: the flow through the disc settles within a tick.
+#[test]
+fn one_step_a_calm_tick_leads_where_many_do() {
+    let rig = Rig::from_toml(include_str!("../../../../tests/recordings/measured/sar-prop-step/rig.toml"))
+        .expect("the rig of a measured propeller");
+    let fly = |calm: bool| {
+        let parameters = Parameters::stated(&rig);
+        let mut plant = Plant::new(ModelName::Model2, &rig, &parameters, &[], 2e-3);
+        let stiff = plant.stiff.as_mut().expect("stiff in air");
+        assert!(stiff.steps > 1, "{stiff:?}");
+        if !calm {
+            // No tick moves less than nothing.
+            stiff.top_m_s = -1.0;
+        }
+        let top_rad_s = stiff.top_rad_s;
+        let mut seen = Vec::new();
+        for i in 0..4000_i32 {
+            // Levels, a ramp, and rest.
+            let volts = match i / 800 {
+                0 => 8.0,
+                1 => 2.0,
+                2 => 2.0 + f64::from(i - 1600) * 0.01,
+                3 => 10.0,
+                _ => 0.0,
+            };
+            plant.step(&Tick { time_s: f64::from(i) * 2e-3, command: volts, ..Tick::default() });
+            seen.push(plant.truth().shaft_speed_rad_s / top_rad_s);
+        }
+        seen
+    };
+    let (few, many) = (fly(true), fly(false));
+    let off = |k: usize| (few[k] - many[k]).abs();
+    let worst = (0..few.len()).map(off).fold(0.0, f64::max);
+    assert!(worst < 2e-4, "{worst} of the largest speed");
+    assert!(off(799) < 1e-7 && off(1599) < 1e-7, "settled: {} and {}", off(799), off(1599));
+    assert!(few[700] > 0.1, "it turns: {}", few[700]);
+}
