@@ -6,6 +6,8 @@
 
 use std::sync::Arc;
 
+use rayon::prelude::*;
+
 use crate::data::{Channel, Driving, Prepared};
 use crate::fit::Fit;
 use crate::hypothesis::{Hypothesis, Inputs, Target};
@@ -27,6 +29,7 @@ impl Problem<'_> {
         let noises = self.noises(fit);
         // Cost of every edge for every tick it may lie on, all edges moved together.
         let costs: Vec<Vec<Vec<f64>>> = (0..places)
+            .into_par_iter()
             .map(|place| {
                 let edges = self.recordings.iter().map(|r| r.edges_at(place));
                 let inputs = Arc::new(Inputs::new(&self.recordings, edges.collect()));
