@@ -3,12 +3,12 @@
 use std::io::{BufRead, BufReader};
 use std::net::TcpStream;
 use std::process::{Child, Command, Stdio};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 use tokio_tungstenite::tungstenite::{self, Message, WebSocket, stream::MaybeTlsStream};
 
-use crate::common::wait;
+use crate::common::{PATIENCE, wait};
 
 /// A headless browser with one page.
 pub struct Browser {
@@ -107,9 +107,19 @@ impl Browser {
         answer["result"]["value"].clone()
     }
 
-    /// Waits until an expression is true.
+    /// Waits until an expression is true; fails with what the page has said until then.
     pub fn until(&mut self, expression: &str) {
-        wait(expression, || (self.eval(expression) == json!(true)).then_some(()));
+        let end = Instant::now() + PATIENCE;
+        while self.eval(expression) != json!(true) {
+            if Instant::now() > end {
+                let said = self.eval("document.getElementById('log')?.innerText ?? ''");
+                panic!(
+                    "waited in vain for: {expression}; the page says {said}; its errors: {:?}",
+                    self.errors
+                );
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
     }
 
     /// Clicks a button that can be clicked.
