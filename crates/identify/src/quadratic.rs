@@ -1,11 +1,11 @@
 //! The criterion about one point, with the response taken as linear in the parameters: cheap to minimise,
 //! however often the noise is learnt anew.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, DVectorView};
 
 use crate::hypothesis::Free;
 use crate::noise::{Criterion, Floor, Noise};
-use crate::spectrum::Spectrum;
+use crate::spectrum::{Band, Spectrum};
 use crate::step::bounded_step;
 
 /// Products of residual and derivative by band; parameters in units of their priors' standard deviations.
@@ -39,6 +39,10 @@ const ROUNDS: usize = 40;
 /// Rounds end where the merit falls by less than this.
 const ENOUGH: f64 = 0.03;
 
+fn lines_of<'v>(all: &'v DVector<f64>, band: &Band) -> DVectorView<'v, f64> {
+    all.rows(band.lines.start, band.lines.len())
+}
+
 impl<'a> Quadratic<'a> {
     /// From a residual (measured less simulated) and the response's derivatives, all as lines.
     pub fn new(
@@ -62,10 +66,10 @@ impl<'a> Quadratic<'a> {
     ) -> Self {
         let n = columns.len();
         let (mut squares, mut slope, mut curvature) = (Vec::new(), Vec::new(), Vec::new());
-        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
         for (k, band) in spectrum.bands.iter().enumerate() {
-            let r = &residual.as_slice()[band.lines.clone()];
-            squares.push(dot(r, r));
+            // Several sums at once: one that waits for its last addend takes eight times as long.
+            let r = lines_of(residual, band);
+            squares.push(r.dot(&r));
             let mut gradient = DVector::zeros(n);
             let mut gram = DMatrix::zeros(n, n);
             let before = known.get(k).map_or(0, DMatrix::nrows);
@@ -73,14 +77,13 @@ impl<'a> Quadratic<'a> {
                 gram.view_mut((0, 0), (before, before)).copy_from(known);
             }
             for i in 0..n {
-                let a = &columns[i].as_slice()[band.lines.clone()];
-                gradient[i] = free[i].sigma * dot(a, r);
+                let a = lines_of(columns[i], band);
+                gradient[i] = free[i].sigma * a.dot(&r);
                 if i < before {
                     continue;
                 }
                 for j in 0..=i {
-                    let b = &columns[j].as_slice()[band.lines.clone()];
-                    let product = free[i].sigma * free[j].sigma * dot(a, b);
+                    let product = free[i].sigma * free[j].sigma * a.dot(&lines_of(columns[j], band));
                     gram[(i, j)] = product;
                     gram[(j, i)] = product;
                 }

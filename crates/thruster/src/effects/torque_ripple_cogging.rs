@@ -1,5 +1,9 @@
 //! Torque that varies with the angle of the rotor.
 
+use std::cell::Cell;
+
+use nalgebra::Complex;
+
 use super::{Available, Context, Descriptor, Effect, Hooks, Path, Scale, Spec, angle_known, free_shaft};
 use crate::plant::{Balance, Local};
 use crate::real::Real;
@@ -100,19 +104,44 @@ fn build<T: Real>(values: &[T], _: &Context<T>) -> Box<dyn Effect<T>> {
     let orders = values
         .chunks_exact(EACH)
         .filter(|v| !v[1..].iter().all(nothing))
-        .map(|v| Order { order: v[0].re().round(), cogging_n_m: [v[1], v[2]], ripple_nm_a: [v[3], v[4]] })
+        .map(|v| Order { order: v[0].re().round() as i32, cogging_n_m: [v[1], v[2]], ripple_nm_a: [v[3], v[4]] })
         .collect();
-    Box::new(TorqueRipple { orders })
+    Box::new(TorqueRipple { orders, turned: Cell::default() })
 }
 
 struct Order<T> {
-    order: f64,
+    order: i32,
     cogging_n_m: [T; 2],
     ripple_nm_a: [T; 2],
 }
 
 struct TorqueRipple<T> {
     orders: Vec<Order<T>>,
+    /// Where the shaft was when last asked: two stages of a step in three ask where the one before did.
+    turned: Cell<Turned>,
+}
+
+/// A shaft angle with sine and cosine of each order's multiple of it.
+#[derive(Clone, Copy, Default)]
+struct Turned {
+    angle_rad: Option<f64>,
+    multiples: [Complex<f64>; ORDERS],
+}
+
+impl<T: Real> TorqueRipple<T> {
+    /// `exp(i k q)` for every order k: one sine and cosine, and powers of it.
+    fn turned(&self, angle_rad: f64) -> [Complex<f64>; ORDERS] {
+        let mut turned = self.turned.get();
+        if turned.angle_rad != Some(angle_rad) {
+            turned.angle_rad = Some(angle_rad);
+            let once = Complex::cis(angle_rad);
+            for (multiple, order) in turned.multiples.iter_mut().zip(&self.orders) {
+                *multiple = once.powi(order.order);
+            }
+            self.turned.set(turned);
+        }
+        turned.multiples
+    }
 }
 
 impl<T: Real> Effect<T> for TorqueRipple<T> {
@@ -121,8 +150,10 @@ impl<T: Real> Effect<T> for TorqueRipple<T> {
     }
 
     fn balance(&self, at: &Local<T>, _: &[T], balance: &mut Balance<T>, _: &mut [T]) {
-        for order in &self.orders {
-            let (sin, cos) = (at.shaft_angle_rad * order.order).sin_cos();
+        let angle = at.shaft_angle_rad;
+        for (order, multiple) in self.orders.iter().zip(self.turned(angle.re())) {
+            let turns = angle * f64::from(order.order);
+            let (sin, cos) = (turns.chain(multiple.im, multiple.re), turns.chain(multiple.re, -multiple.im));
             let amplitude = |i: usize| order.cogging_n_m[i] + order.ripple_nm_a[i] * at.current_a;
             balance.shaft_torque_n_m += amplitude(0) * sin + amplitude(1) * cos;
         }
