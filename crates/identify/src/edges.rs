@@ -17,36 +17,57 @@ use crate::simulate::Problem;
 const WINDOW_ROWS: usize = 12;
 /// Places tried for a step that fell into a gap of the log.
 const MOST_PLACES: usize = 24;
+/// Places about its own that are tried for a step that was placed before; its own comes first, and stays where it does
+/// as well.
+const NEAR: [isize; 7] = [0, -1, 1, -2, 2, -4, 4];
 /// Least noise of a channel over its full scale: rounding of a log.
 const LEAST: f64 = 1e-4;
 
+/// Which places are tried for the command's steps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reach {
+    /// All of them.
+    All,
+    /// Those about where a step is, where there are many.
+    Near,
+}
+
 impl Problem<'_> {
-    /// The command with its steps where they suit a fit best; none if that is where they are.
-    pub fn place_edges(&self, fit: &Fit) -> Option<Inputs> {
+    /// The command with its steps where they suit a fit best: of all their places, or of those about where they are.
+    /// None if that is where they are.
+    pub fn place_edges(&self, fit: &Fit, reach: Reach) -> Option<Inputs> {
         let movable =
             |r: &Prepared| r.driving != Driving::Speed && r.edges.iter().any(|row| r.ticks_before(*row) > 1);
         let places = self.recordings.iter().filter(|r| movable(r)).map(Prepared::places).max()?;
         let noises = self.noises(fit);
-        // Cost of every edge for every tick it may lie on, all edges moved together.
-        let costs: Vec<Vec<Vec<f64>>> = (0..places)
-            .into_par_iter()
-            .map(|place| {
-                let edges = self.recordings.iter().map(|r| r.edges_at(place));
-                let inputs = Arc::new(Inputs::new(&self.recordings, edges.collect()));
+        let before = &fit.hypothesis.inputs.edges;
+        // All edges are moved together, each over its own places.
+        let tried: Vec<Vec<Vec<usize>>> = if reach == Reach::All || places <= NEAR.len() {
+            let at = |place| self.recordings.iter().map(|r| r.edges_at(place)).collect();
+            (0..places).map(at).collect()
+        } else {
+            let about = |by: &isize| {
+                self.recordings.iter().zip(before).map(|(r, edges)| r.edges_moved(edges, *by)).collect()
+            };
+            NEAR.iter().map(about).collect()
+        };
+        let costs: Vec<Vec<Vec<f64>>> = tried
+            .par_iter()
+            .map(|edges| {
+                let inputs = Arc::new(Inputs::new(&self.recordings, edges.clone()));
                 let residual = self.residual(&Hypothesis { inputs, ..fit.hypothesis.clone() }, &fit.values);
                 let of = |(r, one): (usize, &Prepared)| edge_costs(one, &residual[r], &noises[r]);
                 self.recordings.iter().enumerate().map(of).collect()
             })
             .collect();
-        let mut edges = fit.hypothesis.inputs.edges.clone();
-        for (r, recording) in self.recordings.iter().enumerate().filter(|(_, r)| movable(r)) {
-            for (e, before) in edges[r].iter_mut().enumerate() {
-                let place =
-                    (0..recording.places()).min_by(|a, b| costs[*a][r][e].total_cmp(&costs[*b][r][e]));
-                *before = recording.edge_at(e, place.unwrap_or(0));
+        let mut edges = before.clone();
+        for (r, _) in self.recordings.iter().enumerate().filter(|(_, r)| movable(r)) {
+            for (e, ticks) in edges[r].iter_mut().enumerate() {
+                let best = (0..tried.len()).min_by(|a, b| costs[*a][r][e].total_cmp(&costs[*b][r][e]));
+                *ticks = best.map_or(*ticks, |best| tried[best][r][e]);
             }
         }
-        (edges != fit.hypothesis.inputs.edges).then(|| Inputs::new(&self.recordings, edges))
+        (edges != *before).then(|| Inputs::new(&self.recordings, edges))
     }
 
     /// A fit's hypothesis with every step of the command a tick earlier or later, and every sensor read as much later or
@@ -151,6 +172,17 @@ impl Prepared {
         let (ticks, places) = (self.ticks_before(self.edges[edge]), self.places());
         let place = place.min(places - 1);
         if ticks <= places { place.min(ticks - 1) } else { place * (ticks - 1) / (places - 1).max(1) }
+    }
+
+    /// All steps so many places further from their rows.
+    fn edges_moved(&self, before: &[usize], by: isize) -> Vec<usize> {
+        let last = self.places() - 1;
+        let moved = |(edge, ticks): (usize, &usize)| {
+            let now = (0..=last).min_by_key(|place| self.edge_at(edge, *place).abs_diff(*ticks));
+            let to = now.unwrap_or(0).saturating_add_signed(by).min(last);
+            if by == 0 { *ticks } else { self.edge_at(edge, to) }
+        };
+        before.iter().enumerate().map(moved).collect()
     }
 
     /// All steps in one of their places.

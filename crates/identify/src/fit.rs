@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::edges::Reach;
 use crate::hypothesis::{Hypothesis, Member, Target};
 use crate::noise::{Floor, Noise};
 use crate::quadratic::Quadratic;
@@ -144,9 +145,10 @@ impl Problem<'_> {
     /// numbers that were fitted to misplaced steps keep them there.
     pub fn settle_from_stated(&self, hypothesis: &Hypothesis, iterations: usize) -> Fit {
         let mut placed = hypothesis.clone();
-        for _ in 0..PLACINGS {
+        for placing in 0..PLACINGS {
             let stated = self.fit(&placed, &Vec::new(), &self.floor, 0);
-            let Some(inputs) = self.place_edges(&stated) else { break };
+            let reach = if placing == 0 { Reach::All } else { Reach::Near };
+            let Some(inputs) = self.place_edges(&stated, reach) else { break };
             placed.inputs = Arc::new(inputs);
         }
         let mut best = self.settle(&placed, &Vec::new(), &self.floor, iterations);
@@ -168,7 +170,7 @@ impl Problem<'_> {
     pub fn settle(&self, hypothesis: &Hypothesis, known: &Columns, floor: &Floor, iterations: usize) -> Fit {
         let mut fit = self.fit(hypothesis, known, floor, iterations);
         for _ in 0..PLACINGS {
-            let Some(inputs) = self.place_edges(&fit) else { break };
+            let Some(inputs) = self.place_edges(&fit, Reach::Near) else { break };
             let moved = Hypothesis { inputs: Arc::new(inputs), ..fit.resume() };
             let next = self.fit(&moved, &fit.columns, floor, iterations);
             let gain = fit.noise.misfit + fit.penalty - next.noise.misfit - next.penalty;

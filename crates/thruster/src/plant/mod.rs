@@ -25,7 +25,7 @@ pub use state::{Balance, Course, Drive, Driven, Local, Sensed, Tick};
 use friction::Rub;
 use measuring::Filters;
 use rates::Constants;
-use stiff::Stiff;
+use stiff::{Slopes, Stiff};
 
 use crate::effects::{Context, Descriptor, Effect, flexible_coupling};
 use crate::models::ModelName;
@@ -92,6 +92,8 @@ pub struct Plant<T = f64> {
     slow: bool,
     /// Where shaft, flow or swirl settle so fast beside a tick that explicit steps would run away.
     stiff: Option<Stiff>,
+    /// The derivative that a calm stiff plant goes on with.
+    slopes: Option<Slopes<T, OWN>>,
     /// Bandwidth of the observer, rad/s; 0 is off.
     observer_rad_s: f64,
     quantise_encoder: bool,
@@ -181,6 +183,7 @@ impl<T: Real> Plant<T> {
             rates_may_hold: !effects.iter().any(changes_between_ticks),
             slow: effects.iter().all(|e| e.effect.slow()) && model != ModelName::RotationalFlow,
             stiff: Stiff::of(model, rig, tick_s, lightest_share),
+            slopes: None,
             parameters,
             sensors: rig.sensors,
             amplifier: rig.amplifier.kind,
@@ -230,6 +233,7 @@ impl<T: Real> Plant<T> {
     ) {
         self.time_s = time_s;
         self.moving = false;
+        self.slopes = None;
         self.x[SPEED] = T::from(shaft_speed_rad_s);
         self.x[FLOW] = T::from(axial_m_s);
         self.x[ANGLE] = T::from(angle_rad);

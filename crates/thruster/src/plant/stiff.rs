@@ -34,6 +34,9 @@ const MOST_STEPS: f64 = 64.0;
 /// Part of the largest speed and flow that a tick may move them by for one implicit step to do: its error is a hundredth of
 /// that, and where a plant has settled every step ends at the same place.
 const CALM: f64 = 1e-2;
+/// Part of the largest speed and flow by which a calm plant may have moved since its derivative was taken: the loads' slopes go
+/// with the speed, and a derivative that is off by a little costs no order.
+const KEPT: f64 = 2e-2;
 /// Step of differences, as a part of what is moved.
 const DIFFERENCE: f64 = 1e-6;
 
@@ -164,12 +167,42 @@ struct Push<T, const N: usize> {
     rub: Rub<T>,
 }
 
+impl<T: Real, const N: usize> Push<T, N> {
+    /// Whether a tick moves the shaft and the water by less than a part of the largest speed and flow.
+    fn moves_less(&self, part: f64, tick_s: f64, stiff: Stiff) -> bool {
+        let moves = |place: usize, top: f64| self.rates[place].re().abs() * tick_s > part * top;
+        !moves(SPEED, stiff.top_rad_s) && !moves(FLOW, stiff.top_m_s)
+    }
+}
+
 /// Derivative of the rates, as far as it is fast: by shaft speed and axial flow of all states, and of each
 /// other state by itself.
-struct Slopes<T, const N: usize> {
+#[derive(Clone, Copy)]
+pub(super) struct Slopes<T, const N: usize> {
+    /// Shaft speed and axial flow at which it was taken.
+    about: [f64; 2],
     by_speed: [T; N],
     by_flow: [T; N],
     by_itself: [T; N],
+}
+
+impl<T: Real, const N: usize> Slopes<T, N> {
+    /// Whether the plant is still about where the derivative was taken.
+    fn hold_at(&self, x: &[T], stiff: Stiff) -> bool {
+        let near = |place: usize, top: f64| (x[place].re() - self.about[place]).abs() < KEPT * top;
+        near(SPEED, stiff.top_rad_s) && near(FLOW, stiff.top_m_s)
+    }
+
+    /// The same of as many states as are there.
+    fn resized<const M: usize>(&self) -> Slopes<T, M> {
+        let as_many = |of: &[T; N]| each(|i| of.get(i).copied().unwrap_or(T::ZERO));
+        Slopes {
+            about: self.about,
+            by_speed: as_many(&self.by_speed),
+            by_flow: as_many(&self.by_flow),
+            by_itself: as_many(&self.by_itself),
+        }
+    }
 }
 
 impl<T: Real> Plant<T> {
@@ -177,29 +210,73 @@ impl<T: Real> Plant<T> {
         let drive = self.drive_over(tick);
         let mut balance = Balance::default();
         let mut x: [T; N] = each(|i| self.x[i]);
-        let calm = N == OWN && stiff.steps > 1 && self.is_calm(tick, &drive, &x, stiff);
-        let steps = if calm { 1 } else { stiff.steps };
-        let part = 1.0 / steps as f64;
-        for step in 0..steps {
-            let from = step as f64 * part;
-            let until = if step + 1 == steps { 1.0 } else { from + part };
-            x = self.stiff_part(tick, &drive, &x, (from, until), stiff, &mut balance);
+        if N == OWN && stiff.steps > 1 {
+            let whole = self.push(tick, &drive, &x, 1.0, stiff, &mut balance);
+            if whole.moves_less(CALM, self.tick_s, stiff) {
+                let kept = self.slopes.take().filter(|kept| kept.hold_at(&self.x, stiff));
+                let slopes = kept.map_or_else(
+                    || self.slopes_ahead(tick, &drive, &whole, (1.0, self.tick_s), stiff.top_rad_s),
+                    |kept| kept.resized(),
+                );
+                self.slopes = Some(slopes.resized());
+                x = self.stiff_part(tick, &drive, &x, (0.0, 1.0), stiff, (&whole, &slopes), &mut balance);
+                return self.end_stiff(tick, &drive, x, &mut balance);
+            }
         }
-        let current = self.current_at(tick, &drive, 1.0, x[SPEED]);
+        self.slopes = None;
+        let part = 1.0 / stiff.steps as f64;
+        for step in 0..stiff.steps {
+            let from = step as f64 * part;
+            let until = if step + 1 == stiff.steps { 1.0 } else { from + part };
+            let whole = self.push(tick, &drive, &x, until, stiff, &mut balance);
+            let slopes = self.slopes_ahead(
+                tick,
+                &drive,
+                &whole,
+                (until, (until - from) * self.tick_s),
+                stiff.top_rad_s,
+            );
+            x = self.stiff_part(tick, &drive, &x, (from, until), stiff, (&whole, &slopes), &mut balance);
+        }
+        self.end_stiff(tick, &drive, x, &mut balance);
+    }
+
+    fn end_stiff<const N: usize>(
+        &mut self,
+        tick: &Tick,
+        drive: &Course<T>,
+        x: [T; N],
+        balance: &mut Balance<T>,
+    ) {
+        let current = self.current_at(tick, drive, 1.0, x[SPEED]);
         let end = self.local_at(&x, current, 1.0, tick);
-        self.rates::<true, true, N>(&x, &end, &mut balance);
+        self.rates::<true, true, N>(&x, &end, balance);
         self.moving = false;
-        self.arrive(tick, &x, end, &balance);
+        self.arrive(tick, &x, end, balance);
     }
 
-    /// Whether a tick hardly moves the shaft and the water.
-    fn is_calm<const N: usize>(&self, tick: &Tick, drive: &Course<T>, x: &[T; N], stiff: Stiff) -> bool {
-        let rates = self.rates_at(tick, drive, x, 1.0, &mut Balance::default());
-        let moves = |place: usize, top: f64| rates[place].re().abs() * self.tick_s > CALM * top;
-        !moves(SPEED, stiff.top_rad_s) && !moves(FLOW, stiff.top_m_s)
+    /// What moves a state under the inputs at a part of the tick.
+    fn push<const N: usize>(
+        &self,
+        tick: &Tick,
+        drive: &Course<T>,
+        x: &[T; N],
+        until: f64,
+        stiff: Stiff,
+        balance: &mut Balance<T>,
+    ) -> Push<T, N> {
+        let mut x = *x;
+        x[SPEED] = drive.speed_rad_s.map_or(x[SPEED], |(a, b)| a + (b - a) * until);
+        let rates = self.rates_at(tick, drive, &x, until, balance);
+        let mut squares = [T::ZERO; OWN];
+        squares[SPEED] = T::from(stiff.load_nm_s2) / balance.inertia_kg_m2;
+        squares[FLOW] = balance.flux_kg_m / balance.added_mass_kg;
+        squares[SWIRL] = self.constants.swirl.flux_kg_m / self.constants.swirl.mass_kg;
+        Push { x, rates, squares, rub: Rub::of(balance) }
     }
 
-    /// One extrapolated step between two parts of the tick.
+    /// One extrapolated step between two parts of the tick, by what moves the state at its end and the derivative.
+    #[expect(clippy::too_many_arguments)]
     fn stiff_part<const N: usize>(
         &self,
         tick: &Tick,
@@ -207,32 +284,21 @@ impl<T: Real> Plant<T> {
         from: &[T; N],
         (start, end): (f64, f64),
         stiff: Stiff,
+        (whole, slopes): (&Push<T, N>, &Slopes<T, N>),
         balance: &mut Balance<T>,
     ) -> [T; N] {
         let step_s = (end - start) * self.tick_s;
-        let imposed = |part: f64| drive.speed_rad_s.map(|(a, b)| a + (b - a) * part);
-        let mut push = |x: &[T; N], until: f64| {
-            let mut x = *x;
-            x[SPEED] = imposed(until).unwrap_or(x[SPEED]);
-            let rates = self.rates_at(tick, drive, &x, until, balance);
-            let mut squares = [T::ZERO; OWN];
-            squares[SPEED] = T::from(stiff.load_nm_s2) / balance.inertia_kg_m2;
-            squares[FLOW] = balance.flux_kg_m / balance.added_mass_kg;
-            squares[SWIRL] = self.constants.swirl.flux_kg_m / self.constants.swirl.mass_kg;
-            Push { x, rates, squares, rub: Rub::of(balance) }
-        };
-        let whole = push(from, end);
-        let slopes = self.slopes_ahead(tick, drive, &whole, (end, step_s), stiff.top_rad_s);
         let rub = whole.rub;
-        let advance = |push: Push<T, N>, step_s: f64| {
-            slopes.advance(&push, step_s, rub.mean(push.rub), drive.speed_rad_s.is_some())
+        let advance = |push: &Push<T, N>, step_s: f64| {
+            slopes.advance(push, step_s, rub.mean(push.rub), drive.speed_rad_s.is_some())
         };
-        let half = advance(push(from, 0.5 * (start + end)), 0.5 * step_s);
-        let halves = advance(push(&half, end), 0.5 * step_s);
+        let half = self.push(tick, drive, from, 0.5 * (start + end), stiff, balance);
+        let half = advance(&half, 0.5 * step_s);
+        let halves = advance(&self.push(tick, drive, &half, end, stiff, balance), 0.5 * step_s);
         let whole = advance(whole, step_s);
         let mut x: [T; N] = each(|i| halves[i] * 2.0 - whole[i]);
-        x[SPEED] = match imposed(end) {
-            Some(speed) => speed,
+        x[SPEED] = match drive.speed_rad_s {
+            Some((a, b)) => a + (b - a) * end,
             // Held by dry friction at the end of the finer steps.
             None if halves[SPEED] == T::ZERO => T::ZERO,
             None => x[SPEED],
@@ -259,6 +325,7 @@ impl<T: Real> Plant<T> {
         let least = about[SPEED].abs();
         about[SPEED] = if led < 0.0 { led.min(-least) } else { led.max(least) };
         let mut slopes = self.slopes(tick, drive, &about, end);
+        slopes.about = [here.x[SPEED].re(), here.x[FLOW].re()];
 
         let by = DIFFERENCE * here.x[SPEED].re().abs().max(1.0);
         let mut moved = here.x;
@@ -310,7 +377,7 @@ impl<T: Real> Plant<T> {
             by_itself =
                 each(|i| if i > ANGLE { ((there[i] - here[i]) / by[i]).min(T::ZERO) } else { T::ZERO });
         }
-        Slopes { by_speed, by_flow, by_itself }
+        Slopes { about: [about[SPEED].re(), about[FLOW].re()], by_speed, by_flow, by_itself }
     }
 }
 
