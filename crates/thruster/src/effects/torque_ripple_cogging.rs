@@ -104,7 +104,11 @@ fn build<T: Real>(values: &[T], _: &Context<T>) -> Box<dyn Effect<T>> {
     let orders = values
         .chunks_exact(EACH)
         .filter(|v| !v[1..].iter().all(nothing))
-        .map(|v| Order { order: v[0].re().round() as i32, cogging_n_m: [v[1], v[2]], ripple_nm_a: [v[3], v[4]] })
+        .map(|v| Order {
+            order: v[0].re().round() as i32,
+            cogging_n_m: [v[1], v[2]],
+            ripple_nm_a: [v[3], v[4]],
+        })
         .collect();
     Box::new(TorqueRipple { orders, turned: Cell::default() })
 }
