@@ -13,6 +13,7 @@ mod rates;
 mod run;
 mod state;
 mod stiff;
+mod stiffness;
 #[cfg(test)]
 mod tests;
 
@@ -25,7 +26,8 @@ pub use state::{Balance, Course, Drive, Driven, Local, Sensed, Tick};
 use friction::Rub;
 use measuring::Filters;
 use rates::Constants;
-use stiff::{Slopes, Stiff};
+use stiff::Slopes;
+use stiffness::Stiff;
 
 use crate::effects::{Context, Descriptor, Effect, flexible_coupling};
 use crate::models::ModelName;
@@ -282,7 +284,7 @@ impl<T: Real> Plant<T> {
             let there = rates(place, by);
             [(there[0] - here[0]) / by, (there[1] - here[1]) / by]
         });
-        stiff::fastest_1_s([[a, b], [c, d]])
+        stiffness::fastest_1_s([[a, b], [c, d]])
     }
 
     /// One control tick: the command acts from now to the next tick.
