@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use kort_proto::messages::{Command, Setpoint, Telemetry};
+use kort_proto::messages::{Command, Reply, Request, Setpoint, Telemetry};
 use kort_proto::transport::{ControllerPorts, Deployment, GatewayPorts, ServoPorts, TransportError};
 
 #[test]
@@ -41,6 +41,29 @@ fn samples_travel_from_gateway_to_servo_and_back() {
     let recorded: Vec<_> = std::iter::from_fn(|| gateway.telemetry.next()).map(|t| t.faults).collect();
     assert_eq!(recorded, (0..500).collect::<Vec<_>>(), "a recording gets every sample");
     assert_eq!(controller.telemetry.latest().unwrap().faults, 499, "a controller gets the latest");
+}
+
+#[test]
+fn requests_and_answers_pass_through_ports_opened_anew() {
+    let dir = tempfile::tempdir().unwrap();
+    let deployment = Deployment::new(Some(&dir.path().join("root")));
+    let mut owner = deployment.own().unwrap();
+    owner.create(&["t1"]).unwrap();
+    let mut servo = ServoPorts::open(&deployment, "t1").unwrap();
+    let controller = ControllerPorts::open(&deployment, "t1").unwrap();
+    let mut gateway = GatewayPorts::open(&deployment, "t1").unwrap();
+    gateway.request.send(Request { id: 1, ..Default::default() }).unwrap();
+    let before = servo.request.next().expect("a request").header;
+    for id in 2..5 {
+        gateway.reconnect_requests(&deployment, "t1").unwrap();
+        gateway.request.send(Request { id, ..Default::default() }).unwrap();
+        let request = servo.request.next().expect("a request through ports opened anew");
+        assert_eq!((request.id, request.header.session), (id, before.session), "the same asker goes on");
+        assert_eq!(request.header.sequence, id, "and counts on");
+        assert_eq!(std::iter::from_fn(|| controller.request.next()).last().map(|r| r.id), Some(id));
+        servo.reply.send(Reply { id, ..Default::default() }).unwrap();
+        assert_eq!(gateway.reply.next().map(|reply| reply.id), Some(id), "its answer");
+    }
 }
 
 #[test]

@@ -325,6 +325,28 @@ ports! {
     reply: Inbox<Reply> = |o| o.inbox(Stream::Reply, Stream::Reply.depth())?;
 }
 
+impl GatewayPorts {
+    /// Opens the ports of requests and answers anew, under the same session and with the sequence going on. A port that opens
+    /// makes every peer look for its counterparts again: a connection that failed to come about when they all
+    /// started is not tried again otherwise (iceoryx2, issue 129), and requests then go unanswered for good.
+    ///
+    /// # Errors
+    /// As [`Self::open`]; the ports are as before then.
+    pub fn reconnect_requests(
+        &mut self,
+        deployment: &Deployment,
+        thruster: &str,
+    ) -> Result<(), TransportError> {
+        let (generation, session) = (self.generation, self.request.session);
+        let opener = Opener { deployment, node: &self._node, thruster, generation, session };
+        let request = opener.outbox(Stream::Request)?;
+        let reply = opener.inbox(Stream::Reply, Stream::Reply.depth())?;
+        self.request = Outbox { sequence: self.request.sequence, ..request };
+        self.reply = reply;
+        Ok(())
+    }
+}
+
 ports! {
     /// The supervisor's ports: it listens to everybody's beat, and may ask for rest and disarming.
     SupervisorPorts, "supervisor";

@@ -104,7 +104,6 @@ fn run_errands(bridges: &mut [Bridge], recorder: &Recorder, until_ns: u64) {
 
 struct Bridge {
     link: Link,
-    /// What the supervisor writes down.
     watched: PathBuf,
     ports: Option<GatewayPorts>,
     checked: Option<Instant>,
@@ -123,6 +122,8 @@ struct Bridge {
     ramping: bool,
     /// Until when answers are looked for between two ticks.
     errands_until: Option<Instant>,
+    /// A request had no answer in time: the way to who should have answered may never have come about.
+    unanswered: bool,
 }
 
 impl Bridge {
@@ -143,6 +144,7 @@ impl Bridge {
             before_ramp: None,
             ramping: false,
             errands_until: None,
+            unanswered: false,
         }
     }
 
@@ -159,6 +161,11 @@ impl Bridge {
             return;
         };
         self.receive(&ports, recorder, now);
+        if std::mem::take(&mut self.unanswered)
+            && let Err(error) = ports.reconnect_requests(deployment, &self.link.thruster.id)
+        {
+            self.complain(error);
+        }
         let sent = self.send_asks(&mut ports, now).and_then(|()| match pulse.alive() {
             true => ports.setpoint.send(self.setpoint(now)),
             false => Ok(()),
@@ -342,6 +349,7 @@ impl Bridge {
                 let (thruster, id) = (&self.link.thruster.id, request.id);
                 tracing::warn!(thruster, "no answer by the {} to request {id}: sent again", silent.name());
                 ports.request.send(request)?;
+                self.unanswered = true;
             }
         }
         Ok(())
