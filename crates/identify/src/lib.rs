@@ -16,6 +16,7 @@ pub mod hypothesis;
 pub mod identifiable;
 pub mod identify;
 pub mod noise;
+mod over_the_top;
 mod quadratic;
 mod refuse;
 pub mod sampling;

@@ -137,6 +137,10 @@ impl<'a> Setup<'a> {
                 (problem, baseline) = (other, as_held);
             }
         }
+        if let Some(led) = problem.led(&baseline) {
+            (problem, baseline) = compared(led.recordings);
+            baseline.start = led.values;
+        }
         if let Some(hidden) = problem.hidden_by_gaps(&baseline) {
             notes.extend(hidden.words(&problem.recordings));
             problem = problem.without(&hidden.rows);

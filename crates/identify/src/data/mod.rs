@@ -3,6 +3,7 @@
 use kort_thruster::plant::{Course, Driven, Leap, Stimulus, Tick, load_inertia_kg_m2};
 use kort_thruster::rig::{AmplifierKind, Load, Rig};
 
+use crate::over_the_top::TOP_RAD;
 use crate::refuse;
 
 mod channel;
@@ -191,10 +192,7 @@ fn shown(rig: &Rig, driving: Driving, response: Response) -> bool {
 }
 
 /// Bandwidth of the observer on a shaft that nothing brings back to its course, rad/s: 1 Hz.
-const OBSERVER_RAD_S: f64 = std::f64::consts::TAU;
-
-/// Angle of a pendulum near its top, rad.
-const TOP_RAD: f64 = 0.9 * std::f64::consts::PI;
+pub const OBSERVER_RAD_S: f64 = std::f64::consts::TAU;
 
 /// Whether a disturbed shaft returns to its course by itself: blades brake it, or the back-EMF under a
 /// voltage does, within a few tenths of a second; a pendulum hangs. A dry shaft under a current integrates, and

@@ -15,7 +15,7 @@ fn hold(command: f64, released: bool) -> Tick {
 
 #[test]
 fn a_gear_rubs_by_what_it_carries() {
-    let mut plant = plant(&dry(), &[("gear_load_friction", &[0.3])], TICK_S);
+    let mut plant = plant(&dry(), &[("gear_load_friction", &[0.3, 1.0])], TICK_S);
     (0..100).for_each(|_| plant.step(&hold(1.0, false)));
     let speed = plant.truth().shaft_speed_rad_s;
     assert!((speed - 0.7 / INERTIA * 0.2).abs() < 1e-9, "{speed}");

@@ -62,7 +62,7 @@ fn a_pendulum_is_held_by_the_torque_of_its_weight_and_by_dry_friction() {
     assert!((free.truth().shaft_angle_rad - side).abs() < 1e-9);
     // A gear that rubs by a quarter of what it carries holds with less: t (1 + mu) = w (1 - mu).
     for (share, holds) in [(0.62, true), (0.58, false)] {
-        let mut geared = plant(&rig(load), &[("gear_load_friction", &[0.25])], TICK_S);
+        let mut geared = plant(&rig(load), &[("gear_load_friction", &[0.25, 1.0])], TICK_S);
         let torque = share * 0.49 * 0.1 * 9.806_65;
         geared.start(0.0, 0.0, 0.0, torque, side);
         for _ in 0..200 {
