@@ -94,9 +94,9 @@ pub enum EventKind {
 }
 
 impl EventKind {
-    /// Does it tell of a fault that is latched since?
+    /// May it tell of a fault that is latched since?
     fn latches(self) -> bool {
-        matches!(self, Self::Tripped | Self::FaultInherited)
+        matches!(self, Self::Tripped | Self::FaultInherited | Self::RecordingEnded)
     }
 }
 

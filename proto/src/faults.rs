@@ -1,8 +1,10 @@
-//! Faults with stable codes; each has a page in `docs/faults/`. A fault is latched: the output is
-//! zero and disarmed until the cause is gone and someone clears it.
+//! Faults with stable codes; each has a page in `docs/faults/`. A fault of servo or controller is latched: the output is
+//! zero and disarmed until the cause is gone and someone clears it. One of the gateway stops nothing and keeps nobody
+//! from arming; it is shown until someone clears it.
 
 /// A fault. The discriminant is its code and its bit in a bitset; codes never change meaning.
-/// 1 to 31 are raised by the servo, 33 to 47 by the controller.
+/// 1 to 31 are raised by the servo, 33 to 47 by the controller, from 49 on by
+/// the gateway.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[repr(u32)]
 pub enum Fault {
@@ -52,11 +54,13 @@ pub enum Fault {
     ControlNotFinite = 35,
     /// Another gateway process took over while armed.
     GatewayRestarted = 36,
+    /// The disk refused a recording, or has too little space for it.
+    RecordingFailed = 49,
 }
 
 impl Fault {
     /// Every fault, in the order of codes.
-    pub const ALL: [Self; 23] = [
+    pub const ALL: [Self; 24] = [
         Self::OverCurrent,
         Self::OverSpeed,
         Self::ThermalOverload,
@@ -80,6 +84,7 @@ impl Fault {
         Self::ServoLost,
         Self::ControlNotFinite,
         Self::GatewayRestarted,
+        Self::RecordingFailed,
     ];
 
     /// Stable code.
@@ -118,6 +123,7 @@ impl Fault {
             Self::ServoLost => "servo_lost",
             Self::ControlNotFinite => "control_not_finite",
             Self::GatewayRestarted => "gateway_restarted",
+            Self::RecordingFailed => "recording_failed",
         }
     }
 
@@ -169,6 +175,9 @@ impl Fault {
             Self::ServoLost => "the servo stopped sending telemetry: see its log",
             Self::ControlNotFinite => "the control law gave no number: check its parameters",
             Self::GatewayRestarted => "the gateway was replaced while armed: take the lease and arm again",
+            Self::RecordingFailed => {
+                "a recording ended by itself, thrust is untouched: GET /v1/recordings says why; make space, clear, record again"
+            }
         }
     }
 

@@ -116,6 +116,10 @@ pub fn full(table: &mut Table) {
         let events = stack.get("/v1/events")?;
         events.as_array()?.iter().any(|event| event["kind"] == "recording_ended").then_some(())
     });
+    let shown = wait("the fault to be shown", || {
+        stack.state()?["faults"].as_array()?.iter().find(|fault| fault["name"] == "recording_failed").cloned()
+    });
+    assert!(shown["code"] == 49 && shown["since"].is_string(), "{shown}");
     // What the disk took is readable.
     let kept = kort_recording::Recording::read(&file, None).expect("it reads");
     assert!(kept.rows() > 500, "{} rows", kept.rows());
@@ -123,6 +127,12 @@ pub fn full(table: &mut Table) {
         (info["rows"].as_u64().expect("rows"), info["lost_samples"].as_u64().expect("samples"));
     assert_eq!(listed as usize, kept.rows(), "the list says what the disk has: {info}");
     assert!(lost > 0, "what the disk did not take is counted: {info}");
+    let t = stack.watch().next();
+    assert!(t.armed == 1 && t.faults == 0, "the thrust is untouched: {t:?}");
+    // It keeps nobody from anything, and goes when it is cleared.
+    stack.thrust(40.0, 60_000);
+    let cleared = stack.http("POST", "/clear-faults", None).map(|answer| answer.0);
+    assert_eq!((cleared, &stack.state().expect("a state")["faults"]), (Some(200), &json!([])));
     let t = stack.watch().next();
     assert!(t.armed == 1 && t.faults == 0, "the thrust is untouched: {t:?}");
     // The next gateway knows it too, though there was no space to write it down in a new file.

@@ -19,6 +19,8 @@ pub struct Heard {
     pub servo: Option<(Instant, Telemetry)>,
     /// The controller's last state and when it came.
     pub controller: Option<(Instant, ControllerState)>,
+    /// Faults of the gateway's own, as a bitset.
+    pub own_faults: u64,
 }
 
 impl Heard {
@@ -59,11 +61,12 @@ impl Heard {
         self.servo.as_ref().is_none_or(|(at, _)| now.saturating_duration_since(*at) > self.servo_silence)
     }
 
-    /// Faults as shown: a servo that fell silent while armed is one, before its successor can say so.
+    /// Faults as shown: the gateway's own too, which stop nothing, and a servo that fell silent while armed, before its
+    /// successor can say so.
     pub fn shown_faults(&self, now: Instant) -> u64 {
         let armed_last = self.servo.as_ref().is_some_and(|(_, telemetry)| telemetry.armed != 0);
         let lost = if armed_last && self.servo_silent(now) { Fault::ServoLost.bit() } else { 0 };
-        self.faults(now) | lost
+        self.faults(now) | self.own_faults | lost
     }
 
     /// Was the drive armed when the servo was last heard, not long ago? A hiccup of this process is no reason to

@@ -20,6 +20,7 @@ use std::time::SystemTime;
 
 use axum::body::Bytes;
 use kort_proto::events::{Event, EventKind};
+use kort_proto::faults::Fault;
 use kort_proto::messages::Telemetry;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -401,7 +402,11 @@ impl Recorder {
         let cause = info.cause.clone().unwrap_or_default();
         let words = format!("recording {} ended by itself: {cause}", info.name);
         tracing::error!("{words}");
-        self.tell(EventKind::RecordingEnded, info, "gateway", words);
+        let event = Event::now(EventKind::RecordingEnded, Some(&info.thruster), "gateway", words);
+        let failed = info.state == RecordingState::Failed;
+        if let Some(events) = self.events.get().and_then(Weak::upgrade) {
+            events.note(if failed { event.fault(Fault::RecordingFailed) } else { event });
+        }
     }
 
     fn tell(&self, kind: EventKind, info: &RecordingInfo, who: &str, words: String) {

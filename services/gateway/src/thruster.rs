@@ -202,7 +202,8 @@ impl Thruster {
     pub async fn clear_faults(&self, who: &str, lease: Option<&str>) -> Result<(), Problem> {
         self.desk().may(lease, Instant::now())?;
         self.ready()?;
-        let before = self.heard().faults(Instant::now());
+        let heard = self.heard();
+        let before = heard.faults(Instant::now()) | heard.own_faults;
         self.ask(
             request(RequestKind::ClearFaults),
             &[Process::Servo, Process::Controller],
@@ -210,6 +211,7 @@ impl Thruster {
         )
         .await?;
         self.settle(|heard, now| heard.faults(now) == 0).await;
+        self.hear(|heard| heard.own_faults = 0);
         if before != 0 {
             self.did(who, lease, EventKind::FaultsCleared, &format!("cleared {}", Names(before)));
         }

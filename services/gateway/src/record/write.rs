@@ -9,6 +9,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant, SystemTime};
 
 use axum::body::Bytes;
+use kort_proto::faults::Fault;
 use kort_proto::messages::Telemetry;
 use kort_proto::signals::{SIGNALS, Signals};
 use kort_recording::LiveMcap;
@@ -143,6 +144,9 @@ impl Job {
         recorder.note_info(&info);
         if info.cause.is_some() {
             recorder.ended(&info);
+        }
+        if info.state == RecordingState::Failed {
+            self.subject.thruster.show_fault(Fault::RecordingFailed);
         }
     }
 

@@ -10,6 +10,11 @@ use crate::heard::Heard;
 use crate::view::{BeforeView, FaultView};
 
 impl Thruster {
+    /// The gateway itself noticed one that stops nothing.
+    pub fn show_fault(&self, fault: Fault) {
+        self.hear(|heard| heard.own_faults |= fault.bit());
+    }
+
     /// A fault with what the event log knows of how it came.
     pub fn fault_view(&self, fault: Fault, heard: &Heard, now: Instant) -> FaultView {
         let came = self.events.latched(&self.id, fault);
