@@ -109,7 +109,9 @@ pub fn full(table: &mut Table) {
         let metrics = stack.text("/metrics")?;
         let says = |line: &str| metrics.lines().any(|l| l == line);
         (says("kort_recording_active{thruster=\"t1\"} 0")
-            && says("kort_recordings_failed_total{thruster=\"t1\"} 1"))
+            && says("kort_recordings_failed_total{thruster=\"t1\"} 1")
+            && says("kort_faults_total{thruster=\"t1\",fault=\"recording_failed\"} 1")
+            && says("kort_fault_latched{thruster=\"t1\",fault=\"recording_failed\"} 1"))
         .then_some(())
     });
     wait("the event log to say so", || {

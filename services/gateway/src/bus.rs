@@ -78,7 +78,8 @@ pub fn run(
         let woke_ns = monotonic_ns();
         for bridge in &mut bridges {
             bridge.tick(deployment, recorder, pulse);
-            bridge.link.tally.gateway_timing(&ticker.timing);
+            let own_faults = bridge.link.thruster.heard().own_faults;
+            bridge.link.tally.gateway(&ticker.timing, own_faults);
         }
         ticker.worked(woke_ns);
         run_errands(&mut bridges, recorder, ticker.next_ns());

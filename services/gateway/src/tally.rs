@@ -24,6 +24,7 @@ pub struct Counts {
     estimates: Vec<Window>,
     servo_faults: u64,
     controller_faults: u64,
+    own_faults: u64,
     /// Times each fault was raised, in the order of [`Fault::ALL`].
     pub faults_raised: Vec<u64>,
     /// Telemetry samples read, and samples missed because the gateway came too late.
@@ -42,6 +43,7 @@ impl Tally {
             estimates: vec![Window::new(WINDOW_NS); ESTIMATES.len()],
             servo_faults: 0,
             controller_faults: 0,
+            own_faults: 0,
             faults_raised: vec![0; Fault::ALL.len()],
             telemetry: (0, 0),
             gateway: Timing::default(),
@@ -77,9 +79,12 @@ impl Tally {
         counts.raised(state.faults & !before);
     }
 
-    /// How the gateway's loop keeps time.
-    pub fn gateway_timing(&self, timing: &Timing) {
-        lock(&self.0).gateway = *timing;
+    /// How the gateway's loop keeps time, and the gateway's own faults, as a bitset.
+    pub fn gateway(&self, timing: &Timing, faults: u64) {
+        let counts = &mut *lock(&self.0);
+        counts.gateway = *timing;
+        let before = std::mem::replace(&mut counts.own_faults, faults);
+        counts.raised(faults & !before);
     }
 
     /// The figures now.
