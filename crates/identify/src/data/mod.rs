@@ -322,9 +322,8 @@ impl Prepared {
         let angle = recorded_angle.clone().or_else(|| counted_angle(series, rig));
         let depth = series.column("depth_m").map(filled);
         let temperature = series.column("temperature_c").map(filled);
-        // A speed without its sign would pull the shaft the wrong way.
         let signed = !crate::checks::is_unsigned_speed(series);
-        let measured_speed = series.column("shaft_speed_rad_s").filter(|_| signed).map(filled);
+        let measured_speed = series.column("shaft_speed_rad_s").map(filled);
         let enabled = series.column("torque_enable").map(held);
         let speed = (self.driving == Driving::Speed).then(|| self.driving_speed(series, rig));
         let mut ticks = Vec::with_capacity(count);
@@ -360,7 +359,8 @@ impl Prepared {
                 extra: 0.0,
                 released: enabled.as_deref().is_some_and(|e| e[row] < 0.5),
                 observed_angle_rad: recorded_angle.as_deref().map(|a| at(a, next_s)),
-                observed_speed_rad_s: measured_speed.as_deref().map(|s| at(s, next_s)),
+                observed_speed_rad_s: measured_speed.as_deref().filter(|_| signed).map(|s| at(s, next_s)),
+                observed_size_rad_s: measured_speed.as_deref().filter(|_| !signed).map(|s| at(s, next_s)),
                 course: Course::Any,
             });
             i += 1;

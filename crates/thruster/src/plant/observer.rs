@@ -9,7 +9,7 @@ use crate::real::Real;
 
 impl<T: Real> Plant<T> {
     /// Pulls the shaft toward [`Tick::observed_angle_rad`], or [`Tick::observed_speed_rad_s`] where no angle
-    /// is, with this bandwidth, rad/s; 0 is off.
+    /// is, or else [`Tick::observed_size_rad_s`], with this bandwidth, rad/s; 0 is off.
     pub fn with_observer(mut self, bandwidth_rad_s: f64) -> Self {
         self.observer_rad_s = bandwidth_rad_s.max(0.0);
         self
@@ -34,10 +34,42 @@ impl<T: Real> Plant<T> {
         } else if let Some(speed) = tick.observed_speed_rad_s {
             let behind = T::from(speed) - shown.shaft_speed_rad_s;
             self.x[SPEED] += behind * reach.min(1.0);
+        } else if let Some(size) = tick.observed_size_rad_s {
+            // How fast it turns is known; which way, the model tells.
+            let by = (T::from(size) - shown.shaft_speed_rad_s.abs()) * reach.min(1.0);
+            self.x[SPEED] += if self.x[SPEED].re() < 0.0 { -by } else { by };
         } else {
             return;
         }
         // The rates at hand are not those of the state that was pulled.
         self.moving = false;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::models::ModelName;
+    use crate::parameters::Parameters;
+    use crate::plant::{Plant, Tick};
+    use crate::rig::Rig;
+
+    /// Where a shaft ends that turns freely and is observed for two seconds.
+    fn ends_at(start_rad_s: f64, tick: &Tick) -> f64 {
+        let rig = "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = 0.01\ntorque_constant_nm_a = 1.0\n";
+        let rig = Rig::from_toml(rig).unwrap();
+        let mut plant: Plant = Plant::new(ModelName::Model2, &rig, &Parameters::stated(&rig), &[], 0.002)
+            .with_observer(std::f64::consts::TAU);
+        plant.start(0.0, start_rad_s, 0.0, 0.0, 0.0);
+        (0..1000).for_each(|k| plant.step(&Tick { time_s: 0.002 * f64::from(k), ..*tick }));
+        plant.truth().shaft_speed_rad_s
+    }
+
+    #[test]
+    fn a_speed_without_its_sign_pulls_the_way_the_shaft_turns() {
+        let signed = Tick { observed_speed_rad_s: Some(8.0), ..Tick::default() };
+        assert!((ends_at(-5.0, &signed) - 8.0).abs() < 0.01);
+        let size = Tick { observed_size_rad_s: Some(8.0), ..Tick::default() };
+        assert!((ends_at(5.0, &size) - 8.0).abs() < 0.01);
+        assert!((ends_at(-5.0, &size) + 8.0).abs() < 0.01);
     }
 }

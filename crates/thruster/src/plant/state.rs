@@ -31,6 +31,8 @@ pub struct Tick {
     pub observed_angle_rad: Option<f64>,
     /// Recorded shaft speed at the tick's end, rad/s, for the observer; used where no angle is.
     pub observed_speed_rad_s: Option<f64>,
+    /// The same of a sensor that does not know the direction, rad/s, never negative; used where neither is.
+    pub observed_size_rad_s: Option<f64>,
     /// What is known beforehand of the tick's course.
     pub course: Course,
 }
