@@ -24,6 +24,10 @@ pub struct Screened {
     pub hypothesis: Hypothesis,
     /// Derivatives there.
     pub columns: Columns,
+    /// Measured less simulated there, as lines.
+    pub lines: DVector<f64>,
+    /// The fit that it was looked at on top of.
+    pub upon: Arc<Fit>,
     /// Its cost there, without the prior odds of its effects.
     pub cost: f64,
 }
@@ -37,6 +41,7 @@ const CLOSELY: usize = 14;
 
 /// Screens effects on top of a fit, cheapest first. Effects that break the simulation down are left out.
 pub fn screen(problem: &Problem, parent: &Fit, probes: &[&[Probe]]) -> Vec<Screened> {
+    let parent = &Arc::new(parent.clone());
     let known = problem.about(&parent.lines, &parent.columns, &parent.hypothesis);
     let known = known.curvature();
     let mut promised: Vec<Promise> =
@@ -72,7 +77,7 @@ pub fn screen(problem: &Problem, parent: &Fit, probes: &[&[Probe]]) -> Vec<Scree
     all
 }
 
-fn at(problem: &Problem, parent: &Fit, known: &[DMatrix<f64>], member: Member) -> Option<Screened> {
+fn at(problem: &Problem, parent: &Arc<Fit>, known: &[DMatrix<f64>], member: Member) -> Option<Screened> {
     let effect = member.effect;
     let hypothesis = parent.hypothesis.with(&parent.values, member, &problem.scale);
     let own: Vec<usize> = (parent.values.len()..hypothesis.free.len()).collect();
@@ -94,5 +99,5 @@ fn at(problem: &Problem, parent: &Fit, known: &[DMatrix<f64>], member: Member) -
     let minimum = model.minimise(&parent.floor, &hypothesis.free, &hypothesis.start, 0.0);
     let cost = minimum.misfit + minimum.penalty + model.price(&minimum.noise);
     let columns = parent.columns.iter().cloned().chain(new.into_iter().map(|c| Some(Arc::new(c)))).collect();
-    Some(Screened { effect, hypothesis, columns, cost })
+    Some(Screened { effect, hypothesis, columns, lines, upon: parent.clone(), cost })
 }

@@ -4,6 +4,9 @@
 mod expand;
 mod forms;
 mod relatives;
+#[cfg(test)]
+mod tests;
+mod two_at_once;
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -43,6 +46,8 @@ pub struct Search<'a, 'p> {
     /// What a larger set cost when a smaller one was last fitted from where it ended.
     dropped: BTreeMap<(Set, Set), f64>,
     reshaped: BTreeSet<(Set, u64)>,
+    /// Sets from whose fit another was begun, with what they cost then.
+    exchanged: BTreeSet<(Set, Set, u64)>,
     /// What each effect does to the model, and to other equations in its place: by members without a size.
     probes: BTreeMap<Set, Vec<Vec<Probe>>>,
     /// In how many ways each effect may act here.
@@ -63,6 +68,7 @@ impl<'a, 'p> Search<'a, 'p> {
             screens: BTreeMap::new(),
             dropped: BTreeMap::new(),
             reshaped: BTreeSet::new(),
+            exchanged: BTreeSet::new(),
             probes: BTreeMap::new(),
             ways: Vec::new(),
             floors: BTreeMap::new(),
@@ -221,6 +227,12 @@ impl<'a, 'p> Search<'a, 'p> {
                 }
                 if self.cost(&next) >= before - 1e-9 {
                     next = self.relatives(&best);
+                }
+                if self.cost(&next) >= before - 1e-9 && best.len() + 1 < MOST_EFFECTS {
+                    next = self.two_at_once(&best);
+                    next = self.swap(next, progress);
+                    next = self.backward(next);
+                    self.reshape(&next);
                 }
                 if self.cost(&next) >= before - 1e-9 {
                     return best;

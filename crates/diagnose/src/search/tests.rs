@@ -1,0 +1,101 @@
+//! Steps of the search on a motor that rubs and whose speed is read late.
+
+use kort_identify::data::Series;
+use kort_identify::hypothesis::Member;
+use kort_identify::setup::Setup;
+use kort_thruster::effects::{Descriptor, coulomb_friction, encoder_filter_lag, position_dependent_friction};
+use kort_thruster::models::ModelName;
+use kort_thruster::rig::Rig;
+
+use super::{ITERATIONS, Search, Set};
+use crate::constants::Constants;
+
+const RIG: &str = "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = { value = 5e-6, tol = 0.5 }\n\
+                   torque_constant_nm_a = { value = 0.025, tol = 0.3 }\n[amplifier]\nkind = \"current\"\n";
+/// Dry friction, N m, and lag of the speed's reading, s.
+const FRICTION_N_M: f64 = 0.0025;
+const LAG_S: f64 = 0.03;
+
+/// Twenty seconds of a motor under measured current, logged at 200 Hz.
+fn recording() -> Series {
+    let (inertia, kt, dt) = (5e-6, 0.025, 2.5e-4);
+    let levels = [0.3, -0.35, 0.2, -0.3, 0.4, -0.25, 0.35, -0.4, 0.25, -0.2];
+    let (mut speed, mut angle, mut shown) = (0.0_f64, 0.0, 0.0);
+    let mut columns = vec![Vec::new(), Vec::new(), Vec::new()];
+    let mut time_s = Vec::new();
+    for k in 0..80_000_u32 {
+        let t = f64::from(k) * dt;
+        let current = levels[(t / 0.37) as usize % levels.len()] * (0.6 + 0.4 * (10.7 * t).sin());
+        if k % 20 == 0 {
+            let noise = 0.2 * (12.9898 * t * t).sin();
+            [current, angle, shown + noise].iter().zip(&mut columns).for_each(|(v, c)| c.push(*v));
+            time_s.push(t);
+        }
+        speed += kt * current / inertia * dt;
+        speed = speed.signum() * (speed.abs() - FRICTION_N_M / inertia * dt).max(0.0);
+        angle += speed * dt;
+        shown += (speed - shown) / LAG_S * dt;
+    }
+    let names = ["current_a", "shaft_angle_rad", "shaft_speed_rad_s"];
+    Series {
+        name: "motor".into(),
+        time_s,
+        columns: names.map(str::to_owned).into_iter().zip(columns).collect(),
+    }
+}
+
+/// A search with its baseline fitted.
+fn with_search(effects: Vec<&'static Descriptor>, then: impl FnOnce(&mut Search)) {
+    let rig = Rig::from_toml(RIG).unwrap();
+    let constants = Constants::built_in();
+    let Setup { problem, baseline, .. } =
+        Setup::new(&[recording()], &rig, ModelName::Model2, constants.criterion).unwrap();
+    let mut search = Search::new(&problem, effects, &constants);
+    search.fits.insert(Set::new(), problem.settle_from_stated(&baseline, ITERATIONS));
+    then(&mut search);
+}
+
+#[test]
+fn two_that_pay_together_are_found_without_either_alone() {
+    with_search(vec![&coulomb_friction::DESCRIPTOR, &encoder_filter_lag::DESCRIPTOR], |search| {
+        let nothing = Set::new();
+        // Screened, and no single one fitted: nothing is within reach of a bar so low.
+        assert!(search.expand(&nothing, f64::NEG_INFINITY).is_empty());
+        let both = search.two_at_once(&nothing);
+        assert_eq!(both, ["coulomb_friction", "encoder_filter_lag"]);
+        assert!(search.cost(&both) < search.cost(&nothing) - 100.0);
+        let fit = &search.fits[&both];
+        let members = search.problem.members(&fit.hypothesis, &fit.values);
+        let friction = members.iter().find(|m| m.effect.id == "coulomb_friction").unwrap().values[0];
+        assert!((friction / FRICTION_N_M - 1.0).abs() < 0.25, "{friction} N m");
+    });
+}
+
+#[test]
+fn the_plainer_of_two_takes_the_place_that_the_other_found() {
+    let (plain, bent) = (&coulomb_friction::DESCRIPTOR, &position_dependent_friction::DESCRIPTOR);
+    with_search(vec![plain, bent], |search| {
+        let baseline = search.fits[&Set::new()].clone();
+        let probes = search.probe_all(&Set::new());
+        search.probes.insert(Set::new(), probes);
+        let beside = |search: &Search, effect: &'static Descriptor| {
+            baseline.hypothesis.with(
+                &baseline.values,
+                Member::new(effect, &search.problem.scale),
+                &search.problem.scale,
+            )
+        };
+        let hypothesis = beside(search, bent);
+        search.fit_set(vec![bent.id], &hypothesis, &baseline.columns);
+        // The plainer one got lost on its way: it stands where it began.
+        let lost = search.problem.finish(search.problem.fit(
+            &beside(search, plain),
+            &Vec::new(),
+            &baseline.floor,
+            0,
+        ));
+        search.keep(vec![plain.id], lost);
+        assert!(search.cost(&vec![plain.id]) > search.cost(&vec![bent.id]) + 50.0);
+        assert_eq!(search.relatives(&vec![bent.id]), [plain.id]);
+    });
+}
