@@ -70,8 +70,8 @@ impl Search<'_, '_> {
         Some(self.problem.settle(&best.resume(), &best.columns, floor, ITERATIONS))
     }
 
-    /// The best fit with an effect in the place of a member, all else where the set's fit has it; none where it does
-    /// no better than what is known of that set.
+    /// The best fit with an effect in the place of a member, all else where the set's fit has it; none where a
+    /// few steps do not lead near, or it does no better than what is known of that set.
     fn exchange(&self, set: &Set, member: &str, effect: &'static Descriptor, floor: &Floor) -> Option<Fit> {
         let from = self.fits.get(set)?;
         let place = with(&without(set, member), effect.id);
@@ -100,7 +100,12 @@ impl Search<'_, '_> {
         let beside =
             |start: Vec<f64>| (base.with(&base.start, whole.clone().at(start), scale), columns.clone());
         let best = self.begun(starts.into_iter().map(beside).collect(), floor)?;
-        let fit = self.problem.settle(&best.resume(), &best.columns, floor, ITERATIONS);
+        let first = self.problem.finish(best);
+        let reach = self.cost(set) + self.doubt(known.min(first.cost()) - self.cost(set));
+        if first.cost() + self.prior(&place) > reach {
+            return None;
+        }
+        let fit = self.problem.settle(&first.resume(), &first.columns, floor, ITERATIONS);
         (fit.cost() + self.prior(&place) < known).then_some(fit)
     }
 
