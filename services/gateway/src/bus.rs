@@ -78,8 +78,7 @@ pub fn run(
         let woke_ns = monotonic_ns();
         for bridge in &mut bridges {
             bridge.tick(deployment, recorder, pulse);
-            let own_faults = bridge.link.thruster.heard().own_faults;
-            bridge.link.tally.gateway(&ticker.timing, own_faults);
+            bridge.link.tally.gateway(&ticker.timing, bridge.link.thruster.heard().own_faults);
         }
         ticker.worked(woke_ns);
         run_errands(&mut bridges, recorder, ticker.next_ns());
