@@ -43,7 +43,7 @@ pub struct SearchConstants {
 pub struct PosteriorConstants {
     /// Odds of two sets are `exp(-difference of cost / (2 temper))`.
     pub temper: f64,
-    /// Probability that no set that was fitted is right.
+    /// Odds against the likeliest set by the square of the number of its effects.
     pub surprise: f64,
     /// Factor on a name in a set that needs a nameless term: the world then holds what the catalogue does not.
     pub beside_unknown: f64,

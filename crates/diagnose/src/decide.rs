@@ -150,7 +150,7 @@ mod tests {
 
     fn decided(costs: &[(&[&'static str], f64)], circumstances: &Circumstances) -> Decision {
         let costs = costs.iter().map(|(set, cost)| (set.to_vec(), *cost)).collect();
-        decide(&posterior(costs, 3.0, 0.03), circumstances)
+        decide(&posterior(costs, 3.0, 0.01), circumstances)
     }
 
     #[test]

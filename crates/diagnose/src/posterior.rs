@@ -14,16 +14,25 @@ pub struct Explanation {
     pub probability: f64,
 }
 
-/// Probabilities of sets, likeliest first: in proportion to `exp(-cost / (2 temper))`, `surprise` left for
-/// sets that were not fitted. A temper above one says that costs differ by more than the truth behind them,
-/// since no form is exact.
+/// How far a set of so many effects may be believed if it is the likeliest by far. What was not fitted may be right
+/// instead, and the more effects a set has, the more of them make up for each other's equations: the odds against it grow
+/// as the square of their number.
+pub fn trusted(effects: usize, surprise: f64) -> f64 {
+    1.0 / (1.0 + surprise * (effects as f64).powi(2))
+}
+
+/// Probabilities of sets, likeliest first: in proportion to `exp(-cost / (2 temper))`, as far as each may be [`trusted`].
+/// A temper above one says that costs differ by more than the truth behind them, since no form is exact.
 pub fn posterior(costs: Vec<(Set, f64)>, temper: f64, surprise: f64) -> Vec<Explanation> {
     let least = costs.iter().map(|c| c.1).fold(f64::INFINITY, f64::min);
     let weight = |cost: f64| (-(cost - least) / (2.0 * temper)).exp();
     let total: f64 = costs.iter().map(|c| weight(c.1)).sum();
     let mut all: Vec<Explanation> = costs
         .into_iter()
-        .map(|(set, cost)| Explanation { probability: (1.0 - surprise) * weight(cost) / total, set, cost })
+        .map(|(set, cost)| {
+            let probability = trusted(set.len(), surprise) * weight(cost) / total;
+            Explanation { set, cost, probability }
+        })
         .collect();
     all.sort_by(|a, b| a.cost.total_cmp(&b.cost).then_with(|| a.set.cmp(&b.set)));
     all
@@ -66,8 +75,8 @@ mod tests {
     fn equal_sets_share_and_a_far_one_has_nothing() {
         let costs = vec![(vec!["a"], 10.0), (vec!["b"], 10.0), (vec![], 500.0)];
         let all = posterior(costs, 3.0, 0.04);
-        assert!((presence(&all, "a", 0.7) - 0.48).abs() < 1e-12);
-        assert!((presence(&all, "b", 0.7) - 0.48).abs() < 1e-12);
+        assert!((presence(&all, "a", 0.7) - 0.5 / 1.04).abs() < 1e-12);
+        assert!((presence(&all, "b", 0.7) - 0.5 / 1.04).abs() < 1e-12);
         assert!(all[2].probability < 1e-12);
     }
 
@@ -85,7 +94,7 @@ mod tests {
     fn an_effect_in_every_likely_set_is_as_sure_as_all_of_them() {
         let costs = vec![(vec!["a", "b"], 0.0), (vec!["a", "c"], 1.0), (vec!["a"], 60.0)];
         let all = posterior(costs, 3.0, 0.03);
-        assert!((presence(&all, "a", 0.7) - 0.97).abs() < 1e-3);
+        assert!((presence(&all, "a", 0.7) - 1.0 / 1.12).abs() < 1e-3, "as two may be trusted");
         assert!(presence(&all, "b", 0.7) > presence(&all, "c", 0.7));
     }
 }

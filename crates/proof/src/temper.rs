@@ -63,8 +63,8 @@ impl Weighed {
         Some(Self { fold, hidden, sets, standing })
     }
 
-    /// Probability of every name under a temper.
-    pub fn names(&self, temper: f64) -> BTreeMap<&str, f64> {
+    /// Probability of every name under a temper, each set as far as one of so many effects is trusted.
+    pub fn names(&self, temper: f64, trust: Trust) -> BTreeMap<&str, f64> {
         let cost = |set: &(f64, f64, Vec<String>)| set.0 / (2.0 * temper) + set.1;
         let least = self.sets.iter().map(cost).fold(f64::INFINITY, f64::min);
         let weights: Vec<f64> = self.sets.iter().map(|set| (least - cost(set)).exp()).collect();
@@ -72,16 +72,16 @@ impl Weighed {
         let mut out = BTreeMap::new();
         for (set, weight) in self.sets.iter().zip(weights) {
             for name in &set.2 {
-                *out.entry(name.as_str()).or_insert(0.0) += weight / total;
+                *out.entry(name.as_str()).or_insert(0.0) += trust(set.2.len()) * weight / total;
             }
         }
         out
     }
 
     /// Logarithmic score, at most zero: of every name that any set holds, and of hidden ones that none does.
-    pub fn score(&self, temper: f64, surprise: f64) -> f64 {
-        let names = self.names(temper);
-        let stated = |name: &str| (1.0 - surprise) * names.get(name).copied().unwrap_or(0.0).min(1.0);
+    pub fn score(&self, temper: f64, trust: Trust) -> f64 {
+        let names = self.names(temper, trust);
+        let stated = |name: &str| names.get(name).copied().unwrap_or(0.0).min(1.0);
         let wrong = names.keys().filter(|name| self.standing.get(**name) == Some(&Standing::Wrong));
         let akin = self.standing.values().any(|standing| *standing == Standing::Akin);
         wrong.map(|name| (1.0 - stated(name)).max(LEAST).ln()).sum::<f64>()
@@ -95,13 +95,16 @@ impl Weighed {
 }
 
 /// A temper's mean score over cases.
-pub fn mean_score(cases: &[&Weighed], temper: f64, surprise: f64) -> f64 {
-    cases.iter().map(|case| case.score(temper, surprise)).sum::<f64>() / cases.len().max(1) as f64
+pub fn mean_score(cases: &[&Weighed], temper: f64, trust: Trust) -> f64 {
+    cases.iter().map(|case| case.score(temper, trust)).sum::<f64>() / cases.len().max(1) as f64
 }
 
+/// How far a set of so many effects is trusted.
+pub type Trust<'a> = &'a dyn Fn(usize) -> f64;
+
 /// The temper that scores best on some cases.
-pub fn best(cases: &[&Weighed], surprise: f64) -> f64 {
-    let score = |temper: &f64| mean_score(cases, *temper, surprise);
+pub fn best(cases: &[&Weighed], trust: Trust) -> f64 {
+    let score = |temper: &f64| mean_score(cases, *temper, trust);
     TEMPERS.into_iter().max_by(|a, b| score(a).total_cmp(&score(b))).unwrap_or(TEMPERS[0])
 }
 
@@ -121,19 +124,19 @@ pub struct LeftOut {
 }
 
 /// Fits on all folds but one, and tests on that.
-pub fn cross_validate(cases: &[Weighed], in_use: f64, surprise: f64) -> Vec<LeftOut> {
+pub fn cross_validate(cases: &[Weighed], in_use: f64, trust: Trust) -> Vec<LeftOut> {
     let folds: std::collections::BTreeSet<usize> = cases.iter().map(|case| case.fold).collect();
     folds
         .into_iter()
         .map(|fold| {
             let (here, others): (Vec<&Weighed>, Vec<&Weighed>) = cases.iter().partition(|c| c.fold == fold);
-            let temper = best(&others, surprise);
+            let temper = best(&others, trust);
             LeftOut {
                 fold,
                 cases: here.len(),
                 temper,
-                score: mean_score(&here, temper, surprise),
-                in_use: mean_score(&here, in_use, surprise),
+                score: mean_score(&here, temper, trust),
+                in_use: mean_score(&here, in_use, trust),
             }
         })
         .collect()
@@ -156,7 +159,7 @@ mod tests {
 
     #[test]
     fn probabilities_follow_cost_and_rarity() {
-        let p = case(0, 10.0, true).names(1.0)["a"];
+        let p = case(0, 10.0, true).names(1.0, &|_| 1.0)["a"];
         assert!((p - 1.0 / (1.0 + (3.0_f64 - 5.0).exp())).abs() < 1e-12);
     }
 
@@ -164,10 +167,10 @@ mod tests {
     fn where_large_gains_are_wrong_half_the_time_the_best_temper_is_high() {
         let honest: Vec<Weighed> = (0..20).map(|k| case(k % 2, 30.0, true)).collect();
         let deceived: Vec<Weighed> = (0..20).map(|k| case(k % 2, 30.0, k % 4 < 2)).collect();
-        let all = |cases: &[Weighed]| best(&cases.iter().collect::<Vec<_>>(), 0.01);
+        let all = |cases: &[Weighed]| best(&cases.iter().collect::<Vec<_>>(), &|_| 0.99);
         assert!(all(&honest) <= 2.0);
         assert!(all(&deceived) >= 4.0);
-        let left_out = cross_validate(&deceived, 1.0, 0.01);
+        let left_out = cross_validate(&deceived, 1.0, &|_| 0.99);
         assert_eq!(left_out.iter().map(|l| l.cases).sum::<usize>(), 20);
         assert!(left_out.iter().all(|l| l.score > l.in_use), "{left_out:?}");
     }

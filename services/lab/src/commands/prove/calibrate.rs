@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use kort_diagnose::constants::Constants;
+use kort_diagnose::posterior::trusted;
 use kort_proof::calibrate::{Fold, fold_of, records};
 use kort_proof::score::Scored;
 use kort_proof::temper::{TEMPERS, Weighed, best, cross_validate, mean_score};
@@ -49,14 +50,15 @@ fn print_temper(results: &[(Scored, Answer, Value)], by: Fold, folds: usize) {
         .filter_map(|(_, answer, report)| Weighed::of(answer, report, fold_of(answer, by, folds)))
         .collect();
     let odds = Constants::built_in().posterior;
+    let trust = |effects| trusted(effects, odds.surprise);
     let all: Vec<&Weighed> = cases.iter().collect();
     eprintln!("temper  mean log score of the names in {} cases (0 is best)", all.len());
     for temper in TEMPERS {
-        eprintln!("{temper:6}  {:.3}", mean_score(&all, temper, odds.surprise));
+        eprintln!("{temper:6}  {:.3}", mean_score(&all, temper, &trust));
     }
-    eprintln!("best {}, in use {}", best(&all, odds.surprise), odds.temper);
+    eprintln!("best {}, in use {}", best(&all, &trust), odds.temper);
     eprintln!("fold  cases  fitted on the others  its score here  in use");
-    for left in cross_validate(&cases, odds.temper, odds.surprise) {
+    for left in cross_validate(&cases, odds.temper, &trust) {
         let (fold, count, temper) = (left.fold, left.cases, left.temper);
         eprintln!("{fold:4}  {count:5}  {temper:20}  {:14.3}  {:6.3}", left.score, left.in_use);
     }
