@@ -34,7 +34,12 @@ pub fn posterior(costs: Vec<(Set, f64)>, temper: f64, surprise: f64) -> Vec<Expl
             Explanation { set, cost, probability }
         })
         .collect();
-    all.sort_by(|a, b| a.cost.total_cmp(&b.cost).then_with(|| a.set.cmp(&b.set)));
+    all.sort_by(|a, b| {
+        b.probability
+            .total_cmp(&a.probability)
+            .then(a.cost.total_cmp(&b.cost))
+            .then_with(|| a.set.cmp(&b.set))
+    });
     all
 }
 
