@@ -104,6 +104,7 @@ fn run_errands(bridges: &mut [Bridge], recorder: &Recorder, until_ns: u64) {
 
 struct Bridge {
     link: Link,
+    /// What the supervisor writes down.
     watched: PathBuf,
     ports: Option<GatewayPorts>,
     checked: Option<Instant>,
@@ -122,7 +123,6 @@ struct Bridge {
     ramping: bool,
     /// Until when answers are looked for between two ticks.
     errands_until: Option<Instant>,
-    /// A request had no answer in time: the way to who should have answered may never have come about.
     unanswered: bool,
 }
 
@@ -161,6 +161,7 @@ impl Bridge {
             return;
         };
         self.receive(&ports, recorder, now);
+        // The way to who should have answered may never have come about.
         if std::mem::take(&mut self.unanswered)
             && let Err(error) = ports.reconnect_requests(deployment, &self.link.thruster.id)
         {
