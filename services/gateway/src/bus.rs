@@ -161,7 +161,6 @@ impl Bridge {
             return;
         };
         self.receive(&ports, recorder, now);
-        // The way to who should have answered may never have come about.
         if std::mem::take(&mut self.unanswered)
             && let Err(error) = ports.reconnect_requests(deployment, &self.link.thruster.id)
         {

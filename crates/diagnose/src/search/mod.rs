@@ -230,9 +230,11 @@ impl<'a, 'p> Search<'a, 'p> {
                 }
                 if self.cost(&next) >= before - 1e-9 && best.len() + 1 < MOST_EFFECTS {
                     next = self.two_at_once(&best);
-                    next = self.swap(next, progress);
-                    next = self.backward(next);
-                    self.reshape(&next);
+                    if next != best {
+                        next = self.swap(next, progress);
+                        next = self.backward(next);
+                        self.reshape(&next);
+                    }
                 }
                 if self.cost(&next) >= before - 1e-9 {
                     return best;
