@@ -15,10 +15,10 @@ use crate::hypothesis::{Free, Target};
 pub struct Instant<'a, T> {
     /// At the instant.
     pub now: &'a Sensed<T>,
-    /// At the two ends of the control tick that it lies in.
-    pub tick: (&'a Sensed<T>, &'a Sensed<T>),
-    /// Length of that tick, s.
-    pub tick_s: f64,
+    /// At the two ends of the step of the simulation that it lies in.
+    pub step: (&'a Sensed<T>, &'a Sensed<T>),
+    /// Length of that step, s.
+    pub step_s: f64,
     /// At the log instant before.
     pub last_row: &'a Sensed<T>,
     /// Time since then, s.
@@ -26,12 +26,12 @@ pub struct Instant<'a, T> {
 }
 
 impl<T: Real> Instant<'_, T> {
-    /// Rate of change of a response, over the last row for a slow sensor, else over the tick.
+    /// Rate of change of a response, over the last row for a slow sensor, else over the step.
     pub fn rate(&self, response: Response, slow: bool) -> T {
         let (from, to, span) = if slow {
             (self.last_row, self.now, self.row_s)
         } else {
-            (self.tick.0, self.tick.1, self.tick_s)
+            (self.step.0, self.step.1, self.step_s)
         };
         (response.of(to) - response.of(from)) / span
     }
@@ -157,7 +157,7 @@ mod tests {
         let at = |speed| Sensed { shaft_speed_rad_s: speed, ..Sensed::default() };
         let (now, before, last_row) = (at(5.0), at(4.0), at(1.0));
         let instant =
-            Instant { now: &now, tick: (&before, &now), tick_s: 0.002, last_row: &last_row, row_s: 0.01 };
+            Instant { now: &now, step: (&before, &now), step_s: 0.002, last_row: &last_row, row_s: 0.01 };
         let of = |slow| {
             let target = Target::Sampling { response: Response::ShaftSpeed, slow };
             let late = vec![Free { target, ..numbers()[0].clone() }];

@@ -7,7 +7,7 @@ use kort_thruster::dual::{Dual, LANES};
 use kort_thruster::effects::{Descriptor, Scale, Stretch};
 use kort_thruster::models::ModelName;
 use kort_thruster::parameters::Parameters;
-use kort_thruster::plant::{Driven, Plant, Sensed, Tick};
+use kort_thruster::plant::{Plant, Sensed};
 use kort_thruster::real::Real;
 use kort_thruster::rig::Rig;
 use nalgebra::DVector;
@@ -303,44 +303,44 @@ fn run<T: Real>(
     let mut next = stimulus.logs.iter().enumerate().peekable();
     let mut before = plant.sensed();
     let mut last_row = before;
-    let mut log = |row: usize, now: &Sensed<T>, tick: (&Sensed<T>, &Sensed<T>)| {
+    let mut log = |row: usize, now: &Sensed<T>, step: (&Sensed<T>, &Sensed<T>), step_s: f64| {
         let row_s = if row == 0 { tick_s } else { time_s[row] - time_s[row - 1] };
-        show(row, &Instant { now, tick, tick_s, last_row: &last_row, row_s });
+        show(row, &Instant { now, step, step_s, last_row: &last_row, row_s });
         last_row = *now;
     };
     // An instant on the grid shows the state before that tick's command acts.
     while let Some((row, _)) = next.next_if(|(_, (tick, part))| *tick == 0 && *part == 0.0) {
-        log(row, &before, (&before, &before));
+        log(row, &before, (&before, &before), tick_s);
     }
     let mut leaps = recording.leaps.iter().peekable();
-    for (i, (tick, command)) in stimulus.ticks.iter().zip(commands).enumerate() {
+    let mut i = 0;
+    while i < stimulus.ticks.len() {
         if let Some(leap) = leaps.next_if(|leap| leap.tick == i) {
-            plant.leap(tick.time_s, leap);
+            plant.leap(stimulus.ticks[i].time_s, leap);
         }
         let Some((_, (at, part))) = next.peek() else { break };
-        let shows = *at == i && *part > 0.0 || *at == i + 1 && *part == 0.0;
+        let count = recording.strides.get(i).copied().unwrap_or(1);
+        let end = i + count;
+        let shows = *at == i && *part > 0.0 || *at == end && *part == 0.0;
         if shows {
             before = plant.sensed();
         }
-        let driven = match tick.driven {
-            Driven::Current(..) => Driven::Current(*command, *command),
-            other => other,
-        };
-        plant.step(&Tick { command: *command, driven, ..*tick });
-        if !shows {
-            continue;
+        plant.stride(&stimulus.ticks[i..end], Some(&commands[i..end]));
+        if shows {
+            let after = plant.sensed();
+            let span_s = tick_s * count as f64;
+            while let Some((row, (_, part))) =
+                next.next_if(|(_, (at, part))| *at == i && *part > 0.0 || *at == end && *part == 0.0)
+            {
+                let now = if *part > 0.0 { before.between(&after, *part) } else { after };
+                log(row, &now, (&before, &after), span_s);
+            }
         }
-        let after = plant.sensed();
-        while let Some((row, (_, part))) =
-            next.next_if(|(_, (at, part))| *at == i && *part > 0.0 || *at == i + 1 && *part == 0.0)
-        {
-            let now = if *part > 0.0 { before.between(&after, *part) } else { after };
-            log(row, &now, (&before, &after));
-        }
+        i = end;
     }
     // Instants past the last tick see the last state.
     let end = plant.sensed();
     for (row, _) in next {
-        log(row, &end, (&end, &end));
+        log(row, &end, (&end, &end), tick_s);
     }
 }

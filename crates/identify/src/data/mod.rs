@@ -137,6 +137,8 @@ pub struct Prepared {
     pub driving: Driving,
     /// Measured responses.
     pub channels: Vec<Channel>,
+    /// How many ticks may be passed at once from each on.
+    pub strides: Vec<usize>,
     /// Jumps of the command: the first row that shows each.
     pub edges: Vec<usize>,
     /// Command at each row.
@@ -272,6 +274,7 @@ impl Prepared {
             stimulus: Stimulus::default(),
             driving,
             channels,
+            strides: Vec::new(),
             edges: Vec::new(),
             command: if driving == Driving::Current { steps_of(&recorded) } else { recorded },
             ticks_per_row: (row_s / tick_s).round() as usize,

@@ -55,6 +55,11 @@ pub trait Effect<T = f64>: Send {
     fn slow(&self) -> bool {
         self.states() == 0
     }
+    /// Whether what it does may change within a few ticks though the machine's motion hardly does: with the angle within
+    /// a turn.
+    fn brisk(&self) -> bool {
+        false
+    }
     /// Smallest share of the shaft's inertia that its states let move by itself.
     fn lightest_share(&self) -> f64 {
         1.0

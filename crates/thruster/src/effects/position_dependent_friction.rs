@@ -63,6 +63,10 @@ struct PositionDependentFriction<T> {
 }
 
 impl<T: Real> Effect<T> for PositionDependentFriction<T> {
+    fn brisk(&self) -> bool {
+        true
+    }
+
     fn hooks(&self) -> Hooks {
         Hooks::BALANCE
     }

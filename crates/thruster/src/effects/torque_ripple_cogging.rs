@@ -149,6 +149,10 @@ impl<T: Real> TorqueRipple<T> {
 }
 
 impl<T: Real> Effect<T> for TorqueRipple<T> {
+    fn brisk(&self) -> bool {
+        true
+    }
+
     fn hooks(&self) -> Hooks {
         Hooks::BALANCE
     }

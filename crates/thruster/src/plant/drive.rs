@@ -7,22 +7,25 @@ use crate::real::Real;
 use crate::rig::AmplifierKind;
 
 /// What the drive does over one tick.
+#[derive(Clone, Copy)]
 pub(super) struct Course<T> {
     drive: Drive<T>,
+    /// A measured current that takes the command's place, at start and end of the tick, A.
+    measured_a: Option<(f64, f64)>,
     /// Whether the current depends on the speed reached within the tick: through the back-EMF.
     by_speed: bool,
-    /// Current at start, middle and end of the tick where it does not, A.
-    current_a: [T; 3],
+    /// Current at start and end of the tick where it does not, A.
+    current_a: [T; 2],
     /// Shaft speed at start and end, rad/s, where it is imposed.
     pub(super) speed_rad_s: Option<(T, T)>,
 }
 
 impl<T: Real> Plant<T> {
-    /// Runs the effects on the drive and lays out the tick.
+    /// Runs the effects on the drive and lays out a tick under a command, in place of the tick's own.
     #[inline(always)]
-    pub(super) fn drive_over(&mut self, tick: &Tick) -> Course<T> {
+    pub(super) fn drive_over(&mut self, tick: &Tick, command: Option<f64>) -> Course<T> {
         let mut drive = Drive {
-            command: T::from(tick.command),
+            command: T::from(command.unwrap_or(tick.command)),
             current_limit_a: T::from(self.current_limit_a),
             time_constant_s: self.parameters.get(P::TimeConstantS),
             supply_v: T::from(tick.supply_v.unwrap_or(self.nominal_supply_v)),
@@ -50,21 +53,58 @@ impl<T: Real> Plant<T> {
             }
             _ => tick.driven_speed().map(|(a, b)| (T::from(a), T::from(b))),
         };
-        let current_a = if by_speed {
-            [T::ZERO; 3]
-        } else {
-            [0.0, 0.5, 1.0].map(|part| self.current_path(tick, &drive, part, T::ZERO))
+        let measured_a = match tick.driven {
+            Driven::Current(a, b) => Some(command.map_or((a, b), |mean| (mean, mean))),
+            _ => None,
         };
-        Course { drive, by_speed, current_a, speed_rad_s }
+        let mut course = Course { drive, measured_a, by_speed, current_a: [T::ZERO; 2], speed_rad_s };
+        self.lay_out(tick, &mut course);
+        course
+    }
+
+    /// The currents of a tick, where no speed is needed for them.
+    #[inline(always)]
+    fn lay_out(&self, tick: &Tick, course: &mut Course<T>) {
+        if !course.by_speed {
+            course.current_a = [0.0, 1.0].map(|part| self.current_path(tick, course, part, T::ZERO));
+        }
+    }
+
+    /// Runs the drive through ticks of which the first is laid out, while the shaft goes straight from one speed to
+    /// another: the last one's layout, with the current at its start in place.
+    #[inline(always)]
+    pub(super) fn drive_to_last(
+        &mut self,
+        (ticks, commands): (&[Tick], Option<&[f64]>),
+        first: Course<T>,
+        [from, to]: [T; 2],
+    ) -> Course<T> {
+        let mut course = first;
+        let count = ticks.len() as f64;
+        let command = |k: usize| commands.map(|all| all[k]);
+        for (k, pair) in ticks.windows(2).enumerate() {
+            let speed = from + (to - from) * ((k as f64 + 1.0) / count);
+            self.current_a = self.current_at(&pair[0], &course, 1.0, speed);
+            let (tick, command) = (&pair[1], command(k + 1));
+            if self.drive_hooks.is_empty() && !course.by_speed && course.measured_a.is_none() {
+                // The same drive under another command.
+                course.drive.command = T::from(command.unwrap_or(tick.command));
+                self.lay_out(tick, &mut course);
+            } else {
+                self.x[SPEED] = speed;
+                course = self.drive_over(tick, command);
+            }
+        }
+        course
     }
 
     /// Motor current, A, `part` of the tick after its start, where the shaft has this speed.
     #[inline(always)]
     pub(super) fn current_at(&self, tick: &Tick, course: &Course<T>, part: f64, speed_rad_s: T) -> T {
-        if course.by_speed || part != 0.0 && part != 0.5 && part != 1.0 {
-            self.current_path(tick, &course.drive, part, speed_rad_s)
+        if course.by_speed || part != 0.0 && part != 1.0 {
+            self.current_path(tick, course, part, speed_rad_s)
         } else {
-            course.current_a[(2.0 * part) as usize]
+            course.current_a[part as usize]
         }
     }
 
@@ -79,8 +119,10 @@ impl<T: Real> Plant<T> {
         T::from(2.0 * power_w) / (back_emf_v + root_v)
     }
 
-    fn current_path(&self, tick: &Tick, drive: &Drive<T>, part: f64, speed_rad_s: T) -> T {
-        if let Driven::Current(a, b) = tick.driven {
+    #[inline(always)]
+    fn current_path(&self, tick: &Tick, course: &Course<T>, part: f64, speed_rad_s: T) -> T {
+        let drive = &course.drive;
+        if let Some((a, b)) = course.measured_a {
             return T::from(a + (b - a) * part);
         }
         // Open terminals: no current, and so no braking by the back-EMF.

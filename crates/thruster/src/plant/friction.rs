@@ -34,6 +34,18 @@ impl<T: Real> Rub<T> {
         Self { ahead: (self.ahead + other.ahead) * 0.5, astern: (self.astern + other.astern) * 0.5 }
     }
 
+    /// Whether nothing rubs.
+    #[inline(always)]
+    pub(super) fn is_none(self) -> bool {
+        self.largest() == 0.0
+    }
+
+    /// The stronger of both sides, rad/s^2.
+    #[inline(always)]
+    pub(super) fn largest(self) -> f64 {
+        self.ahead.re().max(self.astern.re())
+    }
+
     /// The shaft speed that is left of `speed` after friction acted for `time_s`.
     #[inline(always)]
     pub(super) fn slow(self, speed: T, time_s: T) -> T {

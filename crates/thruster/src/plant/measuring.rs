@@ -1,6 +1,6 @@
 //! The measuring chain: encoder, filters, and what the sensors show, once a tick.
 
-use super::{ANGLE, Balance, Plant, SPEED, Sensed, Tick};
+use super::{ANGLE, Balance, Local, Plant, Sensed, Tick};
 use crate::models::ModelName;
 use crate::real::Real;
 
@@ -14,6 +14,23 @@ pub(super) struct Filters<T> {
     pub(super) last_thrust_n: T,
     pub(super) torque_n_m: T,
     pub(super) last_torque_n_m: T,
+}
+
+/// The way through one tick or several: where it began, and the shaft's own angle at both ends, rad.
+pub(super) struct Way<T> {
+    pub(super) from: Local<T>,
+    pub(super) from_rad: T,
+    pub(super) to_rad: T,
+}
+
+impl<T: Real> Way<T> {
+    /// The shaft's angle a part of the way, with a speed that runs straight to this one.
+    #[inline(always)]
+    fn angle_at(&self, to_rad_s: T, part: f64, span_s: f64) -> T {
+        let from_rad_s = self.from.shaft_speed_rad_s;
+        let bent = (to_rad_s - from_rad_s) * (0.5 * span_s * part * (part - 1.0));
+        self.from_rad + (self.to_rad - self.from_rad) * part + bent
+    }
 }
 
 impl<T: Real> Filters<T> {
@@ -42,34 +59,91 @@ impl<T: Real> Plant<T> {
         self.filters.last_thrust_n
     }
 
-    /// The measuring chain, once a tick.
-    pub(super) fn observe(&mut self, tick: &Tick, balance: &Balance<T>, filter: bool) {
-        let dt = self.tick_s;
-        let s = &self.sensors;
+    /// The measuring chain, once a tick: over several ticks that were passed at once everything is taken to have run
+    /// straight, the shaft's speed too.
+    #[inline(always)]
+    pub(super) fn observe(&mut self, ticks: &[Tick], way: &Way<T>, balance: &Balance<T>) {
+        let (thrust, torque) = (balance.thrust_n + balance.stand_n, balance.blade_torque_n_m);
+        if let [tick] = ticks {
+            self.encode(self.x[ANGLE]);
+            self.weigh(thrust, torque, 1);
+            self.true_thrust_n = balance.thrust_n;
+            return self.show(tick, tick.time_s + self.tick_s);
+        }
+        let (end, count) = (self.at, ticks.len() as f64);
+        let span_s = self.tick_s * count;
+        let from = (self.filters.last_thrust_n, self.filters.last_torque_n_m, self.true_thrust_n);
+        let alone = self.sense_hooks.is_empty();
+        for (k, tick) in ticks.iter().enumerate() {
+            let part = (k as f64 + 1.0) / count;
+            let mix = |a: T, b: T| a + (b - a) * part;
+            self.at.shaft_speed_rad_s = mix(way.from.shaft_speed_rad_s, end.shaft_speed_rad_s);
+            self.encode(way.angle_at(end.shaft_speed_rad_s, part, span_s));
+            if !alone {
+                self.weigh(mix(from.0, thrust), mix(from.1, torque), 1);
+                self.at.axial_m_s = mix(way.from.axial_m_s, end.axial_m_s);
+                self.current_a = mix(way.from.current_a, end.current_a);
+                self.true_thrust_n = mix(from.2, balance.thrust_n);
+                self.show(tick, tick.time_s + self.tick_s);
+            }
+        }
+        (self.at, self.current_a, self.true_thrust_n) = (end, end.current_a, balance.thrust_n);
+        if alone {
+            self.weigh(thrust, torque, ticks.len());
+            if let Some(last) = ticks.last() {
+                self.show(last, last.time_s + self.tick_s);
+            }
+        }
+    }
+
+    /// The encoder over one tick to where the shaft's angle is this.
+    #[inline(always)]
+    fn encode(&mut self, angle_rad: T) {
+        let angle = self.encoded(angle_rad);
         let f = &mut self.filters;
-        let mut angle = self.x[ANGLE];
-        if let (true, Some(counts)) = (self.quantise_encoder, s.encoder_counts_per_rev) {
-            let quantum = std::f64::consts::TAU / counts;
-            angle = T::from((angle.re() / quantum).floor() * quantum);
-        }
         f.angle_rad = angle;
-        if filter {
-            // Angle differenced at the control rate, then a first-order filter.
-            let raw = (angle - f.last_angle_rad) / dt;
-            f.speed_rad_s = match self.decays.speed {
-                Some(left) => raw + (f.speed_rad_s - raw) * left,
-                _ if s.encoder_counts_per_rev.is_some() => raw,
-                _ => self.x[SPEED],
-            };
-            f.last_angle_rad = angle;
-            let (thrust, torque) = (balance.thrust_n + balance.stand_n, balance.blade_torque_n_m);
-            f.thrust_n = first_order(f.thrust_n, f.last_thrust_n, thrust, dt, self.decays.thrust);
-            f.torque_n_m = first_order(f.torque_n_m, f.last_torque_n_m, torque, dt, self.decays.torque);
-            f.last_thrust_n = thrust;
-            f.last_torque_n_m = balance.blade_torque_n_m;
+        // Angle differenced at the control rate, then a first-order filter.
+        let raw = (angle - f.last_angle_rad) / self.tick_s;
+        f.speed_rad_s = match self.decays.speed {
+            Some(left) => raw + (f.speed_rad_s - raw) * left,
+            _ if self.sensors.encoder_counts_per_rev.is_some() => raw,
+            _ => self.at.shaft_speed_rad_s,
+        };
+        f.last_angle_rad = angle;
+    }
+
+    /// The filters of thrust and torque over some ticks through which both run straight to these.
+    #[inline(always)]
+    fn weigh(&mut self, thrust_n: T, torque_n_m: T, ticks: usize) {
+        let span_s = self.tick_s * ticks as f64;
+        let over = |filter: Option<(f64, f64)>| match ticks {
+            1 => filter,
+            _ => filter.map(|(tau, left)| (tau, left.powi(ticks as i32))),
+        };
+        let (of_thrust, of_torque) = (over(self.decays.thrust), over(self.decays.torque));
+        let f = &mut self.filters;
+        f.thrust_n = first_order(f.thrust_n, f.last_thrust_n, thrust_n, span_s, of_thrust);
+        f.torque_n_m = first_order(f.torque_n_m, f.last_torque_n_m, torque_n_m, span_s, of_torque);
+        f.last_thrust_n = thrust_n;
+        f.last_torque_n_m = torque_n_m;
+    }
+
+    /// An angle as the encoder counts it.
+    pub(super) fn encoded(&self, angle_rad: T) -> T {
+        match self.sensors.encoder_counts_per_rev {
+            Some(counts) if self.quantise_encoder => {
+                let quantum = std::f64::consts::TAU / counts;
+                T::from((angle_rad.re() / quantum).floor() * quantum)
+            }
+            _ => angle_rad,
         }
+    }
+
+    /// What the sensors show at an instant, the end of a tick, with the effects on them.
+    #[inline(always)]
+    pub(super) fn show(&mut self, tick: &Tick, time_s: f64) {
+        self.time_s = time_s;
         self.supply_v = tick.supply_v.unwrap_or(self.nominal_supply_v);
-        self.true_thrust_n = balance.thrust_n;
         if !self.sense_hooks.is_empty() {
             let mut sensed = self.unhooked_sensed();
             let now = Tick { time_s: self.time_s, ..*tick };
@@ -102,7 +176,7 @@ impl<T: Real> Plant<T> {
     }
 }
 
-/// Exact first-order low pass over one tick whose input runs straight from `u0` to `u1`.
+/// Exact first-order low pass over a time in which its input runs straight from `u0` to `u1`.
 fn first_order<T: Real>(y: T, u0: T, u1: T, dt: f64, filter: Option<(f64, f64)>) -> T {
     let Some((tau, left)) = filter else { return u1 };
     let slope = (u1 - u0) / dt;

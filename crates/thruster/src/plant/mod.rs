@@ -24,7 +24,7 @@ pub use run::{Response, Stimulus, simulate, simulate_each};
 pub use state::{Balance, Course, Drive, Driven, Local, Sensed, Tick};
 
 use friction::Rub;
-use measuring::Filters;
+use measuring::{Filters, Way};
 use rates::Constants;
 use stiff::Slopes;
 use stiffness::Stiff;
@@ -85,6 +85,10 @@ pub struct Plant<T = f64> {
     last_rates: [[T; STATES]; 2],
     /// Dry friction at the end of the last tick.
     last_rub: Rub<T>,
+    /// Length of the last step, s.
+    last_span_s: f64,
+    /// Whether an effect may change within a few ticks by itself: none is passed over then.
+    brisk: bool,
     /// Whether there was a last tick.
     moving: bool,
     /// Whether those rates can hold at all: no effect keeps a memory that changes between ticks
@@ -184,6 +188,8 @@ impl<T: Real> Plant<T> {
             model,
             rates_may_hold: !effects.iter().any(changes_between_ticks),
             slow: effects.iter().all(|e| e.effect.slow()) && model != ModelName::RotationalFlow,
+            brisk: effects.iter().any(|e| e.effect.brisk()),
+            last_span_s: tick_s,
             stiff: Stiff::of(model, rig, tick_s, lightest_share),
             slopes: None,
             parameters,
@@ -249,7 +255,9 @@ impl<T: Real> Plant<T> {
         self.filters.thrust_n = balance.thrust_n + balance.stand_n;
         self.filters.last_torque_n_m = balance.blade_torque_n_m;
         self.filters.torque_n_m = balance.blade_torque_n_m;
-        self.observe(&Tick { time_s, ..Tick::default() }, &balance, false);
+        self.true_thrust_n = balance.thrust_n;
+        self.filters.angle_rad = self.encoded(self.x[ANGLE]);
+        self.show(&Tick { time_s, ..Tick::default() }, time_s);
     }
 
     /// The true state and loads now; under an observer, before its pull.
@@ -288,41 +296,58 @@ impl<T: Real> Plant<T> {
     }
 
     /// One control tick: the command acts from now to the next tick.
+    pub fn step(&mut self, tick: &Tick) {
+        self.stride(std::slice::from_ref(tick), None);
+    }
+
+    /// Control ticks in a row, under commands in place of their own where they are given (measured currents where those
+    /// drive). Several may be passed in one step where the caller knows them to be as smooth together as
+    /// [`Course`] says of each; where something jumps all the same, and where the plant has a reason not to, they are
+    /// taken one by one.
     ///
     /// Runge-Kutta of order 4; over ticks that the caller knows to be smooth Adams' method of order 3, at
     /// half the cost, or a quarter of it where they are calm. A stiff plant takes linearly implicit steps.
-    pub fn step(&mut self, tick: &Tick) {
+    pub fn stride(&mut self, ticks: &[Tick], commands: Option<&[f64]>) {
+        if self.stiff.is_none() && self.observer_rad_s == 0.0 {
+            return self.advance(ticks, commands);
+        }
+        for (k, tick) in ticks.iter().enumerate() {
+            self.advance(&ticks[k..=k], commands.map(|all| &all[k..=k]));
+            self.pull(tick);
+        }
+    }
+
+    fn advance(&mut self, ticks: &[Tick], commands: Option<&[f64]>) {
         // Copies of the inner loop: the one without hooks keeps everything in registers, the others carry no
         // more states, and show no more of the blade, than somebody looks at.
         let blade = !self.inflow_hooks.is_empty() || !self.foil_hooks.is_empty();
         let hooked = blade || !self.balance_hooks.is_empty();
         match (self.stiff, hooked, blade, self.used_states) {
-            (Some(stiff), .., ..=OWN) => self.step_stiff::<OWN>(tick, stiff),
-            (Some(stiff), .., ..=SOME) => self.step_stiff::<SOME>(tick, stiff),
-            (Some(stiff), ..) => self.step_stiff::<STATES>(tick, stiff),
-            (_, false, ..) => self.step_as::<false, false, OWN>(tick),
-            (_, _, false, ..=OWN) => self.step_as::<true, false, OWN>(tick),
-            (_, _, true, ..=OWN) => self.step_as::<true, true, OWN>(tick),
-            (_, _, false, ..=FEW) => self.step_as::<true, false, FEW>(tick),
-            (_, _, true, ..=FEW) => self.step_as::<true, true, FEW>(tick),
-            (.., ..=SOME) => self.step_as::<true, true, SOME>(tick),
-            _ => self.step_as::<true, true, STATES>(tick),
+            (Some(stiff), .., ..=OWN) => self.step_stiff::<OWN>(&ticks[0], commands.map(|all| all[0]), stiff),
+            (Some(stiff), .., ..=SOME) => self.step_stiff::<SOME>(&ticks[0], commands.map(|all| all[0]), stiff),
+            (Some(stiff), ..) => self.step_stiff::<STATES>(&ticks[0], commands.map(|all| all[0]), stiff),
+            (_, false, ..) => self.step_as::<false, false, OWN>(ticks, commands),
+            (_, _, false, ..=OWN) => self.step_as::<true, false, OWN>(ticks, commands),
+            (_, _, true, ..=OWN) => self.step_as::<true, true, OWN>(ticks, commands),
+            (_, _, false, ..=FEW) => self.step_as::<true, false, FEW>(ticks, commands),
+            (_, _, true, ..=FEW) => self.step_as::<true, true, FEW>(ticks, commands),
+            (.., ..=SOME) => self.step_as::<true, true, SOME>(ticks, commands),
+            _ => self.step_as::<true, true, STATES>(ticks, commands),
         }
-        self.pull(tick);
     }
 
-    /// Takes over the state at the end of a tick, with what acts there.
+    /// Takes over the state at the end of one tick or of several, with what acts there.
     #[inline(always)]
-    fn arrive<const N: usize>(&mut self, tick: &Tick, x: &[T; N], end: Local<T>, balance: &Balance<T>) {
+    fn arrive<const N: usize>(&mut self, ticks: &[Tick], x: &[T; N], end: Local<T>, balance: &Balance<T>) {
+        let way = Way { from: self.at, from_rad: self.x[ANGLE], to_rad: x[ANGLE] };
         for (state, moved) in self.x.iter_mut().zip(x) {
             *state = *moved;
         }
         self.current_a = end.current_a;
-        self.time_s = tick.time_s + self.tick_s;
         self.at = end;
         self.at.thrust_n = balance.thrust_n;
         self.at.blade_torque_n_m = balance.blade_torque_n_m;
-        self.observe(tick, balance, true);
+        self.observe(ticks, &way, balance);
     }
 
     #[inline(always)]

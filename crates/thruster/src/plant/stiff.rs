@@ -73,8 +73,8 @@ impl<T: Real, const N: usize> Slopes<T, N> {
 }
 
 impl<T: Real> Plant<T> {
-    pub(super) fn step_stiff<const N: usize>(&mut self, tick: &Tick, stiff: Stiff) {
-        let drive = self.drive_over(tick);
+    pub(super) fn step_stiff<const N: usize>(&mut self, tick: &Tick, command: Option<f64>, stiff: Stiff) {
+        let drive = self.drive_over(tick, command);
         let mut balance = Balance::default();
         let mut x: [T; N] = each(|i| self.x[i]);
         if N == OWN && stiff.steps > 1 {
@@ -119,7 +119,7 @@ impl<T: Real> Plant<T> {
         let end = self.local_at(&x, current, 1.0, tick);
         self.rates::<true, true, N>(&x, &end, balance);
         self.moving = false;
-        self.arrive(tick, &x, end, balance);
+        self.arrive(std::slice::from_ref(tick), &x, end, balance);
     }
 
     /// What moves a state under the inputs at a part of the tick.

@@ -89,6 +89,50 @@ fn a_smooth_tick_costs_no_accuracy() {
     }
 }
 
+/// A slow swing passed in strides of five ticks, and tick by tick: what the sensors show at each stride's end. With a
+/// lag of the drive, and with effects that keep a memory from tick to tick.
+fn in_strides(effects: &[(&crate::effects::Descriptor, &[f64])], of: usize) -> Vec<[f64; 3]> {
+    const STRIDE: usize = 5;
+    let rig = Rig::from_toml(include_str!("../../../../config/thrusters/whitcomb-yoerger-1999.toml"))
+        .expect("the shipped rig");
+    let parameters = Parameters::stated(&rig);
+    let mut plant: Plant = Plant::new(ModelName::Model2, &rig, &parameters, effects, 2e-3);
+    let ticks: Vec<Tick> = (0..10_000)
+        .map(|i| Tick {
+            time_s: f64::from(i) * 2e-3,
+            course: if i > 1000 { Course::Calm } else { Course::Any },
+            ..Tick::default()
+        })
+        .collect();
+    let commands: Vec<f64> = (0..10_000).map(|i| 3.0 + 2.0 * (1e-3 * f64::from(i)).sin()).collect();
+    let mut seen = Vec::new();
+    for from in (0..ticks.len()).step_by(STRIDE) {
+        for part in (from..from + STRIDE).step_by(of) {
+            plant.stride(&ticks[part..part + of], Some(&commands[part..part + of]));
+        }
+        let s = plant.sensed();
+        seen.push([s.shaft_speed_rad_s, s.thrust_n, s.current_a]);
+    }
+    seen
+}
+
+#[test]
+fn several_smooth_ticks_at_once_lead_where_single_ones_do() {
+    use crate::effects::{coulomb_friction, thrust_sensor_lag, transport_delay};
+    let friction = (&coulomb_friction::DESCRIPTOR, &[0.1, 0.2, 3.0][..]);
+    let delay = (&transport_delay::DESCRIPTOR, &[0.013][..]);
+    let lag = (&thrust_sensor_lag::DESCRIPTOR, &[0.02, 0.3][..]);
+    for effects in [&[][..], &[friction], &[delay, lag], &[friction, delay, lag]] {
+        let (one, five) = (in_strides(effects, 1), in_strides(effects, 5));
+        let top = one.iter().fold([0.0_f64; 3], |top, at| [0, 1, 2].map(|k| top[k].max(at[k].abs())));
+        for k in 0..3 {
+            let off = one.iter().zip(&five).map(|(a, b)| (a[k] - b[k]).abs()).fold(0.0, f64::max);
+            assert!(off < 2e-4 * top[k], "{k}: {off} of {}", top[k]);
+            assert!(off > 0.0 || k == 2, "{k}: they were passed at once");
+        }
+    }
+}
+
 #[test]
 fn a_disturbance_dies_at_the_rate_that_is_told() {
     let rig = Rig::from_toml(include_str!("../../../../config/thrusters/whitcomb-yoerger-1999.toml"))
