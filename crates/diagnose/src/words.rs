@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use kort_identify::data::Series;
 use kort_identify::fit::Fit;
-use kort_identify::scores::{self, HeldOut, ParameterReport, parameters};
+use kort_identify::scores::{self, ChannelReport, HeldOut, ParameterReport, parameters};
 use kort_identify::simulate::{Problem, Stack};
 use kort_thruster::effects::Descriptor;
 
@@ -191,9 +191,17 @@ pub fn summary(told: &Told) -> String {
                 }
                 None => "nothing is missing that this excitation can show".into(),
             };
-            format!(
-                "{model}, re-fitted within the stated tolerances, explains the recording down to its noise: {missing}."
-            )
+            match above_noise(told.baseline) {
+                None => format!(
+                    "{model}, re-fitted within the stated tolerances, explains the recording down to its noise: {missing}."
+                ),
+                Some(left) => {
+                    format!(
+                        "No effect in the catalogue improves {model}, re-fitted within the stated tolerances, by more than it costs. It leaves {left}, which follows nothing clearly enough to be told from slow noise."
+                    ) + &possible(told.alternatives)
+                        .map_or(String::new(), |names| format!(" It cannot exclude {names}."))
+                }
+            }
         }
         Verdict::Explained => format!("{model} leaves out {}.{}", named(told.findings), shows(told)),
         Verdict::PartlyExplained => {
@@ -226,10 +234,15 @@ pub fn summary(told: &Told) -> String {
             )
         }
         Verdict::Unexplained => {
-            let nearest =
-                possible(told.alternatives).map_or(String::new(), |names| format!("; nearest is {names}"));
+            let explains = if told.findings.is_empty() {
+                let nearest = possible(told.alternatives);
+                let nearest = nearest.map_or(String::new(), |names| format!("; nearest is {names}"));
+                format!("no effect in the catalogue explains it{nearest}")
+            } else {
+                format!("no name is likely enough to be believed; nearest is {}", named(told.findings))
+            };
             let mut text = format!(
-                "The mismatch is real ({} path, most in {}, {}), and no effect in the catalogue explains it{nearest}.",
+                "The mismatch is real ({} path, most in {}, {}), and {explains}.",
                 told.mismatch.first().map_or("?", |m| &m.path),
                 told.mismatch.first().map_or("?", |m| &m.channel),
                 told.mismatch.first().map_or("?", |m| &m.regime),
@@ -259,6 +272,23 @@ pub fn summary(told: &Told) -> String {
         text.push_str(&format!(" Run next: {}.", next.excitation));
     }
     text
+}
+
+/// An error so many times the sensor's noise is more than that noise.
+const ABOVE_NOISE: f64 = 2.0;
+
+/// What a baseline leaves beyond the noise from sample to sample, in the channel where that is most; none where it is
+/// about the noise.
+fn above_noise(baseline: &Baseline) -> Option<String> {
+    let times = |c: &ChannelReport| c.nrmse_train / c.noise_floor.max(1e-9);
+    let (channel, most) = baseline.channels.iter().max_by(|a, b| times(a.1).total_cmp(&times(b.1)))?;
+    (times(most) > ABOVE_NOISE).then(|| {
+        format!(
+            "{:.2} % of full scale in {channel} (its noise from sample to sample is {:.2} %)",
+            100.0 * most.nrmse_train,
+            100.0 * most.noise_floor
+        )
+    })
 }
 
 /// Names that are not stated and cannot be excluded.

@@ -160,6 +160,8 @@ fn used(model: ModelName, dry: bool, shaft_prescribed: bool) -> Vec<P> {
         P::ViscousFrictionNmS,
         P::WindingResistanceOhm,
         P::TimeConstantS,
+        P::CurrentLimitA,
+        P::SpeedFilterTimeConstantS,
         P::LoadMassKg,
         P::LoadLengthM,
         P::LoadInertiaKgM2,
@@ -219,15 +221,8 @@ pub fn nothing_stated(rig: &Rig) -> bool {
 }
 
 impl Hypothesis {
-    /// The baseline alone. `current_seen`: whether the current is a response, without which the drive's lag
-    /// is as stated.
-    pub fn baseline(
-        model: ModelName,
-        rig: &Rig,
-        shaft_prescribed: bool,
-        current_seen: bool,
-        inputs: Arc<Inputs>,
-    ) -> Self {
+    /// The baseline alone.
+    pub fn baseline(model: ModelName, rig: &Rig, shaft_prescribed: bool, inputs: Arc<Inputs>) -> Self {
         let values = Parameters::stated(rig);
         let unstated = nothing_stated(rig);
         let coefficient = |p: P| {
@@ -248,7 +243,7 @@ impl Hypothesis {
                 quantity.tol = Some(UNSTATED_TOL);
             }
             let Some(tol) = quantity.tol else { continue };
-            if quantity.value == 0.0 || (parameter == P::TimeConstantS && !current_seen) {
+            if quantity.value == 0.0 || !quantity.value.is_finite() {
                 continue;
             }
             let reach = REACH * tol * quantity.value.abs();

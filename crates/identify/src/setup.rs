@@ -7,7 +7,7 @@ use kort_thruster::parameters::Parameters;
 use kort_thruster::rig::Rig;
 
 use crate::checks;
-use crate::data::{DataError, Driving, Prepared, Response, Series, counted_angle, possible_drivers, spread};
+use crate::data::{DataError, Driving, Prepared, Series, counted_angle, possible_drivers, spread};
 use crate::excerpt;
 use crate::held;
 use crate::hypothesis::{Hypothesis, Inputs, UNSTATED_TOL, nothing_stated};
@@ -118,14 +118,11 @@ impl<'a> Setup<'a> {
         }
         let thin = too_thin(&recordings);
         let prescribed = recordings.iter().all(|p| p.driving == Driving::Speed);
-        let current_seen =
-            recordings.iter().any(|p| p.channels.iter().any(|c| c.response == Response::Current));
         let stated = Parameters::stated(rig);
         let compared = |mut recordings: Vec<Prepared>| {
             recordings.iter_mut().for_each(|r| r.mark_smooth(model, rig, &stated));
             let inputs = Arc::new(Inputs::late(&recordings));
-            let baseline =
-                Hypothesis::baseline(model, rig, prescribed, current_seen, inputs).with_sampling(&recordings);
+            let baseline = Hypothesis::baseline(model, rig, prescribed, inputs).with_sampling(&recordings);
             (Problem::new(model, rig, recordings, masked.clone(), criterion), baseline)
         };
         let held = held::held(&recordings, rig);

@@ -133,6 +133,9 @@ impl<'a> Problem<'a> {
                 .with_observer(recording.observer_rad_s);
             let [speed, flow, current, angle] = recording.start;
             plant.start(recording.time_s[0], speed, flow, current, angle);
+            if let Some(command) = recording.before {
+                plant.commanded_before(command);
+            }
             run(&mut plant, recording, &hypothesis.inputs.commands[r], |row, instant| show(r, row, instant));
         }
     }

@@ -35,6 +35,10 @@ pub enum Parameter {
     ViscousFrictionNmS,
     /// First-order lag of the drive, s.
     TimeConstantS,
+    /// Largest current of the drive, A; infinite where none is stated.
+    CurrentLimitA,
+    /// First-order filter of the measured shaft speed, s.
+    SpeedFilterTimeConstantS,
     /// `C0` of Model 0: thrust over shaft speed squared, N s^2.
     ThrustCoefficientNS2,
     /// `C1` of Model 0: torque over shaft speed squared, N m s^2.
@@ -63,7 +67,7 @@ use Parameter as P;
 
 impl Parameter {
     /// Every parameter, in the order of storage.
-    pub const ALL: [P; 24] = [
+    pub const ALL: [P; 26] = [
         P::RadiusM,
         P::DuctLengthM,
         P::PitchRad,
@@ -77,6 +81,8 @@ impl Parameter {
         P::WindingResistanceOhm,
         P::ViscousFrictionNmS,
         P::TimeConstantS,
+        P::CurrentLimitA,
+        P::SpeedFilterTimeConstantS,
         P::ThrustCoefficientNS2,
         P::TorqueCoefficientNmS2,
         P::Efficiency,
@@ -106,6 +112,8 @@ impl Parameter {
             P::WindingResistanceOhm => "winding_resistance_ohm",
             P::ViscousFrictionNmS => "viscous_friction_nm_s",
             P::TimeConstantS => "time_constant_s",
+            P::CurrentLimitA => "current_limit_a",
+            P::SpeedFilterTimeConstantS => "speed_filter_time_constant_s",
             P::ThrustCoefficientNS2 => "thrust_coefficient_n_s2",
             P::TorqueCoefficientNmS2 => "torque_coefficient_nm_s2",
             P::Efficiency => "efficiency",
@@ -135,7 +143,8 @@ impl Parameter {
             P::TorqueConstantNmA => "N m/A",
             P::WindingResistanceOhm => "ohm",
             P::ViscousFrictionNmS => "N m s",
-            P::TimeConstantS => "s",
+            P::TimeConstantS | P::SpeedFilterTimeConstantS => "s",
+            P::CurrentLimitA => "A",
             P::ThrustCoefficientNS2 => "N s^2",
             P::TorqueCoefficientNmS2 => "N m s^2",
             _ => "1",
@@ -194,6 +203,13 @@ impl Parameters {
             P::WindingResistanceOhm => rig.motor.winding_resistance_ohm,
             P::ViscousFrictionNmS => rig.motor.viscous_friction_nm_s,
             P::TimeConstantS => Some(rig.amplifier.time_constant_s),
+            P::CurrentLimitA => {
+                Some(Quantity { value: rig.amplifier.current_limit_a, tol: rig.amplifier.current_limit_tol })
+            }
+            P::SpeedFilterTimeConstantS => rig
+                .sensors
+                .speed_filter_time_constant_s
+                .map(|value| Quantity { value, tol: rig.sensors.speed_filter_tol }),
             P::LoadMassKg
             | P::LoadLengthM
             | P::LoadInertiaKgM2

@@ -16,7 +16,7 @@ pub fn with_fitted(text: &str, parameters: &[ParameterReport]) -> Result<(String
     let mut document: DocumentMut = text.parse().map_err(|e: toml_edit::TomlError| e.to_string())?;
     let mut left_out = Vec::new();
     for p in parameters {
-        let table = ["propeller", "flow", "motor", "amplifier"]
+        let table = ["propeller", "flow", "motor", "amplifier", "sensors"]
             .into_iter()
             .find(|t| document.get(t).and_then(Item::as_table_like).is_some_and(|t| t.contains_key(&p.name)));
         let Some(table) = table else {

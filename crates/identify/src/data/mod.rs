@@ -13,6 +13,7 @@ mod counted;
 mod driving;
 mod error;
 mod fill;
+mod grain;
 mod pauses;
 mod scale;
 mod start;
@@ -21,6 +22,7 @@ pub use channel::{Channel, rates};
 pub use columns::{KNOWN, possible_drivers, spread};
 pub use counted::counted_angle;
 pub use error::DataError;
+pub use grain::Grain;
 pub use pauses::pause_s;
 pub use scale::{COLUMN, available, scale};
 
@@ -153,6 +155,8 @@ pub struct Prepared {
     pub grain_s: Grain,
     /// State at the first row: shaft speed, axial flow, current, angle.
     pub start: [f64; 4],
+    /// Command before the first row, where it is known not to have been the first one.
+    pub before: Option<f64>,
     /// The interval from row to row beyond which the log has paused, s.
     pub pause_s: f64,
     /// Pauses that are passed over without ticks, in order.
@@ -163,24 +167,6 @@ pub struct Prepared {
     pub extra: Option<String>,
     /// Bandwidth with which the simulated shaft is kept with the recorded one, rad/s; 0 where it runs freely.
     pub observer_rad_s: f64,
-}
-
-/// How far an instant may lie from its stamp, s. Sensors, controller and logger take turns within a control period,
-/// and nobody writes down in which order.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Grain {
-    /// A sample: the stated control period, a step of the simulation where none is stated.
-    pub sample_s: f64,
-    /// A command: the same; where no control period is stated, commands that are held from row to row and those that
-    /// run straight lie half an interval apart, and what is between the two a quarter from either.
-    pub command_s: f64,
-}
-
-impl Grain {
-    fn new(rig: &Rig, row_s: f64, tick_s: f64) -> Self {
-        let stated_s = rig.sensors.control_rate_hz.map(|rate_hz| (1.0 / rate_hz).min(row_s));
-        Self { sample_s: stated_s.unwrap_or(tick_s), command_s: stated_s.unwrap_or(tick_s.max(0.25 * row_s)) }
-    }
 }
 
 /// Whether a rig shows a response. A dry shaft has no water to feel; its angle tells what a filtered speed
@@ -282,6 +268,7 @@ impl Prepared {
             tick_s,
             grain_s: Grain::new(rig, row_s, tick_s),
             start: [0.0; 4],
+            before: None,
             pause_s: pause_s(&series.time_s),
             leaps: Vec::new(),
             speed_between: Vec::new(),
@@ -295,7 +282,7 @@ impl Prepared {
             prepared.command.iter_mut().zip(supply).for_each(|(c, v)| *c *= v);
         }
         prepared.lay_out(series, rig);
-        prepared.start = start_state(series, &prepared);
+        (prepared.start, prepared.before) = start_state(series, &prepared);
         Ok(prepared)
     }
 

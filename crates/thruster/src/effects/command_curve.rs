@@ -15,6 +15,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
                 directions (no hysteresis)",
     confused_with: &[
         "voltage_limit_backemf",
+        "supply_sag",
         "command_dead_band",
         "torque_constant_saturation",
         "windage_drag",

@@ -4,6 +4,7 @@ use super::memory::FirstOrder;
 use super::{
     Available, Descriptor, Effect, Hooks, Path, Scale, Spec, angle_known, one_start, speed_measured,
 };
+use crate::parameters::Parameter as P;
 use crate::plant::{Sensed, Tick};
 use crate::real::Real;
 use crate::rig::Rig;
@@ -31,7 +32,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
         Box::new(Eccentricity {
             first: [values[0], values[1]],
             second: [values[2], values[3]],
-            filter_s: context.rig.sensors.speed_filter_time_constant_s.unwrap_or(0.0),
+            filter_s: context.parameters.get(P::SpeedFilterTimeConstantS),
             tick_s: context.tick_s,
             filter: FirstOrder::new(),
         })
@@ -53,7 +54,7 @@ fn needs(rig: &Rig, available: &Available) -> Result<(), &'static str> {
 struct Eccentricity<T> {
     first: [T; 2],
     second: [T; 2],
-    filter_s: f64,
+    filter_s: T,
     tick_s: f64,
     filter: FirstOrder<T>,
 }
@@ -94,7 +95,7 @@ impl<T: Real> Effect<T> for Eccentricity<T> {
         let angle = tick.shaft_angle_rad.map_or(sensed.shaft_angle_rad, |(_, end)| self.true_angle(end));
         let (wave, _) = self.wave(angle);
         sensed.shaft_speed_rad_s +=
-            self.filter.step(sensed.true_speed_rad_s * wave, T::from(self.filter_s), self.tick_s);
+            self.filter.step(sensed.true_speed_rad_s * wave, self.filter_s, self.tick_s);
     }
 }
 

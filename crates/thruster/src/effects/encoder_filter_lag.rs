@@ -2,6 +2,7 @@
 
 use super::memory::DelayedLag;
 use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, speed_measured};
+use crate::parameters::Parameter as P;
 use crate::plant::{Sensed, Tick};
 use crate::real::Real;
 
@@ -35,7 +36,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     needs: speed_measured,
     build: both!(|values, context| {
         let tick_s = context.tick_s;
-        let stated_s = context.rig.sensors.speed_filter_time_constant_s.unwrap_or(0.0);
+        let stated_s = context.parameters.get(P::SpeedFilterTimeConstantS);
         Box::new(EncoderFilterLag {
             stated: decay(stated_s, tick_s),
             slower: decay(values[0] + stated_s, tick_s),
@@ -60,7 +61,7 @@ fn decay<T: Real>(time_constant_s: T, tick_s: f64) -> T {
 
 struct EncoderFilterLag<T> {
     /// Decay over a tick of the filter as stated, and as it is.
-    stated: f64,
+    stated: T,
     slower: T,
     /// Last output of the stated filter, and of the one in its place.
     memory: Option<(T, T)>,
@@ -76,7 +77,7 @@ impl<T: Real> Effect<T> for EncoderFilterLag<T> {
         let seen = sensed.shaft_speed_rad_s;
         let (before, last) = self.memory.unwrap_or((seen, seen));
         // The stated filter undone, and the slower one in its place.
-        let raw = (seen - before * self.stated) / (1.0 - self.stated);
+        let raw = (seen - before * self.stated) / (T::ONE - self.stated);
         let slow = self.slower * last + (T::ONE - self.slower) * raw;
         self.memory = Some((seen, slow));
         sensed.shaft_speed_rad_s = self.delay.step(slow);

@@ -1,6 +1,7 @@
 //! What effects remember from tick to tick: a past signal, a first-order lag, and both in a row.
 
 use super::Context;
+use crate::parameters::Parameter as P;
 use crate::real::Real;
 
 /// The past of a signal sampled once a tick. Before the first sample the signal is taken as
@@ -97,17 +98,18 @@ pub(super) struct EncoderAhead<T> {
     last_rad: T,
     speed_rad_s: T,
     /// What a tick leaves of a filter's error; none where nothing is differenced.
-    left: Option<f64>,
+    left: Option<T>,
     tick_s: f64,
 }
 
 impl<T: Real> EncoderAhead<T> {
     /// Level with the shaft.
     pub fn new(context: &Context<T>) -> Self {
-        let sensors = &context.rig.sensors;
-        let left = match sensors.speed_filter_time_constant_s {
-            Some(lag_s) if lag_s > 0.0 => Some((-context.tick_s / lag_s).exp()),
-            _ => sensors.encoder_counts_per_rev.map(|_| 0.0),
+        let lag_s = context.parameters.get(P::SpeedFilterTimeConstantS);
+        let left = if lag_s > 0.0 {
+            Some((T::from(-context.tick_s) / lag_s).exp())
+        } else {
+            context.rig.sensors.encoder_counts_per_rev.map(|_| T::ZERO)
         };
         Self { last_rad: T::ZERO, speed_rad_s: T::ZERO, left, tick_s: context.tick_s }
     }

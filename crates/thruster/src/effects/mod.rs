@@ -51,7 +51,8 @@ pub trait Effect<T = f64>: Send {
     fn states(&self) -> usize {
         0
     }
-    /// Whether its states are slow beside a tick, so that the rates of two ticks foretell the next.
+    /// Whether its states are slow beside a tick, so that a look ahead is as good as the end. Others may settle within a
+    /// tick, and no faster.
     fn slow(&self) -> bool {
         self.states() == 0
     }

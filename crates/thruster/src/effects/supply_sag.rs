@@ -16,7 +16,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
                falls in proportion; a current drive meets its voltage limit sooner",
     signature: "on a voltage drive thrust grows more slowly than command; on a current drive only the top is capped; \
                 other loads on the bus show through; thrust over speed squared is unchanged",
-    confused_with: &["voltage_limit_backemf", "thermal_drift_kt", "viscous_friction"],
+    confused_with: &["voltage_limit_backemf", "command_curve", "thermal_drift_kt", "viscous_friction"],
     separated_by: "the recorded bus voltage; the supply voltage varied",
     reference: "Ohm's law with the power balance of the drive; kort's form",
     commonness: 1.5,
@@ -56,11 +56,13 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
     ]
 }
 
-/// Supplies as stated with more and less sag, and others that fall short of what the winding takes at the
+/// Supplies as stated with more and less sag, at once and after a while, and others that fall short of what the winding takes at the
 /// top of the recording by about as much, with little and much of it through sag.
 fn starts(scale: &Scale) -> Vec<Vec<f64>> {
     let full = source_ohm(scale);
     let stated = [0.03, 0.08, 0.14, 0.2, 0.28, 0.4].iter().map(|share| vec![share * full, 0.01, 1.0]);
+    // From a bus that gives way at once a fit creeps towards one that takes a while.
+    let late = [0.08, 0.2].iter().map(|share| vec![share * full, 0.2, 1.0]);
     let winding = winding_share(scale);
     let back_emf_v = scale.torque_n_m * scale.shaft_speed_rad_s / scale.current_a;
     let electric_over_shaft_power = winding * scale.supply_v / back_emf_v.max(1e-3);
@@ -69,7 +71,7 @@ fn starts(scale: &Scale) -> Vec<Vec<f64>> {
         [0.85, 0.91, 0.95, 0.98, 1.01, 1.05]
             .map(|k| vec![share * full, 0.01, (k * winding + lost).clamp(0.4, 1.2)])
     });
-    stated.chain(binding).collect()
+    stated.chain(late).chain(binding).collect()
 }
 
 /// A recorded supply that loses less than this share at the largest load is no sagging one.

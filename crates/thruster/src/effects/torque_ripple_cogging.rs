@@ -79,11 +79,11 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
     NAMES.into_iter().enumerate().flat_map(|(place, names)| order(place, names)).collect()
 }
 
-/// One start a first order: what misalignment gives, the poles, the slots, six times the pole pairs, and the
+/// One start a first order: what an eccentric rotor and misalignment give, the poles, the slots, six times the pole pairs, and the
 /// least common multiple of slots and poles of common windings. Nothing acts at the other orders.
 fn starts(scale: &Scale) -> Vec<Vec<f64>> {
     let (torque, per_a) = (0.02 * scale.torque_n_m, 0.02 * scale.torque_n_m / scale.current_a);
-    [2, 3, 4, 6, 7, 8, 10, 12, 14, 18, 21, 24, 30, 36, 42, 48, 60, 72, 84]
+    [1, 2, 3, 4, 6, 7, 8, 10, 12, 14, 18, 21, 24, 30, 36, 42, 48, 60, 72, 84]
         .iter()
         .map(|order| {
             let mut values = vec![f64::from(*order), torque, torque, per_a, per_a];

@@ -26,7 +26,7 @@ impl<T: Real> Plant<T> {
     pub(super) fn drive_over(&mut self, tick: &Tick, command: Option<f64>) -> Course<T> {
         let mut drive = Drive {
             command: T::from(command.unwrap_or(tick.command)),
-            current_limit_a: T::from(self.current_limit_a),
+            current_limit_a: self.parameters.get(P::CurrentLimitA),
             time_constant_s: self.parameters.get(P::TimeConstantS),
             supply_v: T::from(tick.supply_v.unwrap_or(self.nominal_supply_v)),
             resistance_ohm: self.constants.resistance_ohm,

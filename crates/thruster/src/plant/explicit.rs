@@ -39,6 +39,7 @@ impl<T: Real> Plant<T> {
         let begin = self.local_at(x, self.current_at(tick, drive, 0.0, x[SPEED]), 0.0, tick);
         let goes = self.last_rates[0][SPEED].re().abs() + self.last_rub.largest();
         self.foretold::<HOOKED>(tick, drive, &begin)
+            && self.slow
             && !self.quantise_encoder
             && !self.brisk
             && (!HOOKED
@@ -54,10 +55,7 @@ impl<T: Real> Plant<T> {
         drive: &DriveCourse<T>,
         begin: &super::Local<T>,
     ) -> bool {
-        self.holds::<HOOKED>(begin)
-            && tick.course != Course::Any
-            && self.slow
-            && drive.speed_rad_s.is_none()
+        self.holds::<HOOKED>(begin) && tick.course != Course::Any && drive.speed_rad_s.is_none()
     }
 
     /// Whether the rates at the end of the last step are this one's at its start.
@@ -111,7 +109,7 @@ impl<T: Real> Plant<T> {
             let k2 = self.rates::<HOOKED, BLADE, N>(&ahead, &there, &mut balance);
             (
                 each(|i| start[i] + k2[i] * c2 + k1[i] * c1 + k0[i] * c0),
-                (first.course == Course::Calm).then_some(k2),
+                (first.course == Course::Calm && self.slow).then_some(k2),
             )
         } else {
             // Classic Runge-Kutta of order 4.

@@ -59,7 +59,6 @@ pub struct Plant<T = f64> {
     parameters: Parameters<T>,
     sensors: Sensors,
     amplifier: AmplifierKind,
-    current_limit_a: f64,
     nominal_supply_v: f64,
     tick_s: f64,
     effects: Vec<Hooked<T>>,
@@ -94,7 +93,7 @@ pub struct Plant<T = f64> {
     /// Whether those rates can hold at all: no effect keeps a memory that changes between ticks
     /// and acts on the rates.
     rates_may_hold: bool,
-    /// Whether all states are slow beside a tick, so that two ticks' rates foretell the next.
+    /// Whether all states are slow beside a tick, so that a look ahead is as good as the end.
     slow: bool,
     /// Where shaft, flow or swirl settle so fast beside a tick that explicit steps would run away.
     stiff: Option<Stiff>,
@@ -110,13 +109,15 @@ pub struct Plant<T = f64> {
 struct Decays<T> {
     /// Stated lag of the drive, and its decay over half a tick and a whole one.
     drive: (T, T, T),
-    speed: Option<f64>,
+    speed: Option<T>,
     thrust: Option<(f64, f64)>,
     torque: Option<(f64, f64)>,
 }
 
 impl<T: Real> Decays<T> {
-    fn new(time_constant_s: T, sensors: &Sensors, tick_s: f64) -> Self {
+    fn new(parameters: &Parameters<T>, sensors: &Sensors, tick_s: f64) -> Self {
+        let [time_constant_s, filter_s] =
+            [P::TimeConstantS, P::SpeedFilterTimeConstantS].map(|p| parameters.get(p));
         let corner = |hz: Option<f64>| {
             hz.map(|hz| {
                 let tau = 1.0 / (std::f64::consts::TAU * hz);
@@ -129,7 +130,7 @@ impl<T: Real> Decays<T> {
                 (T::from(-0.5 * tick_s) / time_constant_s).exp(),
                 (T::from(-tick_s) / time_constant_s).exp(),
             ),
-            speed: sensors.speed_filter_time_constant_s.filter(|t| *t > 0.0).map(|t| (-tick_s / t).exp()),
+            speed: (filter_s > 0.0).then(|| (T::from(-tick_s) / filter_s).exp()),
             thrust: corner(sensors.thrust_filter_hz),
             torque: corner(sensors.torque_filter_hz),
         }
@@ -195,7 +196,6 @@ impl<T: Real> Plant<T> {
             parameters,
             sensors: rig.sensors,
             amplifier: rig.amplifier.kind,
-            current_limit_a: rig.amplifier.current_limit_a,
             nominal_supply_v,
             tick_s,
             drive_hooks: hooked(|h| h.drive),
@@ -206,7 +206,7 @@ impl<T: Real> Plant<T> {
             effects,
             used_states: next,
             constants: Constants::new(&parameters, rig),
-            decays: Decays::new(parameters.get(P::TimeConstantS), &rig.sensors, tick_s),
+            decays: Decays::new(&parameters, &rig.sensors, tick_s),
             x: [T::ZERO; STATES],
             current_a: T::ZERO,
             time_s: 0.0,
@@ -258,6 +258,13 @@ impl<T: Real> Plant<T> {
         self.true_thrust_n = balance.thrust_n;
         self.filters.angle_rad = self.encoded(self.x[ANGLE]);
         self.show(&Tick { time_s, ..Tick::default() }, time_s);
+    }
+
+    /// What was commanded until the start, which a drive that remembers begins with; else it begins with the first
+    /// command.
+    pub fn commanded_before(&mut self, command: f64) {
+        let before = Tick { time_s: self.time_s - self.tick_s, ..Tick::default() };
+        self.drive_over(&before, Some(command));
     }
 
     /// The true state and loads now; under an observer, before its pull.
@@ -324,7 +331,9 @@ impl<T: Real> Plant<T> {
         let hooked = blade || !self.balance_hooks.is_empty();
         match (self.stiff, hooked, blade, self.used_states) {
             (Some(stiff), .., ..=OWN) => self.step_stiff::<OWN>(&ticks[0], commands.map(|all| all[0]), stiff),
-            (Some(stiff), .., ..=SOME) => self.step_stiff::<SOME>(&ticks[0], commands.map(|all| all[0]), stiff),
+            (Some(stiff), .., ..=SOME) => {
+                self.step_stiff::<SOME>(&ticks[0], commands.map(|all| all[0]), stiff)
+            }
             (Some(stiff), ..) => self.step_stiff::<STATES>(&ticks[0], commands.map(|all| all[0]), stiff),
             (_, false, ..) => self.step_as::<false, false, OWN>(ticks, commands),
             (_, _, false, ..=OWN) => self.step_as::<true, false, OWN>(ticks, commands),

@@ -164,6 +164,8 @@ pub struct Amplifier {
     pub time_constant_s: Quantity,
     /// Largest current, A; infinite when not stated.
     pub current_limit_a: f64,
+    /// How far off it may be, relative, two sigma.
+    pub current_limit_tol: Option<f64>,
     /// Nominal supply, V.
     pub supply_v: Option<f64>,
 }
@@ -179,6 +181,8 @@ pub struct Sensors {
     pub encoder_counts_per_rev: Option<f64>,
     /// First-order filter on the differenced speed, s.
     pub speed_filter_time_constant_s: Option<f64>,
+    /// How far off it may be, relative, two sigma.
+    pub speed_filter_tol: Option<f64>,
     /// First-order filter of the force sensor, Hz.
     pub thrust_filter_hz: Option<f64>,
     /// Full scale of the force sensor (plus and minus), N.
@@ -206,6 +210,7 @@ impl Sensors {
         control_rate_hz: None,
         encoder_counts_per_rev: None,
         speed_filter_time_constant_s: None,
+        speed_filter_tol: None,
         thrust_filter_hz: None,
         thrust_full_scale_n: None,
         thrust_bits: None,

@@ -114,6 +114,7 @@ impl Rig {
                 kind,
                 time_constant_s: t.quantity("amplifier", "time_constant_s")?.unwrap_or(Quantity::exact(0.0)),
                 current_limit_a: t.number("amplifier", "current_limit_a")?.unwrap_or(f64::INFINITY),
+                current_limit_tol: t.tolerance("amplifier", "current_limit_a")?,
                 supply_v: t.number("amplifier", "supply_v")?,
             },
             sensors: Sensors {
@@ -121,6 +122,7 @@ impl Rig {
                 control_rate_hz: t.number("sensors", "control_rate_hz")?,
                 encoder_counts_per_rev: t.number("sensors", "encoder_counts_per_rev")?,
                 speed_filter_time_constant_s: t.number("sensors", "speed_filter_time_constant_s")?,
+                speed_filter_tol: t.tolerance("sensors", "speed_filter_time_constant_s")?,
                 thrust_filter_hz: t.number("sensors", "thrust_filter_hz")?,
                 thrust_full_scale_n: t.number("sensors", "thrust_full_scale_n")?,
                 thrust_bits: t.number("sensors", "thrust_bits")?.map(|b| b as u32),
@@ -170,6 +172,10 @@ impl Reader<'_> {
 
     pub(super) fn number(&self, table: &str, key: &str) -> Result<Option<f64>, RigError> {
         Ok(self.quantity(table, key)?.map(|q| q.value))
+    }
+
+    fn tolerance(&self, table: &str, key: &str) -> Result<Option<f64>, RigError> {
+        Ok(self.quantity(table, key)?.and_then(|q| q.tol))
     }
 
     pub(super) fn quantity(&self, table: &str, key: &str) -> Result<Option<Quantity>, RigError> {
