@@ -104,6 +104,35 @@ damping_nm_s = 0.004"#);
     assert!((inertia / 0.005 - 1.0).abs() < 0.05, "{inertia}");
 }
 
+/// A servo whose drive and filter are stated roughly: largest current, its lag, filter of the speed.
+fn rough_drive(tol: &str) -> Rig {
+    let text = format!(
+        "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = 0.0015\ntorque_constant_nm_a = 0.354\n\
+         winding_resistance_ohm = 3.4\n[amplifier]\nkind = \"voltage\"\nsupply_v = 7.3\n\
+         current_limit_a = {{ value = 1.2{tol} }}\ntime_constant_s = {{ value = 0.01{tol} }}\n\
+         [sensors]\nlog_rate_hz = 100\nspeed_filter_time_constant_s = {{ value = 0.02{tol} }}\n"
+    );
+    Rig::from_toml(&text).unwrap()
+}
+
+#[test]
+fn what_a_drive_and_its_speed_signal_are_stated_roughly_to_be_is_found() {
+    let rough = rough_drive(", tol = 0.6");
+    let truth = [(P::CurrentLimitA, 0.9), (P::TimeConstantS, 0.013), (P::SpeedFilterTimeConstantS, 0.03)];
+    for (parameter, value) in truth {
+        let found = fitted(&rough, &truth, parameter);
+        assert!((found / value - 1.0).abs() < 0.1, "{}: {found}", parameter.name());
+    }
+}
+
+#[test]
+fn a_drive_stated_without_tolerance_is_taken_as_stated() {
+    let exact = rough_drive("");
+    let setup = Setup::new(&[recording(&exact, &[])], &exact, ModelName::Model2, CRITERION).unwrap();
+    let free = |p: P| setup.baseline.free.iter().any(|f| f.target == Target::Base(p));
+    assert!(![P::CurrentLimitA, P::TimeConstantS, P::SpeedFilterTimeConstantS].into_iter().any(free));
+}
+
 #[test]
 fn a_load_stated_without_tolerance_is_taken_as_stated() {
     let exact = rig(r#"kind = "pendulum"

@@ -6,7 +6,8 @@
 //! - [`measured`]: recordings that others measured, with an open key beside them;
 //! - [`concealed`]: exact changes hidden in measured recordings;
 //! - [`calibrate`]: every probability that was stated, with what became of it, in folds;
-//! - [`temper`]: the odds' one free constant, fitted on some cases and tested on those left out;
+//! - [`temper`]: how far costs count as odds, fitted on some cases and tested on those left out;
+//! - [`trust`]: how far a set is believed by the number of its names;
 //! - [`ledger`]: seeds that were used, so that none is used twice.
 
 pub mod blind;
@@ -19,6 +20,7 @@ pub mod report;
 pub mod score;
 pub mod tally;
 pub mod temper;
+pub mod trust;
 
 use serde_json::Value;
 

@@ -1,13 +1,23 @@
 //! Other forms of the members of a set.
 
-use kort_identify::fit::Fit;
-use kort_identify::hypothesis::Member;
+use kort_identify::fit::{Columns, Fit};
+use kort_identify::hypothesis::{Hypothesis, Member};
 use rayon::prelude::*;
 
 use super::{FIRST_STEPS, ITERATIONS, Search, Set};
 
 /// Forms are changed as long as that lowers a cost by this.
 const ENOUGH: f64 = 0.3;
+
+/// Forms of one set from which first steps are taken.
+const CLOSELY: usize = 4;
+
+/// A set in another form, with what a straight line promises.
+struct Promised {
+    hypothesis: Hypothesis,
+    columns: Columns,
+    cost: f64,
+}
 
 impl Search<'_, '_> {
     /// Fits a set anew with each member in its other forms, until none helps: a screen sees only how a form begins,
@@ -18,13 +28,20 @@ impl Search<'_, '_> {
             if !self.reshaped.insert((set.clone(), before.to_bits())) {
                 return;
             }
-            // A few steps tell which form is worth a fit to the end.
-            let best = self
+            let mut promised: Vec<Promised> = self
                 .other_forms(from)
                 .par_iter()
-                .map(|members| {
-                    let (hypothesis, columns) = self.problem.recompose(from, members);
-                    self.problem.finish(self.problem.fit(&hypothesis, &columns, &from.floor, FIRST_STEPS))
+                .map(|members| self.promised(from, members))
+                .filter(|form| form.cost.is_finite())
+                .collect();
+            promised.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+            promised.truncate(CLOSELY);
+            // A few steps tell which form is worth a fit to the end.
+            let best = promised
+                .par_iter()
+                .map(|form| {
+                    let fit = self.problem.fit(&form.hypothesis, &form.columns, &from.floor, FIRST_STEPS);
+                    self.problem.finish(fit)
                 })
                 .min_by(|a, b| a.cost().total_cmp(&b.cost()));
             let Some(best) = best.filter(|fit| fit.cost() < before + self.constants.rivals) else { return };
@@ -34,6 +51,17 @@ impl Search<'_, '_> {
                 return;
             }
         }
+    }
+
+    /// What a fit's members in these forms come to, as far as the response is a straight line from where they begin.
+    fn promised(&self, from: &Fit, members: &[Member]) -> Promised {
+        let (hypothesis, mut columns) = self.problem.recompose(from, members);
+        let lines = self.problem.residual_lines(&hypothesis, &hypothesis.start);
+        self.problem.complete(&hypothesis, &hypothesis.start, &mut columns);
+        let model = self.problem.about(&lines, &columns, &hypothesis);
+        let there = model.minimise(&from.floor, &hypothesis.free, &hypothesis.start, 0.0);
+        let cost = there.misfit + there.penalty + model.price(&there.noise);
+        Promised { hypothesis, columns, cost }
     }
 
     /// The members of a fit with one of them in another of its forms. What a form leaves out stays at its prior mean,

@@ -36,3 +36,30 @@ pub(super) fn start_state(series: &Series, prepared: &Prepared) -> ([f64; 4], Op
     let current = first("current_a").or(asked).unwrap_or(0.0);
     ([speed, flow, current, first("shaft_angle_rad").unwrap_or(0.0)], None)
 }
+
+#[cfg(test)]
+mod tests {
+    use kort_thruster::rig::Rig;
+
+    use crate::data::{Prepared, Series};
+
+    /// Command before the first row of a log whose first command and speed are these.
+    fn before(command_a: f64, speed_rad_s: f64) -> Option<f64> {
+        let rig = "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = 0.01\ntorque_constant_nm_a = 1.0\n";
+        let rig = Rig::from_toml(rig).unwrap();
+        let rows = 100;
+        let time_s = (0..rows).map(|k| 0.01 * f64::from(k)).collect();
+        let columns = vec![
+            ("current_cmd_a".into(), (0..rows).map(|k| if k < 50 { command_a } else { -2.0 }).collect()),
+            ("shaft_speed_rad_s".into(), (0..rows).map(|k| speed_rad_s + f64::from(k)).collect()),
+        ];
+        Prepared::new(&Series { name: "log".into(), time_s, columns }, &rig, false).unwrap().before
+    }
+
+    #[test]
+    fn a_shaft_that_stands_under_a_live_command_was_asked_for_nothing_until_then() {
+        assert_eq!(before(2.0, 0.0), Some(0.0));
+        assert_eq!(before(2.0, 40.0), None, "it was under way");
+        assert_eq!(before(0.0, 0.0), None, "it is asked for nothing");
+    }
+}

@@ -13,8 +13,9 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     path: Path::Drive,
     what: "play in the gear: when torque reverses the motor crosses the gap alone, then strikes the other flank",
     equation: "motor against load: x'' = c/(f (1 - f)) - p, c = (1 - f) Om' - tl/I; the flanks press by p = wc^2 e + 2 z wc x' where x \
-               is e beyond a gap b, never pull; motor Om + (1 - f) x', load Om - f x'; b [rad], f motor's share \
-               of the inertia I [1], wc = 2 pi fc, fc of the teeth and shafts in contact [Hz], z [1], tl load's torque [N m]",
+               is e beyond a gap b, never pull; motor Om + (1 - f) x', load Om - f x', of which the encoder shows one; b [rad], f \
+               motor's share of the inertia I [1], wc = 2 pi fc, fc of the teeth and shafts in contact [Hz], z [1], tl load's \
+               torque [N m]",
     signature: "lost motion, then a blow, at each reversal of torque; a limit cycle about zero under a speed loop",
     confused_with: &["coulomb_friction", "transport_delay", "command_dead_band"],
     separated_by: "an encoder on the load side; slow reversals of torque",
@@ -42,6 +43,7 @@ fn parameters(_: &Scale) -> Vec<Spec> {
         Spec::shape("contact_frequency_hz", "Hz", 60.0, 15.0, 250.0).sigma(40.0),
         // Flanks come off at four tenths of the speed at which they struck at 0.3, hardly at 1.
         Spec::shape("contact_damping_ratio", "1", 0.5, 0.05, 1.5).sigma(0.3),
+        Spec::held("encoder_at_load", "1", 0.0, 0.0, 1.0),
     ]
 }
 
@@ -52,7 +54,9 @@ const MOST_RAD: f64 = 9.0;
 fn starts(_: &Scale) -> Vec<Vec<f64>> {
     let plays =
         std::iter::successors(Some(0.002), |play| Some(play * 1.5)).take_while(|play| *play < MOST_RAD);
-    plays.flat_map(|play| [0.3, 0.55].map(|share| vec![play, share, 60.0, 0.5])).collect()
+    let sides = |at_load: f64| move |share: f64| [share, at_load];
+    let ways: Vec<[f64; 2]> = [0.0, 1.0].into_iter().flat_map(|at| [0.3, 0.55].map(sides(at))).collect();
+    plays.flat_map(|play| ways.iter().map(move |[share, at]| vec![play, *share, 60.0, 0.5, *at])).collect()
 }
 
 fn build<T: Real>(values: &[T], context: &Context<T>) -> Box<dyn Effect<T>> {
@@ -61,6 +65,7 @@ fn build<T: Real>(values: &[T], context: &Context<T>) -> Box<dyn Effect<T>> {
     let contact_rad_s = (values[2] * std::f64::consts::TAU).min(T::from(SWING_A_STEP_RAD / step_s));
     Box::new(GearBacklash {
         gap_rad: values[0],
+        encoder_at_load: values[4],
         motor_share: values[1],
         contact_rad_s,
         damping_1_s: contact_rad_s * values[3] * 2.0,
@@ -89,6 +94,8 @@ const RIGID_RAD: f64 = 0.01;
 /// how the motor moves against the load.
 struct GearBacklash<T> {
     gap_rad: T,
+    /// 0 where the encoder sits on the motor, 1 where it sits on the load.
+    encoder_at_load: T,
     motor_share: T,
     contact_rad_s: T,
     damping_1_s: T,
@@ -181,11 +188,10 @@ impl<T: Real> Effect<T> for GearBacklash<T> {
         self.advance(between / (self.motor_share * load_share * (self.step_s * PARTS as f64)));
     }
 
-    /// The encoder sits on the motor.
     fn sense(&mut self, _: &Tick, sensed: &mut Sensed<T>) {
-        let load_share = T::ONE - self.motor_share;
-        let ahead_rad = load_share * self.turned_rad;
-        sensed.shaft_speed_rad_s += self.encoder.step(ahead_rad, load_share * self.relative_rad_s);
+        let ahead = T::ONE - self.encoder_at_load - self.motor_share;
+        let ahead_rad = ahead * self.turned_rad;
+        sensed.shaft_speed_rad_s += self.encoder.step(ahead_rad, ahead * self.relative_rad_s);
         sensed.shaft_angle_rad += ahead_rad;
     }
 }

@@ -191,7 +191,7 @@ fn a_voltage_drive_stops_at_its_supply() {
 fn a_motor_that_moves_against_its_load_is_seen_through_the_speed_filter() {
     let rig = dry_filtered();
     let soft: (&str, &[f64]) = ("flexible_coupling", &[2.0, 0.5, 0.1]);
-    let loose: (&str, &[f64]) = ("gear_backlash", &[0.5, 0.4, 60.0, 0.5]);
+    let loose: (&str, &[f64]) = ("gear_backlash", &[0.5, 0.4, 60.0, 0.5, 0.0]);
     for effect in [soft, loose] {
         let mut plant = plant(&rig, &[effect], TICK_S);
         let (mut filtered, mut last, mut apart) = (0.0, 0.0, 0.0_f64);

@@ -89,7 +89,7 @@ fn a_recording_of_the_same_effect_pulls_nothing() {
     let rig = dry_filtered();
     let late: (&str, &[f64]) = ("clock_skew", &[0.0, 0.02, 0.0, 0.0, 0.0]);
     let soft: (&str, &[f64]) = ("flexible_coupling", &[2.0, 0.5, 0.1]);
-    let loose: (&str, &[f64]) = ("gear_backlash", &[0.5, 0.4, 60.0, 0.5]);
+    let loose: (&str, &[f64]) = ("gear_backlash", &[0.5, 0.4, 60.0, 0.5, 0.0]);
     for effect in [late, soft, loose] {
         for by_angle in [true, false] {
             let mut recorded = plant(&rig, &[effect], TICK_S);

@@ -7,6 +7,7 @@ use kort_diagnose::posterior::trusted;
 use kort_proof::calibrate::{Fold, fold_of, records};
 use kort_proof::score::Scored;
 use kort_proof::temper::{TEMPERS, Weighed, best, cross_validate, mean_score};
+use kort_proof::trust::{self, Law, SURPRISES, Stated};
 use kort_truth::Answer;
 use serde_json::Value;
 
@@ -40,7 +41,28 @@ pub fn write(
     write_text(path, &text)?;
     eprintln!("wrote {count} records to {}", path.display());
     print_temper(results, by, folds);
+    print_trust(results);
     Ok(())
+}
+
+/// How often names that have no rival to speak of were right, by how many stand together, and which trust that asks for.
+fn print_trust(results: &[(Scored, Answer, Value)]) {
+    let in_use = Constants::built_in().posterior.surprise;
+    let all: Vec<Stated> = results
+        .iter()
+        .flat_map(|(scored, _, report)| trust::stated(scored, report, |names| trusted(names, in_use)))
+        .collect();
+    eprintln!("names in the set  right  stated without a rival");
+    for (names, right, count) in trust::counted(&all) {
+        eprintln!("{names:16}  {right:5}  {count:22}");
+    }
+    eprintln!("odds against one name  {}", Law::ALL.map(|law| format!("{:>16}", law.name())).join("  "));
+    for surprise in SURPRISES {
+        let of = |law: Law| format!("{:16.2}", trust::score(&all, |names| law.trust(names, surprise)));
+        eprintln!("{surprise:21}  {}", Law::ALL.map(of).join("  "));
+    }
+    let (law, surprise) = trust::best(&all);
+    eprintln!("best {surprise} {}, in use {in_use} {}", law.name(), Law::Square.name());
 }
 
 /// The temper that these cases ask for, and what it is worth on folds left out.
