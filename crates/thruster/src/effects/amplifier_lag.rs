@@ -51,6 +51,10 @@ struct AmplifierLag<T> {
 }
 
 impl<T: Real> Effect<T> for AmplifierLag<T> {
+    fn brisk(&self) -> bool {
+        true
+    }
+
     fn hooks(&self) -> Hooks {
         Hooks::DRIVE
     }

@@ -56,8 +56,8 @@ pub trait Effect<T = f64>: Send {
     fn slow(&self) -> bool {
         self.states() == 0
     }
-    /// Whether what it does may change within a few ticks though the machine's motion hardly does: with the angle within
-    /// a turn.
+    /// Whether what it does may change within a few ticks where the stated machine is calm: with the angle within a turn,
+    /// or since a step of the command comes late.
     fn brisk(&self) -> bool {
         false
     }

@@ -40,6 +40,10 @@ struct TransportDelay<T> {
 }
 
 impl<T: Real> Effect<T> for TransportDelay<T> {
+    fn brisk(&self) -> bool {
+        true
+    }
+
     fn hooks(&self) -> Hooks {
         Hooks::DRIVE
     }

@@ -86,7 +86,8 @@ pub struct Plant<T = f64> {
     last_rub: Rub<T>,
     /// Length of the last step, s.
     last_span_s: f64,
-    /// Whether an effect may change within a few ticks by itself: none is passed over then.
+    /// Whether an effect may change within a few ticks by itself, or makes another motion of the model's: what is known of
+    /// a tick's course is not known of several then.
     brisk: bool,
     /// Whether there was a last tick.
     moving: bool,
@@ -173,7 +174,7 @@ impl<T: Real> Plant<T> {
                 Hooked { effect, own }
             })
             .collect();
-        let (mut model, mut parameters) = (model, *parameters);
+        let (stated, mut model, mut parameters) = (model, model, *parameters);
         effects.iter().for_each(|e| e.effect.amend(&mut model, &mut parameters));
         let hooked = |used: fn(&crate::effects::Hooks) -> bool| -> Vec<usize> {
             (0..effects.len()).filter(|i| used(&effects[*i].effect.hooks())).collect()
@@ -189,7 +190,7 @@ impl<T: Real> Plant<T> {
             model,
             rates_may_hold: !effects.iter().any(changes_between_ticks),
             slow: effects.iter().all(|e| e.effect.slow()) && model != ModelName::RotationalFlow,
-            brisk: effects.iter().any(|e| e.effect.brisk()),
+            brisk: model != stated || effects.iter().any(|e| e.effect.brisk()),
             last_span_s: tick_s,
             stiff: Stiff::of(model, rig, tick_s, lightest_share),
             slopes: None,

@@ -118,11 +118,11 @@ fn in_strides(effects: &[(&crate::effects::Descriptor, &[f64])], of: usize) -> V
 
 #[test]
 fn several_smooth_ticks_at_once_lead_where_single_ones_do() {
-    use crate::effects::{coulomb_friction, thrust_sensor_lag, transport_delay};
+    use crate::effects::{command_dead_band, coulomb_friction, thrust_sensor_lag};
     let friction = (&coulomb_friction::DESCRIPTOR, &[0.1, 0.2, 3.0][..]);
-    let delay = (&transport_delay::DESCRIPTOR, &[0.013][..]);
+    let band = (&command_dead_band::DESCRIPTOR, &[0.2, 0.0, 0.0][..]);
     let lag = (&thrust_sensor_lag::DESCRIPTOR, &[0.02, 0.3][..]);
-    for effects in [&[][..], &[friction], &[delay, lag], &[friction, delay, lag]] {
+    for effects in [&[][..], &[friction], &[band, lag], &[friction, band, lag]] {
         let (one, five) = (in_strides(effects, 1), in_strides(effects, 5));
         let top = one.iter().fold([0.0_f64; 3], |top, at| [0, 1, 2].map(|k| top[k].max(at[k].abs())));
         for k in 0..3 {
