@@ -203,6 +203,7 @@ impl ControlModel {
             duration_s,
             clock_s: [0.0, duration_s],
             angle_known: true,
+            turned_rad: f64::INFINITY,
             reverses: true,
         }
     }

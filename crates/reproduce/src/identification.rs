@@ -71,6 +71,7 @@ fn levels(paper: &Paper, effect: &str) -> Vec<Level> {
         duration_s: SETTLE_S,
         clock_s: [0.0, SETTLE_S],
         angle_known: true,
+        turned_rad: f64::INFINITY,
         reverses: true,
     };
     // Twice the size at which a fit would start: a few percent of the loads.

@@ -97,6 +97,7 @@ mod tests {
             duration_s: 10.0,
             clock_s: [0.0, 10.0],
             angle_known: true,
+            turned_rad: f64::INFINITY,
             reverses: true,
         }
     }

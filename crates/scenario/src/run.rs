@@ -273,6 +273,7 @@ pub fn scale(rig: &Rig, p: &Parameters, peak: f64, tick_s: f64, duration_s: f64)
         duration_s,
         clock_s: [0.0, duration_s],
         angle_known: true,
+        turned_rad: f64::INFINITY,
         reverses: true,
     }
 }

@@ -138,6 +138,7 @@ fn bench(name: &'static str, text: &str) -> Bench {
             duration_s: DURATION_S,
             clock_s: [0.0, DURATION_S],
             angle_known: true,
+            turned_rad: f64::INFINITY,
             reverses: true,
         },
         rig,

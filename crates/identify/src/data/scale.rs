@@ -70,12 +70,23 @@ pub fn scale(all: &[Prepared], rig: &Rig) -> Scale {
         ],
         reverses: goes_astern(all, speed, command),
         angle_known: angle_known(all),
+        turned_rad: turned_rad(all),
     }
 }
 
 /// Whether every recording holds the shaft angle, or a speed that it was counted from.
 fn angle_known(all: &[Prepared]) -> bool {
     all.iter().all(|p| p.stimulus.ticks.iter().any(|t| t.shaft_angle_rad.is_some()))
+}
+
+/// The longest way of a recording's shaft between its furthest ends, rad.
+fn turned_rad(all: &[Prepared]) -> f64 {
+    let way = |p: &Prepared| {
+        let angles = p.stimulus.ticks.iter().filter_map(|t| t.shaft_angle_rad.map(|(at, _)| at));
+        let ends = angles.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), q| (a.min(q), b.max(q)));
+        if ends.0.is_finite() { ends.1 - ends.0 } else { f64::INFINITY }
+    };
+    all.iter().map(way).fold(0.0, f64::max)
 }
 
 /// Whether command or shaft speed ever went astern by more than a trifle.

@@ -29,6 +29,8 @@ pub struct Scale {
     pub clock_s: [f64; 2],
     /// Whether the shaft angle was recorded, or counted from a recorded speed, so that what follows it can be kept in phase.
     pub angle_known: bool,
+    /// Way of the shaft's known angle between its furthest ends, rad; infinite where none is known.
+    pub turned_rad: f64,
     /// Whether command or shaft speed ever went astern.
     pub reverses: bool,
 }
@@ -54,6 +56,7 @@ impl Scale {
         duration_s: 1.0,
         clock_s: [0.0, 1.0],
         angle_known: true,
+        turned_rad: f64::INFINITY,
         reverses: true,
     };
 }

@@ -71,6 +71,7 @@ impl Bench {
             duration_s: DURATION_S,
             clock_s: [0.0, DURATION_S],
             angle_known: true,
+            turned_rad: f64::INFINITY,
             reverses: true,
         };
         Self { rig, stimulus: Stimulus { ticks, logs }, scale }

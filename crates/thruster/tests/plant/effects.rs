@@ -150,6 +150,7 @@ fn cogging_has_several_orders_at_once() {
         duration_s: 10.0,
         clock_s: [0.0, 10.0],
         angle_known: true,
+        turned_rad: f64::INFINITY,
         reverses: true,
     };
     let mut values = vec![0.0; (cogging.parameters)(&scale).len()];
