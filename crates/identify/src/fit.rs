@@ -1,8 +1,8 @@
 //! Output-error identification: simulate, compare with every channel, improve the free numbers.
 //!
 //! Gauss-Newton on the tempered likelihood of [`crate::noise`]: about each point the response is taken as
-//! linear and the criterion minimised with its noise learnt anew ([`crate::quadratic`]); a step that does
-//! not hold is damped. A fit knows its noise, so that any two can be compared.
+//! linear and the criterion minimised with its noise learnt anew ([`crate::quadratic`]); a step that gives
+//! less than it promises is damped, one that gives more is lengthened. A fit knows its noise, so that any two can be compared.
 
 use std::sync::Arc;
 
@@ -17,11 +17,38 @@ use crate::simulate::Problem;
 /// A fit ends when a step lowers the merit (twice a log-likelihood) by less than this.
 const ENOUGH: f64 = 0.3;
 
+/// A linear response holds where a step gains what it promises within this part of it.
+const HOLDS: f64 = 0.25;
+
+/// A step that gains less than this part of what it promises is damped.
+const FALLS_SHORT: f64 = 0.3;
+
+/// Dampings of one step.
+const DAMPINGS: usize = 5;
+
+/// How many times its length a step goes where it gains more than it promises.
+const LONGEST: f64 = 4.0;
+
 /// Rounds of placing the command's steps and fitting.
 const PLACINGS: usize = 8;
 
 /// Derivatives of the response by free number, as lines, where they are known.
 pub type Columns = Vec<Option<Arc<DVector<f64>>>>;
+
+/// Where a fit stands.
+struct Point {
+    values: Vec<f64>,
+    /// Measured less simulated, as lines.
+    lines: DVector<f64>,
+    /// Misfit and priors.
+    merit: f64,
+}
+
+/// Where a step leads, and what the linear response promised of it.
+struct Step {
+    to: Point,
+    promised: f64,
+}
 
 /// A fitted hypothesis.
 #[derive(Clone)]
@@ -68,65 +95,40 @@ impl Fit {
 
 impl Problem<'_> {
     /// Fits a hypothesis from its start, held to noise no less than `floor`. `known` holds derivatives from a nearby
-    /// fit; they serve until a step falls short of what they promise, which saves most simulations while hypotheses are
+    /// fit; they serve until a step gives less or more than they promise, which saves most simulations while hypotheses are
     /// compared.
     pub fn fit(&self, hypothesis: &Hypothesis, known: &Columns, floor: &Floor, iterations: usize) -> Fit {
-        let free = &hypothesis.free;
-        let n = free.len();
-        let mut values = hypothesis.start.clone();
-        let mut lines = self.residual_lines(hypothesis, &values);
-        let mut merit = self.merit(hypothesis, &values, &lines, floor);
+        let mut at = self.point(hypothesis, hypothesis.start.clone(), floor);
         let mut columns = known.clone();
-        columns.resize(n, None);
+        columns.resize(at.values.len(), None);
         let mut fresh = columns.iter().all(Option::is_none);
         let mut damping = 0.0;
-        for _ in 0..if merit.is_finite() { iterations } else { 0 } {
-            self.complete(hypothesis, &values, &mut columns);
-            let model = self.about(&lines, &columns, hypothesis);
-            let mut outcome = None;
-            for _ in 0..5 {
-                let minimum = model.minimise(floor, free, &values, damping);
-                let trial: Vec<f64> = (0..n)
-                    .map(|k| (values[k] + minimum.step[k] * free[k].sigma).clamp(free[k].low, free[k].high))
-                    .collect();
-                let promised = merit - minimum.misfit - minimum.penalty;
-                let trial_lines = self.residual_lines(hypothesis, &trial);
-                let trial_merit = self.merit(hypothesis, &trial, &trial_lines, floor);
-                if trial_merit < merit {
-                    outcome = Some((merit - trial_merit, promised));
-                    (values, lines, merit) = (trial, trial_lines, trial_merit);
-                    damping = if damping > 1e-3 { damping * 0.1 } else { 0.0 };
+        for _ in 0..if at.merit.is_finite() { iterations } else { 0 } {
+            self.complete(hypothesis, &at.values, &mut columns);
+            let model = self.about(&at.lines, &columns, hypothesis);
+            let step = self.step(hypothesis, &at, &model, floor, &mut damping, fresh);
+            let (gain, promised) = step.as_ref().map_or((0.0, 0.0), |s| (at.merit - s.to.merit, s.promised));
+            at = step.map_or(at, |step| step.to);
+            if gain > 0.0 && (gain - promised).abs() < HOLDS * promised {
+                if gain < ENOUGH {
                     break;
                 }
-                if !fresh || promised < ENOUGH {
-                    break;
-                }
-                damping = if damping == 0.0 { 0.1 } else { damping * 10.0 };
-            }
-            match outcome {
-                Some((gain, promised)) if gain > 0.75 * promised => {
-                    if gain < ENOUGH {
-                        break;
-                    }
-                    fresh = false;
-                }
+                fresh = false;
+            } else if !fresh && gain > ENOUGH && gain > FALLS_SHORT * promised {
                 // The derivatives no longer tell: refresh the effects' first, then everything.
-                Some((gain, promised)) if gain > 0.3 * promised && !fresh && gain > ENOUGH => {
-                    for k in 0..n {
-                        if matches!(free[k].target, Target::Effect(..)) {
-                            columns[k] = None;
-                        }
+                for (column, free) in columns.iter_mut().zip(&hypothesis.free) {
+                    if matches!(free.target, Target::Effect(..)) {
+                        *column = None;
                     }
                 }
-                other => {
-                    if fresh && other.is_none_or(|(gain, _)| gain < ENOUGH) {
-                        break;
-                    }
-                    columns.fill(None);
-                    fresh = true;
-                }
+            } else if fresh && gain < ENOUGH {
+                break;
+            } else {
+                columns.fill(None);
+                fresh = true;
             }
         }
+        let Point { values, lines, .. } = at;
         let powers = self.spectrum.powers(&lines);
         let noise = Noise::of(&self.spectrum.bands, &powers, floor, &self.criterion);
         Fit {
@@ -242,10 +244,61 @@ impl Problem<'_> {
         (hypothesis, columns)
     }
 
-    /// Misfit and priors at values that leave these lines.
-    fn merit(&self, hypothesis: &Hypothesis, values: &[f64], lines: &DVector<f64>, floor: &Floor) -> f64 {
-        let powers = self.spectrum.powers(lines);
-        Noise::of(&self.spectrum.bands, &powers, floor, &self.criterion).misfit + hypothesis.penalty(values)
+    /// A step from a point whose derivatives are known: damped where it does not give what it promises, lengthened
+    /// where it gives more. Nothing where no step lowers the merit.
+    fn step(
+        &self,
+        hypothesis: &Hypothesis,
+        from: &Point,
+        model: &Quadratic,
+        floor: &Floor,
+        damping: &mut f64,
+        fresh: bool,
+    ) -> Option<Step> {
+        let free = &hypothesis.free;
+        let mut best: Option<Step> = None;
+        for _ in 0..DAMPINGS {
+            let minimum = model.minimise(floor, free, &from.values, *damping);
+            let promised = from.merit - minimum.misfit - minimum.penalty;
+            let moved = |times: f64| -> Vec<f64> {
+                let by = |k: usize| from.values[k] + times * minimum.step[k] * free[k].sigma;
+                (0..free.len()).map(|k| by(k).clamp(free[k].low, free[k].high)).collect()
+            };
+            let mut to = self.point(hypothesis, moved(1.0), floor);
+            let mut times = 2.0;
+            while from.merit - to.merit > (1.0 + HOLDS) * promised.max(ENOUGH) && times <= LONGEST {
+                let farther = self.point(hypothesis, moved(times), floor);
+                if farther.merit.is_nan() || farther.merit >= to.merit {
+                    break;
+                }
+                to = farther;
+                times *= 2.0;
+            }
+            let gain = from.merit - to.merit;
+            let so_far = best.as_ref().map_or(0.0, |step| from.merit - step.to.merit);
+            if gain > so_far {
+                best = Some(Step { to, promised });
+            } else if best.is_some() {
+                break;
+            }
+            if gain > FALLS_SHORT * promised {
+                *damping = if *damping > 1e-3 { *damping * 0.1 } else { 0.0 };
+                break;
+            }
+            if !fresh || promised < ENOUGH {
+                break;
+            }
+            *damping = if *damping == 0.0 { 0.1 } else { *damping * 10.0 };
+        }
+        best
+    }
+
+    /// Values, what they leave as lines, and their merit.
+    fn point(&self, hypothesis: &Hypothesis, values: Vec<f64>, floor: &Floor) -> Point {
+        let lines = self.residual_lines(hypothesis, &values);
+        let powers = self.spectrum.powers(&lines);
+        let misfit = Noise::of(&self.spectrum.bands, &powers, floor, &self.criterion).misfit;
+        Point { merit: misfit + hypothesis.penalty(&values), values, lines }
     }
 
     /// Computes the derivatives that are missing.
