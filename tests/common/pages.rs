@@ -110,7 +110,7 @@ pub fn follow_with(page: &str, port: u16, given: &[(&str, &[u8])]) -> String {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let text = std::fs::read_to_string(root.join(page)).unwrap();
     let text =
-        text.replace("rate_hz = 50,", "rate_hz = 10,").replace("\"duration_s\": 20", "\"duration_s\": 8");
+        text.replace("rate_hz = 50,", "rate_hz = 10,").replace("\"duration_s\": 20", "\"duration_s\": 12");
     let folder = tempfile::tempdir().unwrap();
     for shared in ["tests", "config", "docs"] {
         std::os::unix::fs::symlink(root.join(shared), folder.path().join(shared)).unwrap();
