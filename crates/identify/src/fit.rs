@@ -2,7 +2,8 @@
 //!
 //! Gauss-Newton on the tempered likelihood of [`crate::noise`]: about each point the response is taken as
 //! linear and the criterion minimised with its noise learnt anew ([`crate::quadratic`]); a step that gives
-//! less than it promises is damped, one that gives more is lengthened. A fit knows its noise, so that any two can be compared.
+//! less than it promises is damped, one that gives more is lengthened. A fit knows its noise, so that any two can be
+//! compared.
 
 use std::sync::Arc;
 
@@ -26,7 +27,8 @@ const FALLS_SHORT: f64 = 0.3;
 /// Dampings of one step.
 const DAMPINGS: usize = 5;
 
-/// How many times its length a step goes where it gains more than it promises.
+/// How many times its length a step goes at most where it gains more than it promises: a budget. By more, the fits of
+/// tuning cases ended where they do by this.
 const LONGEST: f64 = 4.0;
 
 /// Rounds of placing the command's steps and fitting.
@@ -95,8 +97,8 @@ impl Fit {
 
 impl Problem<'_> {
     /// Fits a hypothesis from its start, held to noise no less than `floor`. `known` holds derivatives from a nearby
-    /// fit; they serve until a step gives less or more than they promise, which saves most simulations while hypotheses are
-    /// compared.
+    /// fit; they serve until a step gives less or more than they promise, which saves most simulations while
+    /// hypotheses are compared.
     pub fn fit(&self, hypothesis: &Hypothesis, known: &Columns, floor: &Floor, iterations: usize) -> Fit {
         let mut at = self.point(hypothesis, hypothesis.start.clone(), floor);
         let mut columns = known.clone();
