@@ -1,45 +1,20 @@
 //! Calm stretches are passed in longer steps: whatever an effect does to the machine, its response is the one that single
 //! ticks give.
 
-use kort_identify::data::{Series, available};
+mod common;
+
+use common::{CRITERION, RIG, recording};
+use kort_identify::data::available;
 use kort_identify::hypothesis::{Hypothesis, Member};
-use kort_identify::noise::Criterion;
 use kort_identify::setup::Setup;
 use kort_identify::simulate::Problem;
 use kort_thruster::effects;
 use kort_thruster::models::ModelName;
-use kort_thruster::parameters::Parameters;
-use kort_thruster::plant::{Plant, Tick};
 use kort_thruster::rig::Rig;
 
-const CRITERION: Criterion =
-    Criterion { form_error: 0.01, own_form_error: 0.1, facts_a_band: 100.0, timing_s: 0.001 };
-const RIG: &str = include_str!("../../../config/thrusters/whitcomb-yoerger-1999.toml");
-const TICK_S: f64 = 0.002;
-
-/// 16 s of levels of the current, long enough to settle: a step that comes late falls into the calm.
-fn recording(rig: &Rig) -> Series {
-    let levels = [0.0, 4.0, -3.0, 6.0, 2.0, -5.0, 1.0, 3.0];
-    let mut plant = Plant::new(ModelName::Model2, rig, &Parameters::stated(rig), &[], TICK_S);
-    let (mut time_s, mut columns) = (Vec::new(), vec![Vec::new(); 3]);
-    for k in 0..8000_u32 {
-        let t = f64::from(k) * TICK_S;
-        let command = levels[(t / 2.0) as usize];
-        let at = *plant.truth();
-        if k % 5 == 0 {
-            time_s.push(t);
-            let row = [command, at.shaft_speed_rad_s, at.thrust_n];
-            row.iter().zip(&mut columns).for_each(|(value, column)| column.push(*value));
-        }
-        plant.step(&Tick { time_s: t, command, ..Tick::default() });
-    }
-    let names = ["current_cmd_a", "shaft_speed_rad_s", "thrust_n"];
-    Series {
-        name: "levels".into(),
-        time_s,
-        columns: names.map(str::to_owned).into_iter().zip(columns).collect(),
-    }
-}
+/// Long enough to settle: a step that comes late falls into the calm. Until when, s, and how much, A.
+const LEVELS: [(f64, f64); 8] =
+    [(2.0, 0.0), (4.0, 4.0), (6.0, -3.0), (8.0, 6.0), (10.0, 2.0), (12.0, -5.0), (14.0, 1.0), (16.0, 3.0)];
 
 /// The largest difference between two responses, over full scale.
 fn apart(problem: &Problem, single: &Problem, hypothesis: &Hypothesis) -> f64 {
@@ -55,7 +30,7 @@ fn apart(problem: &Problem, single: &Problem, hypothesis: &Hypothesis) -> f64 {
 fn every_effect_responds_as_in_single_ticks() {
     let rig = Rig::from_toml(RIG).unwrap();
     let Setup { series, problem, baseline, .. } =
-        Setup::new(&[recording(&rig)], &rig, ModelName::Model2, CRITERION).unwrap();
+        Setup::new(&[recording(&rig, &[], &LEVELS, [0.0; 2])], &rig, ModelName::Model2, CRITERION).unwrap();
     let strides = &problem.recordings[0].strides;
     assert!(
         strides.iter().filter(|count| **count > 1).count() > strides.len() / 10,
