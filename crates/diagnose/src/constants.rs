@@ -41,8 +41,10 @@ pub struct SearchConstants {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PosteriorConstants {
-    /// Odds of two sets are `exp(-difference of cost / (2 temper))`.
+    /// Odds of two sets are `exp(-difference of cost / (2 temper))` where little is explained.
     pub temper: f64,
+    /// What the temper grows to as a share of what the likeliest set costs less than the baseline.
+    pub form_share: f64,
     /// Odds against the likeliest set by the square of the number of its effects.
     pub surprise: f64,
     /// Factor on a name in a set that needs a nameless term: the world then holds what the catalogue does not.
@@ -76,6 +78,7 @@ mod tests {
             c.criterion.timing_s,
             c.search.rivals,
             c.posterior.temper,
+            c.posterior.form_share,
             c.posterior.surprise,
             c.posterior.beside_unknown,
             c.remainder.practical,

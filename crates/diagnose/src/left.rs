@@ -42,7 +42,7 @@ pub struct Rest {
 /// What a fit leaves that is no noise: either it follows what the machine does by more than our equations may err, or
 /// it is larger than sensors of this kind err.
 pub fn more_than_noise(problem: &Problem, fit: &Fit, residual: &Stack, floor: &Noise) -> Option<Rest> {
-    let may_err = problem.spectrum.variances(fit.floor.levels());
+    let may_err = problem.spectrum.variances(&fit.floor.levels());
     let following = follows(problem, fit, residual);
     let lasting = lasting(problem, residual);
     let mut all = Vec::new();

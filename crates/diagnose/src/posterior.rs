@@ -1,5 +1,6 @@
 //! From costs of sets to probabilities, of sets and of effects.
 
+use crate::constants::PosteriorConstants;
 use crate::flexible::is_term;
 use crate::search::Set;
 
@@ -21,8 +22,13 @@ pub fn trusted(effects: usize, surprise: f64) -> f64 {
     1.0 / (1.0 + surprise * (effects as f64).powi(2))
 }
 
+/// How far costs count as odds where the likeliest set costs so much less than the baseline. No form is exact, so costs
+/// differ by more than the truth behind them, and the more there is to explain, the more of it is form.
+pub fn temper(constants: &PosteriorConstants, gain: f64) -> f64 {
+    constants.temper.hypot(constants.form_share * gain.max(0.0))
+}
+
 /// Probabilities of sets, likeliest first: in proportion to `exp(-cost / (2 temper))`, as far as each may be [`trusted`].
-/// A temper above one says that costs differ by more than the truth behind them, since no form is exact.
 pub fn posterior(costs: Vec<(Set, f64)>, temper: f64, surprise: f64) -> Vec<Explanation> {
     let least = costs.iter().map(|c| c.1).fold(f64::INFINITY, f64::min);
     let weight = |cost: f64| (-(cost - least) / (2.0 * temper)).exp();
@@ -75,6 +81,15 @@ pub fn presence(explanations: &[Explanation], effect: &str, beside_unknown: f64)
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_temper_is_the_least_where_little_is_explained_and_a_share_of_much() {
+        let constants = crate::constants::Constants::built_in().posterior;
+        let (least, share) = (constants.temper, constants.form_share);
+        assert_eq!(temper(&constants, -3.0), least, "a baseline that nothing betters");
+        assert!((temper(&constants, 0.1 * least / share) / least - 1.0).abs() < 0.01);
+        assert!((temper(&constants, 1e5) / (share * 1e5) - 1.0).abs() < 0.01);
+    }
 
     #[test]
     fn equal_sets_share_and_a_far_one_has_nothing() {

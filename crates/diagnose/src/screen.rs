@@ -36,6 +36,8 @@ pub struct Screened {
 const STARTS_OF_ONE: usize = 2;
 /// What a closer look may gain beyond a probe's promise.
 const HOPE: f64 = 10.0;
+/// Part of what a probe promises that is worth no other look.
+const KEPT: f64 = 0.7;
 /// Promises looked at closely on top of one set, and effects of which one is.
 const CLOSELY: usize = 14;
 
@@ -58,14 +60,8 @@ pub fn screen(problem: &Problem, parent: &Fit, probes: &[&[Probe]]) -> Vec<Scree
         *place < CLOSELY || first && effects.len() <= CLOSELY
     });
     let promised: Vec<Promise> = promised.map(|p| p.1).collect();
-    let best_of = |p: Promise| {
-        let near =
-            p.member.values.iter().zip(&p.probed.values).all(|(a, b)| a == b || (a / b - 1.0).abs() < 0.5);
-        let from_probe = if near { None } else { at(problem, parent, known, p.probed) };
-        let scaled = at(problem, parent, known, p.member);
-        scaled.into_iter().chain(from_probe).min_by(|a, b| a.cost.total_cmp(&b.cost))
-    };
-    let mut all: Vec<Screened> = promised.into_par_iter().filter_map(best_of).collect();
+    let mut all: Vec<Screened> =
+        promised.into_par_iter().filter_map(|p| look(problem, parent, known, p)).collect();
     all.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     // Where an effect is a different motion from each of its starts, a fit does not come from one to the other.
     let mut seen: Vec<&'static str> = Vec::new();
@@ -75,6 +71,23 @@ pub fn screen(problem: &Problem, parent: &Fit, probes: &[&[Probe]]) -> Vec<Scree
         before < STARTS_OF_ONE
     });
     all
+}
+
+/// A closer look at a promise: at the size that a straight line promises and, where that does not keep it, at the size
+/// that was probed. What switches on or binds may do nothing at the first.
+pub fn look(
+    problem: &Problem,
+    parent: &Arc<Fit>,
+    known: &[DMatrix<f64>],
+    promise: Promise,
+) -> Option<Screened> {
+    let promised = parent.cost() - promise.cost;
+    let scaled = at(problem, parent, known, promise.member);
+    if scaled.as_ref().is_some_and(|s| parent.cost() - s.cost > KEPT * promised) {
+        return scaled;
+    }
+    let probed = at(problem, parent, known, promise.probed);
+    scaled.into_iter().chain(probed).min_by(|a, b| a.cost.total_cmp(&b.cost))
 }
 
 fn at(problem: &Problem, parent: &Arc<Fit>, known: &[DMatrix<f64>], member: Member) -> Option<Screened> {

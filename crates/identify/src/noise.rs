@@ -2,9 +2,13 @@
 //!
 //! A tempered profile Whittle likelihood. Each band's noise level is what the residual leaves there, but
 //! never below the *form error*: our equations are not exact, and a few percent of a signal, or a share of
-//! the mismatch that is to be explained, must not count against a good name. A band of one structural error holds many
-//! lines and few facts, in however many recordings: it counts as at most so many. The lowest bands may not explain a constant away:
-//! noise rises towards low frequency no faster than a random walk does.
+//! the mismatch that is to be explained, must not count against a good name. The lowest bands may not explain a constant
+//! away: noise rises towards low frequency no faster than a random walk does.
+//!
+//! A band of one structural error holds many lines and few facts, in however many recordings: all its variance may lie in
+//! at most so many coordinates of the band, while the sensor's white noise lies in all of them alike. So white noise of
+//! level `N` hides no more than `N` in each of the coordinates of a structural error of level `T`, which has
+//! `T n / facts` there: an error well below the noise of single samples shows, as far as it is larger than the form error.
 //!
 //! Whittle 1953 (Ark. Mat. 2:423); tempering after Gruenwald & van Ommen 2017 (Bayesian Anal. 12:1069).
 
@@ -33,10 +37,10 @@ impl Criterion {
     }
 }
 
-/// The likeliest levels that rise towards low frequency no faster than a random walk's, `1/f^2`, and lie on or above
-/// the floor. Over the walk's own course levels may only fall with falling frequency, which pooling neighbours that
+/// The likeliest levels that rise towards low frequency no faster than a random walk's, `1/f^2`; no lower than the floor.
+/// Over the walk's own course levels may only fall with falling frequency, which pooling neighbours that
 /// violate it solves exactly (Barlow et al. 1972, Statistical Inference under Order Restrictions, 1.2).
-fn likeliest(bands: &[Band], powers: &[f64], floor: &[f64], facts: &[f64]) -> Vec<f64> {
+fn likeliest(bands: &[Band], powers: &[f64], floor: &Floor, facts: &[f64]) -> Vec<f64> {
     struct Pool {
         bands: usize,
         facts: f64,
@@ -49,7 +53,10 @@ fn likeliest(bands: &[Band], powers: &[f64], floor: &[f64], facts: &[f64]) -> Ve
         let walk = |b: usize| bands[b].hz.powi(-2);
         let mut pools: Vec<Pool> = Vec::new();
         for b in first..=last {
-            let mut pool = Pool { bands: 1, facts: facts[b], level: powers[b].max(floor[b]) / walk(b) };
+            let (power, least) = (powers[b], floor.levels[b]);
+            // What is excused need not be there: a quiet band says that there is no walk.
+            let noise = (power - floor.own[b]).max(power.min(least));
+            let mut pool = Pool { bands: 1, facts: facts[b], level: noise / walk(b) };
             while let Some(lower) = pools.pop_if(|lower| lower.level > pool.level) {
                 let facts = pool.facts + lower.facts;
                 pool = Pool {
@@ -61,7 +68,9 @@ fn likeliest(bands: &[Band], powers: &[f64], floor: &[f64], facts: &[f64]) -> Ve
             pools.push(pool);
         }
         let levels = pools.iter().flat_map(|p| std::iter::repeat_n(p.level, p.bands));
-        out.extend(levels.zip(first..).map(|(level, b)| (level * walk(b)).max(floor[b])));
+        out.extend(
+            levels.zip(first..).map(|(level, b)| (level * walk(b)).max(floor.levels[b]) + floor.own[b]),
+        );
         first = last + 1;
     }
     out
@@ -70,9 +79,17 @@ fn likeliest(bands: &[Band], powers: &[f64], floor: &[f64], facts: &[f64]) -> Ve
 /// Variance below which nothing is told apart, in squares of the full scale: rounding of the computation.
 const ROUNDING: f64 = 1e-14;
 
-/// Least noise by band; belongs to one hypothesis.
+/// What no hypothesis is held to account for, by band.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Floor(Vec<f64>);
+pub struct Floor {
+    /// Variance of quantisation, form error of the model and timing.
+    levels: Vec<f64>,
+    /// Form error of what explains the mismatch, on top of it. It is no noise: it says nothing about frequencies beside
+    /// it.
+    own: Vec<f64>,
+    /// Variance of the sensor's white noise.
+    white: Vec<f64>,
+}
 
 impl Floor {
     /// The floor under which no hypothesis is held to account: quantisation, form error, timing.
@@ -93,31 +110,58 @@ impl Floor {
             let timing = (std::f64::consts::TAU * band.hz * timing_s).powi(2) * band.signal;
             floor.push(band.quantisation + form + timing + ROUNDING);
         }
-        Self(floor)
+        Self { white: vec![0.0; floor.len()], own: vec![0.0; floor.len()], levels: floor }
     }
 
     /// Variance by band, in squares of the full scale.
-    pub fn levels(&self) -> &[f64] {
-        &self.0
+    pub fn levels(&self) -> Vec<f64> {
+        self.levels.iter().zip(&self.own).map(|(floor, own)| floor + own).collect()
     }
 
     /// With the doubt of what drives the model (mean square by band).
     pub fn with_doubt(&self, doubt: &[f64]) -> Self {
-        Self(self.0.iter().zip(doubt).map(|(f, d)| f + d).collect())
+        Self { levels: self.levels.iter().zip(doubt).map(|(f, d)| f + d).collect(), ..self.clone() }
     }
 
     /// With the form error of what is to explain a mismatch (mean square by band): its equations are as good as a share
     /// of it. No more than the signal is to be explained: a model that runs away leaves more than none at all.
     pub fn explaining(&self, bands: &[Band], mismatch: &[f64], criterion: &Criterion) -> Self {
         let share = criterion.own_form_error.powi(2);
-        let of_band = |((floor, band), left): ((&f64, &Band), &f64)| floor + share * left.min(band.signal);
-        Self(self.0.iter().zip(bands).zip(mismatch).map(of_band).collect())
+        let of_band = |(band, left): (&Band, &f64)| share * left.min(band.signal);
+        Self {
+            levels: self.levels.clone(),
+            own: bands.iter().zip(mismatch).map(of_band).collect(),
+            white: white(bands, mismatch),
+        }
     }
 
     /// The lower of two, band by band.
     pub fn or_lower(&self, other: &Self) -> Self {
-        Self(self.0.iter().zip(&other.0).map(|(a, b)| a.min(*b)).collect())
+        let lower = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a.min(*b)).collect();
+        Self {
+            levels: lower(&self.levels, &other.levels),
+            own: lower(&self.own, &other.own),
+            white: lower(&self.white, &other.white),
+        }
     }
+}
+
+/// Fewest lines of a band whose level is known well enough, to a seventh, to be taken for the sensor's noise.
+const MANY: usize = 100;
+
+/// Variance of each channel's white noise by band: the lowest level to which a residual falls anywhere in frequency.
+/// Nothing is white noise in a channel that has no band of many lines.
+fn white(bands: &[Band], powers: &[f64]) -> Vec<f64> {
+    let mut out = Vec::with_capacity(bands.len());
+    while out.len() < bands.len() {
+        let first = out.len();
+        let last = (first..bands.len()).find(|b| !bands[*b].continues).unwrap_or(bands.len() - 1);
+        let many = (first..=last).filter(|b| bands[*b].lines.len() >= MANY);
+        let lowest = many.map(|b| powers[b]).fold(f64::INFINITY, f64::min);
+        let level = if lowest.is_finite() { lowest } else { 0.0 };
+        out.resize(last + 1, level);
+    }
+    out
 }
 
 /// The noise that a residual shows: level and weight by band.
@@ -125,7 +169,7 @@ impl Floor {
 pub struct Noise {
     /// Variance by band, in squares of the full scale.
     pub level: Vec<f64>,
-    /// What a squared line counts: facts a line over the variance.
+    /// What a squared line counts: one over the variance of a coordinate that a structural error may lie in.
     pub weight: Vec<f64>,
     /// Twice the tempered negative log-likelihood of the residual under it.
     pub misfit: f64,
@@ -135,17 +179,17 @@ impl Noise {
     /// Of a residual with these mean squares by band.
     pub fn of(bands: &[Band], powers: &[f64], floor: &Floor, criterion: &Criterion) -> Self {
         let facts: Vec<f64> = bands.iter().map(|band| criterion.facts(band)).collect();
-        let level = likeliest(bands, powers, &floor.0, &facts);
+        let level = likeliest(bands, powers, floor, &facts);
         let mut misfit = 0.0;
-        let weight = bands
-            .iter()
-            .zip(&level)
-            .zip(powers.iter().zip(&facts))
-            .map(|((band, level), (power, facts))| {
-                misfit += facts * (level.ln() + power / level - 1.0);
-                facts / (band.lines.len() as f64 * level)
-            })
-            .collect();
+        let mut weight = Vec::with_capacity(bands.len());
+        for (b, band) in bands.iter().enumerate() {
+            let (white, lines) = (floor.white[b], band.lines.len() as f64);
+            let gathered = lines / facts[b];
+            let structure = (level[b] - white).max(floor.levels[b] + floor.own[b]);
+            let variance = white + gathered * structure;
+            misfit += facts[b] * (variance.ln() + (white + gathered * (powers[b] - white)) / variance - 1.0);
+            weight.push(1.0 / variance);
+        }
         Self { level, weight, misfit }
     }
 }
@@ -175,16 +219,16 @@ mod tests {
     #[test]
     fn the_form_error_falls_with_the_square_of_frequency_above_the_signal_and_is_none_below() {
         let floor = Floor::of_signal(&bands(), &CRITERION);
-        assert!(floor.0[2] < 1e-12, "{:?}", floor.0);
-        assert!((floor.0[3] / 1e-4 - 1.0).abs() < 0.01);
-        assert!((floor.0[5] / floor.0[3] * 1.585_f64.powi(4) - 1.0).abs() < 0.01);
+        assert!(floor.levels()[2] < 1e-12, "{:?}", floor.levels());
+        assert!((floor.levels()[3] / 1e-4 - 1.0).abs() < 0.01);
+        assert!((floor.levels()[5] / floor.levels()[3] * 1.585_f64.powi(4) - 1.0).abs() < 0.01);
     }
 
     #[test]
     fn stamps_of_a_fast_log_are_doubted_by_no_more_than_a_row() {
         let level = |row_s: f64| {
             let bands: Vec<Band> = bands().into_iter().map(|b| Band { signal: 1.0, row_s, ..b }).collect();
-            Floor::of_signal(&bands, &Criterion { form_error: 0.0, ..CRITERION }).0[11]
+            Floor::of_signal(&bands, &Criterion { form_error: 0.0, ..CRITERION }).levels[11]
         };
         assert!((level(0.1) / level(0.01) - 1.0).abs() < 1e-9, "a slow log: what the criterion says");
         assert!(
@@ -211,7 +255,10 @@ mod tests {
         assert!(misfit(0.01 * share) < misfit(share), "less error never costs more");
         let away = vec![1e3; 12];
         let most = Floor::of_signal(&bands, &CRITERION).explaining(&bands, &away, &CRITERION);
-        assert!((most.0[5] - floor.0[5]).abs() < 1e-12, "no more than the signal is to be explained");
+        assert!(
+            (most.levels()[5] - floor.levels()[5]).abs() < 1e-12,
+            "no more than the signal is to be explained"
+        );
     }
 
     #[test]
@@ -259,6 +306,50 @@ mod tests {
             let after = Noise::of(&bands(), &less, &floor, &CRITERION).misfit;
             assert!(after <= before + 1e-9, "band {k}: {after} after {before}");
         }
+    }
+
+    #[test]
+    fn an_error_below_white_noise_shows_by_what_many_lines_tell() {
+        let mut wide = bands();
+        for (k, band) in wide.iter_mut().enumerate() {
+            (band.lines, band.alike) = (1000 * k..1000 * k + 1000, 1000);
+        }
+        let exact = Criterion { form_error: 0.0, timing_s: 0.0, ..CRITERION };
+        let plain = Floor::of_signal(&wide, &exact);
+        let noise = vec![1e-6; 12];
+        let white = plain.explaining(&wide, &noise, &exact);
+        let mut powers = noise.clone();
+        powers[8] = 1.5e-6;
+        let told = |floor: &Floor| {
+            let misfit = |powers: &[f64]| Noise::of(&wide, powers, floor, &exact).misfit;
+            misfit(&powers) - misfit(&noise)
+        };
+        let facts = exact.facts(&wide[8]);
+        assert!(
+            (told(&plain) / facts - 1.5_f64.ln()).abs() < 0.02,
+            "no noise known: as much as a structural error"
+        );
+        assert!(
+            (told(&white) / facts - (1.0 + 0.5 * 1000.0 / facts).ln()).abs() < 0.3,
+            "{}",
+            told(&white) / facts
+        );
+    }
+
+    #[test]
+    fn what_is_excused_at_a_frequency_is_no_noise_beside_it() {
+        let loud: Vec<Band> = bands().into_iter().map(|band| Band { signal: 1e-2, ..band }).collect();
+        let mut mismatch = vec![1e-9; 12];
+        mismatch[0] = 1e-2;
+        let exact = Criterion { form_error: 0.0, timing_s: 0.0, ..CRITERION };
+        let floor = Floor::of_signal(&loud, &exact).explaining(&loud, &mismatch, &exact);
+        let levels = |constant: f64| {
+            let mut powers = vec![1e-9; 12];
+            powers[0] = constant;
+            Noise::of(&loud, &powers, &floor, &exact).level
+        };
+        assert!(levels(1e-5)[1] < 1.1e-9, "within the share of the mismatch that its name may leave");
+        assert!(levels(1e-2)[1] > 1e-4, "beyond it: a walk");
     }
 
     #[test]

@@ -1,9 +1,9 @@
 //! The temper of the odds, fitted on some cases and tested on those left out.
 //!
 //! A diagnosis weighs sets of effects by `exp(-cost / (2 temper) - rarity)`. Costs assume that what is left is
-//! noise; it is structure too, and differs by more than the truth behind it. How much more is read off cases
-//! with a known answer: the temper under which the names that are right are given most, and those that are
-//! wrong least (logarithmic score, Good 1952, J. R. Stat. Soc. B 14:107).
+//! noise; it is structure too, and differs by more than the truth behind it, and the more so the more there is to
+//! explain. How much more is read off cases with a known answer: the temper under which the names that are right are
+//! given most, and those that are wrong least (logarithmic score, Good 1952, J. R. Stat. Soc. B 14:107).
 
 use std::collections::BTreeMap;
 
@@ -12,8 +12,31 @@ use serde_json::Value;
 
 use crate::score::stands_for;
 
-/// Tempers that are tried.
-pub const TEMPERS: [f64; 11] = [1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 11.0, 15.0, 20.0];
+/// How far costs count as odds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Temper {
+    /// Where little is explained.
+    pub least: f64,
+    /// What it grows to as a share of what the likeliest set costs less than the baseline.
+    pub form_share: f64,
+}
+
+impl Temper {
+    fn at(self, gain: f64) -> f64 {
+        self.least.hypot(self.form_share * gain.max(0.0))
+    }
+}
+
+/// Least tempers that are tried.
+pub const LEAST_TEMPERS: [f64; 7] = [1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 6.0];
+/// Shares that are tried.
+pub const FORM_SHARES: [f64; 6] = [0.0, 0.003, 0.006, 0.01, 0.02, 0.04];
+
+/// Every temper that is tried.
+pub fn tempers() -> impl Iterator<Item = Temper> {
+    LEAST_TEMPERS.into_iter().flat_map(|least| FORM_SHARES.map(|form_share| Temper { least, form_share }))
+}
+
 /// Least probability that counts, so that one miss does not decide alone.
 const LEAST: f64 = 1e-3;
 
@@ -64,7 +87,10 @@ impl Weighed {
     }
 
     /// Probability of every name under a temper, each set as far as one of so many effects is trusted.
-    pub fn names(&self, temper: f64, trust: Trust) -> BTreeMap<&str, f64> {
+    pub fn names(&self, temper: Temper, trust: Trust) -> BTreeMap<&str, f64> {
+        let least = self.sets.iter().map(|set| set.0).fold(f64::INFINITY, f64::min);
+        let baseline = self.sets.iter().find(|set| set.2.is_empty()).map_or(least, |set| set.0);
+        let temper = temper.at(baseline - least);
         let cost = |set: &(f64, f64, Vec<String>)| set.0 / (2.0 * temper) + set.1;
         let least = self.sets.iter().map(cost).fold(f64::INFINITY, f64::min);
         let weights: Vec<f64> = self.sets.iter().map(|set| (least - cost(set)).exp()).collect();
@@ -79,7 +105,7 @@ impl Weighed {
     }
 
     /// Logarithmic score, at most zero: of every name that any set holds, and of hidden ones that none does.
-    pub fn score(&self, temper: f64, trust: Trust) -> f64 {
+    pub fn score(&self, temper: Temper, trust: Trust) -> f64 {
         let names = self.names(temper, trust);
         let stated = |name: &str| names.get(name).copied().unwrap_or(0.0).min(1.0);
         let wrong = names.keys().filter(|name| self.standing.get(**name) == Some(&Standing::Wrong));
@@ -95,7 +121,7 @@ impl Weighed {
 }
 
 /// A temper's mean score over cases.
-pub fn mean_score(cases: &[&Weighed], temper: f64, trust: Trust) -> f64 {
+pub fn mean_score(cases: &[&Weighed], temper: Temper, trust: Trust) -> f64 {
     cases.iter().map(|case| case.score(temper, trust)).sum::<f64>() / cases.len().max(1) as f64
 }
 
@@ -103,9 +129,10 @@ pub fn mean_score(cases: &[&Weighed], temper: f64, trust: Trust) -> f64 {
 pub type Trust<'a> = &'a dyn Fn(usize) -> f64;
 
 /// The temper that scores best on some cases.
-pub fn best(cases: &[&Weighed], trust: Trust) -> f64 {
-    let score = |temper: &f64| mean_score(cases, *temper, trust);
-    TEMPERS.into_iter().max_by(|a, b| score(a).total_cmp(&score(b))).unwrap_or(TEMPERS[0])
+pub fn best(cases: &[&Weighed], trust: Trust) -> Temper {
+    let scored = tempers().map(|temper| (mean_score(cases, temper, trust), temper));
+    let first = Temper { least: LEAST_TEMPERS[0], form_share: FORM_SHARES[0] };
+    scored.max_by(|a, b| a.0.total_cmp(&b.0)).map_or(first, |best| best.1)
 }
 
 /// A fold left out: the temper fitted on the others, its score here, and the built-in one's.
@@ -116,7 +143,7 @@ pub struct LeftOut {
     /// Cases in it.
     pub cases: usize,
     /// Temper fitted on the other folds.
-    pub temper: f64,
+    pub temper: Temper,
     /// Its mean score on this fold.
     pub score: f64,
     /// Mean score here of the temper in use.
@@ -124,7 +151,7 @@ pub struct LeftOut {
 }
 
 /// Fits on all folds but one, and tests on that.
-pub fn cross_validate(cases: &[Weighed], in_use: f64, trust: Trust) -> Vec<LeftOut> {
+pub fn cross_validate(cases: &[Weighed], in_use: Temper, trust: Trust) -> Vec<LeftOut> {
     let folds: std::collections::BTreeSet<usize> = cases.iter().map(|case| case.fold).collect();
     folds
         .into_iter()
@@ -146,6 +173,10 @@ pub fn cross_validate(cases: &[Weighed], in_use: f64, trust: Trust) -> Vec<LeftO
 mod tests {
     use super::*;
 
+    const fn flat(least: f64) -> Temper {
+        Temper { least, form_share: 0.0 }
+    }
+
     /// Two sets: nothing, and one name that gains so much.
     fn case(fold: usize, gain: f64, right: bool) -> Weighed {
         let standing = if right { Standing::Hidden } else { Standing::Wrong };
@@ -159,8 +190,13 @@ mod tests {
 
     #[test]
     fn probabilities_follow_cost_and_rarity() {
-        let p = case(0, 10.0, true).names(1.0, &|_| 1.0)["a"];
+        let p = case(0, 10.0, true).names(flat(1.0), &|_| 1.0)["a"];
         assert!((p - 1.0 / (1.0 + (3.0_f64 - 5.0).exp())).abs() < 1e-12);
+        let half = case(0, 10.0, true).names(Temper { least: 0.0, form_share: 0.2 }, &|_| 1.0)["a"];
+        assert!(
+            (half - 1.0 / (1.0 + (3.0_f64 - 2.5).exp())).abs() < 1e-12,
+            "twice as far off where ten are gained"
+        );
     }
 
     #[test]
@@ -168,9 +204,10 @@ mod tests {
         let honest: Vec<Weighed> = (0..20).map(|k| case(k % 2, 30.0, true)).collect();
         let deceived: Vec<Weighed> = (0..20).map(|k| case(k % 2, 30.0, k % 4 < 2)).collect();
         let all = |cases: &[Weighed]| best(&cases.iter().collect::<Vec<_>>(), &|_| 0.99);
-        assert!(all(&honest) <= 2.0);
-        assert!(all(&deceived) >= 4.0);
-        let left_out = cross_validate(&deceived, 1.0, &|_| 0.99);
+        let at = |temper: Temper| temper.at(30.0);
+        assert!(at(all(&honest)) <= 2.0);
+        assert!(at(all(&deceived)) >= 4.0);
+        let left_out = cross_validate(&deceived, flat(1.0), &|_| 0.99);
         assert_eq!(left_out.iter().map(|l| l.cases).sum::<usize>(), 20);
         assert!(left_out.iter().all(|l| l.score > l.in_use), "{left_out:?}");
     }

@@ -17,8 +17,9 @@ use kort_identify::simulate::Problem;
 use kort_thruster::effects::Descriptor;
 use rayon::prelude::*;
 
-use crate::constants::{Constants, SearchConstants};
+use crate::constants::{Constants, PosteriorConstants, SearchConstants};
 use crate::flexible::{TERMS, is_term};
+use crate::posterior;
 use crate::probe::{Probe, probe, ways};
 use crate::screen::Screened;
 
@@ -55,7 +56,7 @@ pub struct Search<'a, 'p> {
     /// Least noise that a set is held to: of all sets under no name, lower ones under effects without a size.
     floors: BTreeMap<&'static str, Floor>,
     constants: SearchConstants,
-    temper: f64,
+    odds: PosteriorConstants,
 }
 
 impl<'a, 'p> Search<'a, 'p> {
@@ -73,7 +74,7 @@ impl<'a, 'p> Search<'a, 'p> {
             ways: Vec::new(),
             floors: BTreeMap::new(),
             constants: constants.search,
-            temper: constants.posterior.temper,
+            odds: constants.posterior,
         }
     }
 
@@ -109,7 +110,14 @@ impl<'a, 'p> Search<'a, 'p> {
     /// What one more member adds to a cost before any data. Costs are tempered as a whole where they become
     /// odds, so the logarithm of its prior odds counts that much more among them.
     pub fn price_of(&self, id: &str) -> f64 {
-        2.0 * self.temper * self.rarity_of(id) + self.choice_of(id)
+        2.0 * self.temper() * self.rarity_of(id) + self.choice_of(id)
+    }
+
+    /// How far costs count as odds, as far as is known by now.
+    pub fn temper(&self) -> f64 {
+        let baseline = self.fits.get(&Set::new()).map_or(f64::NAN, Fit::cost);
+        let least = self.fits.values().map(Fit::cost).fold(f64::INFINITY, f64::min);
+        posterior::temper(&self.odds, baseline - least)
     }
 
     /// An effect or term of any set.
@@ -190,7 +198,10 @@ impl<'a, 'p> Search<'a, 'p> {
         let mismatch = spectrum.powers(&fit.lines);
         let floor = self.problem.floor.explaining(&spectrum.bands, &mismatch, &self.problem.criterion);
         fit.floor = floor.clone();
-        self.fits.insert(set.clone(), self.problem.finish(fit));
+        // What white noise covered has its weight now.
+        let again = self.problem.settle(&fit.resume(), &fit.columns, &floor, ITERATIONS);
+        let fit = self.problem.finish(fit);
+        self.fits.insert(set.clone(), if again.cost() < fit.cost() { again } else { fit });
         self.floors.insert(under, floor);
     }
 
@@ -206,42 +217,48 @@ impl<'a, 'p> Search<'a, 'p> {
         let mut best = from;
         loop {
             progress(&format!("on top of {}", words(&best)));
-            let before = self.cost(&best);
+            // The temper grows while more is explained: priors are compared as they stand in the end.
+            let fitted = self.fits[&best].cost();
+            let helps = |search: &Self, next: &Set| search.cost(next) < fitted + search.prior(&best) - 1e-9;
             let mut next = best.clone();
             if best.len() < MOST_EFFECTS {
                 next = self.forward(&best);
             }
             if next != best {
-                next = self.swap(next, progress);
-                next = self.backward(next);
-                self.reshape(&next);
+                next = self.settled(next, progress);
             }
-            if self.cost(&next) >= before - 1e-9 {
+            if !helps(self, &next) {
                 // What stands near the end gets the same chance.
                 progress(&format!("other forms of what is near {}", words(&best)));
                 let near = self.near(&best);
                 near.iter().for_each(|set| self.reshape(set));
                 next = self.better(best.clone(), near);
-                if self.cost(&next) >= before - 1e-9 {
+                if !helps(self, &next) {
                     next = self.stand_in(&best);
                 }
-                if self.cost(&next) >= before - 1e-9 {
+                if !helps(self, &next) {
                     next = self.relatives(&best);
                 }
-                if self.cost(&next) >= before - 1e-9 && best.len() + 1 < MOST_EFFECTS {
+                if !helps(self, &next) && best.len() + 1 < MOST_EFFECTS {
                     next = self.two_at_once(&best);
                     if next != best {
-                        next = self.swap(next, progress);
-                        next = self.backward(next);
-                        self.reshape(&next);
+                        next = self.settled(next, progress);
                     }
                 }
-                if self.cost(&next) >= before - 1e-9 {
+                if !helps(self, &next) {
                     return best;
                 }
             }
             best = next;
         }
+    }
+
+    /// A set after exchanges and what can be left out, in its best form.
+    fn settled(&mut self, set: Set, progress: &(dyn Fn(&str) + Sync)) -> Set {
+        let set = self.swap(set, progress);
+        let set = self.backward(set);
+        self.reshape(&set);
+        set
     }
 
     /// The best set with one more effect, or the same.

@@ -1,5 +1,7 @@
 //! Steps of the search on a motor that rubs and whose speed is read late.
 
+use std::sync::Arc;
+
 use kort_identify::data::Series;
 use kort_identify::hypothesis::Member;
 use kort_identify::setup::Setup;
@@ -9,6 +11,8 @@ use kort_thruster::rig::Rig;
 
 use super::{ITERATIONS, Search, Set};
 use crate::constants::Constants;
+use crate::probe::Promise;
+use crate::screen;
 
 const RIG: &str = "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = { value = 5e-6, tol = 0.5 }\n\
                    torque_constant_nm_a = { value = 0.025, tol = 0.3 }\n[amplifier]\nkind = \"current\"\n";
@@ -68,6 +72,28 @@ fn two_that_pay_together_are_found_without_either_alone() {
         let members = search.problem.members(&fit.hypothesis, &fit.values);
         let friction = members.iter().find(|m| m.effect.id == "coulomb_friction").unwrap().values[0];
         assert!((friction / FRICTION_N_M - 1.0).abs() < 0.25, "{friction} N m");
+    });
+}
+
+#[test]
+fn what_does_nothing_where_a_line_promises_much_is_looked_at_where_it_was_probed() {
+    with_search(vec![&coulomb_friction::DESCRIPTOR], |search| {
+        let parent = Arc::new(search.fits[&Set::new()].clone());
+        let member = |friction_n_m: f64| {
+            let whole = Member::new(&coulomb_friction::DESCRIPTOR, &search.problem.scale);
+            let mut values = whole.values.clone();
+            values[0] = friction_n_m;
+            whole.at(values)
+        };
+        let looked = |scaled, probed, gain: f64| {
+            let promise =
+                Promise { cost: parent.cost() - gain, member: member(scaled), probed: member(probed) };
+            let found = screen::look(search.problem, &parent, &[], promise).unwrap();
+            found.hypothesis.effects[0].values[0]
+        };
+        let nothing = 1e-9 * FRICTION_N_M;
+        assert!((looked(nothing, FRICTION_N_M, 500.0) / FRICTION_N_M - 1.0).abs() < 1e-9);
+        assert!((looked(FRICTION_N_M, 2.0 * FRICTION_N_M, 10.0) / FRICTION_N_M - 1.0).abs() < 1e-9, "kept");
     });
 }
 

@@ -6,7 +6,7 @@ use kort_diagnose::constants::Constants;
 use kort_diagnose::posterior::trusted;
 use kort_proof::calibrate::{Fold, fold_of, records};
 use kort_proof::score::Scored;
-use kort_proof::temper::{TEMPERS, Weighed, best, cross_validate, mean_score};
+use kort_proof::temper::{FORM_SHARES, LEAST_TEMPERS, Temper, Weighed, best, cross_validate, mean_score};
 use kort_proof::trust::{self, Law, SURPRISES, Stated};
 use kort_truth::Answer;
 use serde_json::Value;
@@ -74,14 +74,21 @@ fn print_temper(results: &[(Scored, Answer, Value)], by: Fold, folds: usize) {
     let odds = Constants::built_in().posterior;
     let trust = |effects| trusted(effects, odds.surprise);
     let all: Vec<&Weighed> = cases.iter().collect();
-    eprintln!("temper  mean log score of the names in {} cases (0 is best)", all.len());
-    for temper in TEMPERS {
-        eprintln!("{temper:6}  {:.3}", mean_score(&all, temper, &trust));
+    eprintln!(
+        "mean log score of the names in {} cases (0 is best), by least temper and share of the gain",
+        all.len()
+    );
+    eprintln!("        {}", FORM_SHARES.map(|share| format!("{share:7}")).join("  "));
+    for least in LEAST_TEMPERS {
+        let of = |form_share| format!("{:7.3}", mean_score(&all, Temper { least, form_share }, &trust));
+        eprintln!("{least:6}  {}", FORM_SHARES.map(of).join("  "));
     }
-    eprintln!("best {}, in use {}", best(&all, &trust), odds.temper);
+    let words = |temper: Temper| format!("{} and {}", temper.least, temper.form_share);
+    let in_use = Temper { least: odds.temper, form_share: odds.form_share };
+    eprintln!("best {}, in use {}", words(best(&all, &trust)), words(in_use));
     eprintln!("fold  cases  fitted on the others  its score here  in use");
-    for left in cross_validate(&cases, odds.temper, &trust) {
-        let (fold, count, temper) = (left.fold, left.cases, left.temper);
+    for left in cross_validate(&cases, in_use, &trust) {
+        let (fold, count, temper) = (left.fold, left.cases, words(left.temper));
         eprintln!("{fold:4}  {count:5}  {temper:20}  {:14.3}  {:6.3}", left.score, left.in_use);
     }
 }
