@@ -142,7 +142,10 @@ fn a_dry_shaft_has_no_blades_to_blame() {
     let unsigned =
         Table::read(&rubbing).keep(&columns).map("shaft_speed_rad_s", amount).save("dry-unsigned.csv");
     let report = diagnose(&[&unsigned], dry_rig(), &[]);
-    assert_eq!(found(&report), ["unsigned_speed_sensor", "coulomb_friction"], "{}", report["summary"]);
+    // Beside so much that the lost sign explains, friction that differs by direction may stay a rival.
+    assert_eq!(found(&report)[..2], ["unsigned_speed_sensor", "coulomb_friction"], "{}", report["summary"]);
+    let likely = |finding: &serde_json::Value| finding["probability"].as_f64().unwrap();
+    assert!(report["findings"].as_array().unwrap()[2..].iter().all(|rival| likely(rival) < 0.3), "{report}");
 }
 
 #[test]
