@@ -39,7 +39,8 @@ impl Criterion {
 
 /// The likeliest levels that rise towards low frequency no faster than a random walk's, `1/f^2`; no lower than the floor.
 /// Over the walk's own course levels may only fall with falling frequency, which pooling neighbours that
-/// violate it solves exactly (Barlow et al. 1972, Statistical Inference under Order Restrictions, 1.2).
+/// violate it solves exactly (Barlow et al. 1972, Statistical Inference under Order Restrictions, 1.2). The floor is laid
+/// over the pools afterwards: beside a much louder band, less error in a quiet one lowers the pool and can cost more.
 fn likeliest(bands: &[Band], powers: &[f64], floor: &Floor, facts: &[f64]) -> Vec<f64> {
     struct Pool {
         bands: usize,

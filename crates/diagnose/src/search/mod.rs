@@ -47,7 +47,7 @@ pub struct Search<'a, 'p> {
     /// What a larger set cost when a smaller one was last fitted from where it ended.
     dropped: BTreeMap<(Set, Set), f64>,
     reshaped: BTreeSet<(Set, u64)>,
-    /// Sets from whose fit another was begun, with what they cost then.
+    /// Sets from whose fit another was begun, with what the fit cost then.
     exchanged: BTreeSet<(Set, Set, u64)>,
     /// What each effect does to the model, and to other equations in its place: by members without a size.
     probes: BTreeMap<Set, Vec<Vec<Probe>>>,
