@@ -157,8 +157,7 @@ impl Bridge {
             self.keep_open(deployment);
         }
         let Some(mut ports) = self.ports.take() else {
-            self.answer_overdue(now);
-            return;
+            return self.refuse(now);
         };
         self.receive(&ports, recorder, now);
         if std::mem::take(&mut self.unanswered)
@@ -355,12 +354,13 @@ impl Bridge {
         Ok(())
     }
 
+    /// Without ports nobody can be asked. Where they are merely in use, a request that comes meanwhile waits for them.
+    fn refuse(&mut self, now: Instant) {
+        self.link.asks.try_iter().for_each(|ask| drop(ask.answer.send(Vec::new())));
+        self.answer_overdue(now);
+    }
+
     fn answer_overdue(&mut self, now: Instant) {
-        if self.ports.is_none() {
-            while let Ok(ask) = self.link.asks.try_recv() {
-                let _ = ask.answer.send(Vec::new());
-            }
-        }
         let (over, waiting) =
             std::mem::take(&mut self.pending).into_iter().partition(|pending| pending.overdue(now));
         self.pending = waiting;
