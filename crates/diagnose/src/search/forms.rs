@@ -2,6 +2,7 @@
 
 use kort_identify::fit::{Columns, Fit};
 use kort_identify::hypothesis::{Hypothesis, Member};
+use kort_thruster::effects::Scale;
 use rayon::prelude::*;
 
 use super::{FIRST_STEPS, ITERATIONS, Search, Set};
@@ -24,7 +25,7 @@ impl Search<'_, '_> {
     /// and shapes that the data do not speak of are better left at their prior means. The cheapest is kept.
     pub(super) fn reshape(&mut self, set: &Set) {
         while let Some(from) = self.fits.get(set) {
-            let before = from.cost();
+            let before = self.cost_of(from);
             if !self.reshaped.insert((set.clone(), before.to_bits())) {
                 return;
             }
@@ -43,11 +44,13 @@ impl Search<'_, '_> {
                     let fit = self.problem.fit(&form.hypothesis, &form.columns, &from.floor, FIRST_STEPS);
                     self.problem.finish(fit)
                 })
-                .min_by(|a, b| a.cost().total_cmp(&b.cost()));
-            let Some(best) = best.filter(|fit| fit.cost() < before + self.constants.rivals) else { return };
+                .min_by(|a, b| self.cost_of(a).total_cmp(&self.cost_of(b)));
+            let Some(best) = best.filter(|fit| self.cost_of(fit) < before + self.constants.rivals) else {
+                return;
+            };
             let fit = self.problem.settle(&best.resume(), &best.columns, &best.floor, ITERATIONS);
             self.keep(set.clone(), fit);
-            if self.fits[set].cost() > before - ENOUGH {
+            if self.cost_of(&self.fits[set]) > before - ENOUGH {
                 return;
             }
         }
@@ -88,11 +91,68 @@ impl Search<'_, '_> {
                         (false, false) => 0.0,
                     };
                 }
-                let mut all = members.clone();
-                all[k] = other;
-                others.push(all);
+                for chosen in self.chosen(other, member) {
+                    let mut all = members.clone();
+                    all[k] = chosen;
+                    others.push(all);
+                }
             }
         }
         others
     }
+
+    /// A member in another form than before; where the form adds an order of the shaft's angle, at each usual one that is
+    /// not at work already.
+    fn chosen(&self, member: Member, before: &Member) -> Vec<Member> {
+        let at_work = orders(before, &self.problem.scale);
+        let added = orders(&member, &self.problem.scale).into_iter().find(|place| !at_work.contains(place));
+        let Some(place) = added else { return vec![member] };
+        let taken: Vec<f64> = at_work.iter().map(|place| before.values[*place]).collect();
+        let at = |order| {
+            let mut values = member.values.clone();
+            values[place] = order;
+            member.clone().at(values)
+        };
+        self.usual_orders(&member).into_iter().filter(|order| !taken.contains(order)).map(at).collect()
+    }
+
+    /// The orders of the shaft's angle that a member's starts have first.
+    fn usual_orders(&self, member: &Member) -> Vec<f64> {
+        let Some(place) = places(member, &self.problem.scale).first().copied() else { return Vec::new() };
+        let mut usual: Vec<f64> =
+            member.starts(&self.problem.scale).iter().map(|start| start[place]).collect();
+        usual.sort_by(f64::total_cmp);
+        usual.dedup();
+        usual
+    }
+
+    /// A fit's cost with what the choice of each order of the shaft's angle beyond the first costs; the first is in
+    /// [`Search::price_of`].
+    pub(super) fn cost_of(&self, fit: &Fit) -> f64 {
+        let choices = |member: &Member| {
+            let further = orders(member, &self.problem.scale).len().saturating_sub(1);
+            if further == 0 {
+                0.0
+            } else {
+                further as f64 * 2.0 * (self.usual_orders(member).len() as f64).ln()
+            }
+        };
+        fit.cost() + fit.hypothesis.effects.iter().map(choices).sum::<f64>()
+    }
+}
+
+/// Places of the orders of the shaft's angle of an effect that may act at several.
+fn places(member: &Member, scale: &Scale) -> Vec<usize> {
+    let specs = (member.effect.parameters)(scale);
+    let all: Vec<usize> = (0..specs.len()).filter(|j| specs[*j].held && specs[*j].shape).collect();
+    if all.len() > 1 { all } else { Vec::new() }
+}
+
+/// Those of them at which a free size acts: an order is listed before its sizes.
+fn orders(member: &Member, scale: &Scale) -> Vec<usize> {
+    let mut all = places(member, scale);
+    let ends: Vec<usize> = all.iter().skip(1).copied().chain([member.values.len()]).collect();
+    let mut ends = ends.into_iter();
+    all.retain(|place| ends.next().is_some_and(|end| (place + 1..end).any(|j| !member.held.contains(&j))));
+    all
 }

@@ -80,7 +80,7 @@ impl<'a, 'p> Search<'a, 'p> {
 
     /// Cost of a set: of its fit, and of the prior odds of each effect.
     pub fn cost(&self, set: &Set) -> f64 {
-        self.fits.get(set).map_or(f64::INFINITY, |fit| fit.cost() + self.prior(set))
+        self.fits.get(set).map_or(f64::INFINITY, |fit| self.cost_of(fit) + self.prior(set))
     }
 
     fn prior(&self, set: &Set) -> f64 {
@@ -218,7 +218,7 @@ impl<'a, 'p> Search<'a, 'p> {
         loop {
             progress(&format!("on top of {}", words(&best)));
             // The temper grows while more is explained: priors are compared as they stand in the end.
-            let fitted = self.fits[&best].cost();
+            let fitted = self.cost_of(&self.fits[&best]);
             let helps = |search: &Self, next: &Set| search.cost(next) < fitted + search.prior(&best) - 1e-9;
             let mut next = best.clone();
             if best.len() < MOST_EFFECTS {
@@ -361,12 +361,12 @@ impl<'a, 'p> Search<'a, 'p> {
     }
 
     fn keep(&mut self, set: Set, fit: Fit) {
-        let known = self.fits.get(&set).map(Fit::cost);
-        if fit.broke_down() || known.is_some_and(|known| known <= fit.cost()) {
+        let (known, cost) = (self.fits.get(&set).map(|known| self.cost_of(known)), self.cost_of(&fit));
+        if fit.broke_down() || known.is_some_and(|known| known <= cost) {
             return;
         }
         // What was seen from a worse place, with the command's steps elsewhere, is looked at again.
-        if known.is_some_and(|known| known > fit.cost() + self.constants.rivals) {
+        if known.is_some_and(|known| known > cost + self.constants.rivals) {
             self.screens.remove(&set);
         }
         self.fits.insert(set, fit);

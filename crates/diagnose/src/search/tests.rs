@@ -5,7 +5,9 @@ use std::sync::Arc;
 use kort_identify::data::Series;
 use kort_identify::hypothesis::Member;
 use kort_identify::setup::Setup;
-use kort_thruster::effects::{Descriptor, coulomb_friction, encoder_filter_lag, position_dependent_friction};
+use kort_thruster::effects::{
+    Descriptor, coulomb_friction, encoder_filter_lag, position_dependent_friction, torque_ripple_cogging,
+};
 use kort_thruster::models::ModelName;
 use kort_thruster::rig::Rig;
 
@@ -20,8 +22,8 @@ const RIG: &str = "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = { valu
 const FRICTION_N_M: f64 = 0.0025;
 const LAG_S: f64 = 0.03;
 
-/// Twenty seconds of a motor under measured current, logged at 200 Hz.
-fn recording() -> Series {
+/// Twenty seconds of a motor under measured current, logged at 200 Hz, whose magnets turn it so far by its angle.
+fn recording(cogging_n_m: impl Fn(f64) -> f64) -> Series {
     let (inertia, kt, dt) = (5e-6, 0.025, 2.5e-4);
     let levels = [0.3, -0.35, 0.2, -0.3, 0.4, -0.25, 0.35, -0.4, 0.25, -0.2];
     let (mut speed, mut angle, mut shown) = (0.0_f64, 0.0, 0.0);
@@ -35,7 +37,7 @@ fn recording() -> Series {
             [current, angle, shown + noise].iter().zip(&mut columns).for_each(|(v, c)| c.push(*v));
             time_s.push(t);
         }
-        speed += kt * current / inertia * dt;
+        speed += (kt * current + cogging_n_m(angle)) / inertia * dt;
         speed = speed.signum() * (speed.abs() - FRICTION_N_M / inertia * dt).max(0.0);
         angle += speed * dt;
         shown += (speed - shown) / LAG_S * dt;
@@ -50,10 +52,14 @@ fn recording() -> Series {
 
 /// A search with its baseline fitted.
 fn with_search(effects: Vec<&'static Descriptor>, then: impl FnOnce(&mut Search)) {
+    with_search_of(recording(|_| 0.0), effects, then);
+}
+
+fn with_search_of(series: Series, effects: Vec<&'static Descriptor>, then: impl FnOnce(&mut Search)) {
     let rig = Rig::from_toml(RIG).unwrap();
     let constants = Constants::built_in();
     let Setup { problem, baseline, .. } =
-        Setup::new(&[recording()], &rig, ModelName::Model2, constants.criterion).unwrap();
+        Setup::new(&[series], &rig, ModelName::Model2, constants.criterion).unwrap();
     let mut search = Search::new(&problem, effects, &constants);
     search.fits.insert(Set::new(), problem.settle_from_stated(&baseline, ITERATIONS));
     then(&mut search);
@@ -72,6 +78,39 @@ fn two_that_pay_together_are_found_without_either_alone() {
         let members = search.problem.members(&fit.hypothesis, &fit.values);
         let friction = members.iter().find(|m| m.effect.id == "coulomb_friction").unwrap().values[0];
         assert!((friction / FRICTION_N_M - 1.0).abs() < 0.25, "{friction} N m");
+    });
+}
+
+#[test]
+fn orders_of_cogging_that_are_not_the_usual_ones_are_found_one_after_the_other() {
+    let orders = [3.0, 5.0, 9.0];
+    let cogging_n_m = move |angle: f64| orders.iter().map(|k| 4e-4 * (k * angle + k).sin()).sum();
+    let effects: Vec<&'static Descriptor> = vec![
+        &coulomb_friction::DESCRIPTOR,
+        &encoder_filter_lag::DESCRIPTOR,
+        &torque_ripple_cogging::DESCRIPTOR,
+    ];
+    with_search_of(recording(cogging_n_m), effects.clone(), |search| {
+        let mut set = Set::new();
+        for effect in effects {
+            let from = search.fits[&set].clone();
+            let member = Member::new(effect, &search.problem.scale);
+            let hypothesis = from.hypothesis.with(&from.values, member, &search.problem.scale);
+            set = super::with(&set, effect.id);
+            search.fit_set(set.clone(), &hypothesis, &Vec::new());
+        }
+        search.reshape(&set);
+        let fit = &search.fits[&set];
+        let members = search.problem.members(&fit.hypothesis, &fit.values);
+        let cogging = members.iter().find(|m| m.effect.id == "torque_ripple_cogging").unwrap();
+        let mut found: Vec<f64> =
+            cogging.values.chunks(5).filter(|order| order[1].hypot(order[2]) > 1e-4).map(|o| o[0]).collect();
+        found.sort_by(f64::total_cmp);
+        assert_eq!(found, orders, "{:?}", cogging.values);
+        assert!(
+            search.cost_of(fit) > fit.cost() + 2.0 * 2.0 * 20.0_f64.ln(),
+            "two choices among the usual orders"
+        );
     });
 }
 

@@ -84,7 +84,7 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
 /// turns through a whole wave nothing tells that it comes again: a weight or a spring does the same.
 fn starts(scale: &Scale) -> Vec<Vec<f64>> {
     let (torque, per_a) = (0.02 * scale.torque_n_m, 0.02 * scale.torque_n_m / scale.current_a);
-    [1, 2, 3, 4, 6, 7, 8, 10, 12, 14, 18, 21, 24, 30, 36, 42, 48, 60, 72, 84]
+    [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 14, 18, 21, 24, 30, 36, 42, 48, 60, 72, 84]
         .iter()
         .filter(|order| f64::from(**order) * scale.turned_rad >= std::f64::consts::TAU)
         .map(|order| {
