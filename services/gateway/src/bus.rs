@@ -356,7 +356,7 @@ impl Bridge {
 
     /// Without ports nobody can be asked. Where they are merely in use, a request that comes meanwhile waits for them.
     fn refuse(&mut self, now: Instant) {
-        self.link.asks.try_iter().for_each(|ask| drop(ask.answer.send(Vec::new())));
+        self.link.asks.try_iter().for_each(drop);
         self.answer_overdue(now);
     }
 

@@ -42,7 +42,7 @@ pub struct Ask {
     pub expects: Vec<Process>,
     /// And within which time.
     pub within: Duration,
-    /// Where the answers go; fewer than expected if time ran out.
+    /// Where the answers go; fewer than expected if time ran out, and dropped if nobody can be asked.
     pub answer: oneshot::Sender<Vec<Reply>>,
 }
 
@@ -317,12 +317,15 @@ impl Thruster {
     ) -> Result<(), Problem> {
         let (answer, answers) = oneshot::channel();
         let ask = Ask { request, expects: expects.to_vec(), within, answer };
-        let replies = match self.asks.try_send(ask) {
-            Ok(()) => {
-                self.bell.ring();
-                answers.await.unwrap_or_default()
-            }
-            Err(_) => Vec::new(),
+        if self.asks.try_send(ask).is_err() {
+            let detail =
+                "as many requests as this thruster takes at once wait already; this one was not sent";
+            return Err(Problem::new(Kind::Overloaded, detail).hint("ask again in a second"));
+        }
+        self.bell.ring();
+        let Ok(replies) = answers.await else {
+            let detail = "there is no way to servo and controller: their shared memory is not open";
+            return Err(Problem::new(Kind::NotReady, detail).hint("`kort up` opens it; its log says why not"));
         };
         if let Some(reply) = replies.iter().find(|reply| reply.outcome != Outcome::Done as u32) {
             let kind = if reply.outcome == Outcome::Invalid as u32 { Kind::InvalidField } else { refused };
