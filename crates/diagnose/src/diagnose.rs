@@ -75,8 +75,8 @@ pub fn diagnose(
     }
     progress("looking for what has no name");
     unknown::look(&mut search, &best, rig, &offered, progress);
-    let temper = search.temper();
-    let explanations = posterior(search.costs_at(temper), temper, constants.posterior.surprise);
+    let costs: Vec<(Set, f64)> = search.fits.keys().map(|set| (set.clone(), search.cost(set))).collect();
+    let explanations = posterior(costs, search.temper(), constants.posterior.surprise);
     progress("scoring on held-out data");
     let evidence = search.fits.iter().map(|(set, fit)| Evidence {
         effects: set.clone(),

@@ -78,16 +78,9 @@ impl<'a, 'p> Search<'a, 'p> {
         }
     }
 
-    /// Cost of a set as the search compares it: of its fit, and of the prior odds of each effect.
+    /// Cost of a set: of its fit, and of the prior odds of each effect.
     pub fn cost(&self, set: &Set) -> f64 {
         self.fits.get(set).map_or(f64::INFINITY, |fit| self.cost_of(fit) + self.prior(set))
-    }
-
-    /// Every set fitted with what it costs where costs count as odds so far: there the logarithm of the prior odds counts
-    /// that much more.
-    pub fn costs_at(&self, temper: f64) -> Vec<(Set, f64)> {
-        let more = |set: &Set| 2.0 * (temper - self.odds.temper) * self.rarity(set);
-        self.fits.keys().map(|set| (set.clone(), self.cost(set) + more(set))).collect()
     }
 
     fn prior(&self, set: &Set) -> f64 {
@@ -115,13 +108,12 @@ impl<'a, 'p> Search<'a, 'p> {
     }
 
     /// What one more member adds to a cost before any data. Costs are tempered as a whole where they become
-    /// odds, so the logarithm of its prior odds counts that much more among them: here by the least temper, so that what
-    /// may be believed in the end is tried.
+    /// odds, so the logarithm of its prior odds counts that much more among them.
     pub fn price_of(&self, id: &str) -> f64 {
-        2.0 * self.odds.temper * self.rarity_of(id) + self.choice_of(id)
+        2.0 * self.temper() * self.rarity_of(id) + self.choice_of(id)
     }
 
-    /// How far costs count as odds in the end.
+    /// How far costs count as odds, as far as is known by now.
     pub fn temper(&self) -> f64 {
         let baseline = self.fits.get(&Set::new()).map_or(f64::NAN, Fit::cost);
         let least = self.fits.values().map(Fit::cost).fold(f64::INFINITY, f64::min);
@@ -225,8 +217,9 @@ impl<'a, 'p> Search<'a, 'p> {
         let mut best = from;
         loop {
             progress(&format!("on top of {}", words(&best)));
-            let before = self.cost(&best);
-            let helps = |search: &Self, next: &Set| search.cost(next) < before - 1e-9;
+            // The temper grows while more is explained: priors are compared as they stand in the end.
+            let fitted = self.cost_of(&self.fits[&best]);
+            let helps = |search: &Self, next: &Set| search.cost(next) < fitted + search.prior(&best) - 1e-9;
             let mut next = best.clone();
             if best.len() < MOST_EFFECTS {
                 next = self.forward(&best);

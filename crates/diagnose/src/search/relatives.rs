@@ -42,7 +42,7 @@ impl Search<'_, '_> {
                         self.keep(place.clone(), fit);
                     }
                 }
-                // Not twice from the same fit.
+                // The fit's own cost: priors grow with the temper, and the same exchange would be begun again.
                 let begun_from = self.fits.get(set).map_or(f64::INFINITY, Fit::cost).to_bits();
                 if self.exchanged.insert((set.clone(), place.clone(), begun_from))
                     && let Some(fit) = self.exchange(set, member, effect, &floor)
