@@ -58,6 +58,13 @@ limits = {{ full_drive_s = 0.005 }}
         Self { folder, port }
     }
 
+    /// The controller, and the gateway's bus with it, at the rate of a deployment.
+    pub fn with_a_fast_controller(self) -> Self {
+        let config = std::fs::read_to_string(self.config()).unwrap();
+        std::fs::write(self.config(), config.replace("rate_hz = 10,", "rate_hz = 250,")).unwrap();
+        self
+    }
+
     /// A second thruster beside the first, of another kind: t2, a T200.
     pub fn with_t2(self) -> Self {
         let rig = concat!(env!("CARGO_MANIFEST_DIR"), "/config/thrusters/t200.toml");

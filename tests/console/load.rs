@@ -29,12 +29,7 @@ const WATCH: &str = r"(() => {
 fn eight_signals_at_50_hz_with_ten_minutes_in_view() {
     let seconds = std::env::var("KORT_CONSOLE_S").ok().and_then(|s| s.parse().ok()).unwrap_or(10.0f64);
     common::in_real_time(|| {
-        let site = Site::new();
-        // As a deployment has it: the gateway hears of servo and controller at the controller's rate.
-        let config =
-            std::fs::read_to_string(site.config()).unwrap().replace("rate_hz = 10,", "rate_hz = 250,");
-        std::fs::write(site.config(), config).unwrap();
-        let stack = Stack::start_at(site);
+        let stack = Stack::start_at(Site::new().with_a_fast_controller());
         let Some(mut page) = Browser::open(&format!("http://127.0.0.1:{}/", stack.site.port)) else { return };
         page.until("document.readyState === 'complete' && typeof state !== 'undefined' && state !== null");
         page.eval("lease_ttl_ms = 60000; $('span').value = '600'");

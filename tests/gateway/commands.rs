@@ -110,16 +110,11 @@ fn a_control_law_is_switched_under_way_and_its_parameters_are_set() {
     });
 }
 
-/// However soon after the disarming: the controller's answer comes behind the command that asks for nothing.
 /// Arming asks controller and servo in turn, so the second request comes while the bus is at its tick.
 #[test]
 fn a_request_that_comes_while_the_bus_is_at_work_is_asked_all_the_same() {
     common::in_real_time(|| {
-        let site = Site::new();
-        let config =
-            std::fs::read_to_string(site.config()).unwrap().replace("rate_hz = 10,", "rate_hz = 250,");
-        std::fs::write(site.config(), config).unwrap();
-        let stack = Stack::start_at(site);
+        let stack = Stack::start_at(Site::new().with_a_fast_controller());
         for _ in 0..1000 {
             stack.expect("POST", "/arm", None);
             stack.expect("POST", "/disarm", None);
@@ -127,6 +122,7 @@ fn a_request_that_comes_while_the_bus_is_at_work_is_asked_all_the_same() {
     });
 }
 
+/// However soon after the disarming: the controller's answer comes behind the command that asks for nothing.
 #[test]
 fn arming_right_after_disarming_is_not_refused() {
     common::in_real_time(|| {

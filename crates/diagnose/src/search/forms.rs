@@ -131,11 +131,7 @@ impl Search<'_, '_> {
     pub(super) fn cost_of(&self, fit: &Fit) -> f64 {
         let choices = |member: &Member| {
             let further = orders(member, &self.problem.scale).len().saturating_sub(1);
-            if further == 0 {
-                0.0
-            } else {
-                further as f64 * 2.0 * (self.usual_orders(member).len() as f64).ln()
-            }
+            2.0 * further as f64 * (self.usual_orders(member).len().max(1) as f64).ln()
         };
         fit.cost() + fit.hypothesis.effects.iter().map(choices).sum::<f64>()
     }
@@ -150,9 +146,8 @@ fn places(member: &Member, scale: &Scale) -> Vec<usize> {
 
 /// Those of them at which a free size acts: an order is listed before its sizes.
 fn orders(member: &Member, scale: &Scale) -> Vec<usize> {
-    let mut all = places(member, scale);
-    let ends: Vec<usize> = all.iter().skip(1).copied().chain([member.values.len()]).collect();
-    let mut ends = ends.into_iter();
-    all.retain(|place| ends.next().is_some_and(|end| (place + 1..end).any(|j| !member.held.contains(&j))));
-    all
+    let all = places(member, scale);
+    let ends = all.iter().skip(1).copied().chain([member.values.len()]);
+    let acts = |(place, end): &(usize, usize)| (place + 1..*end).any(|j| !member.held.contains(&j));
+    all.iter().copied().zip(ends).filter(acts).map(|(place, _)| place).collect()
 }
