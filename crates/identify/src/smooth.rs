@@ -42,7 +42,7 @@ impl Prepared {
             course.push([truth.shaft_speed_rad_s, truth.axial_m_s, truth.current_a]);
             decay.push(plant.fastest_decay_1_s() * self.tick_s);
         }
-        let smooth = smooth(&course, self.ticks_per_row + 2);
+        let smooth = smooth(&course, &self.may_jump(), self.ticks_per_row + 2);
         for ((tick, smooth), decay) in self.stimulus.ticks.iter_mut().zip(&smooth).zip(&decay) {
             tick.course = course_of(*smooth, *decay);
         }
@@ -64,6 +64,17 @@ impl Prepared {
                 at += count;
             }
         }
+    }
+
+    /// Ticks in which a step of the command may yet be placed: all those of the rows' interval that it fell into, however
+    /// long a gap that is.
+    fn may_jump(&self) -> Vec<bool> {
+        let mut all = vec![false; self.stimulus.ticks.len()];
+        for row in self.edges.iter().filter(|row| !self.after_pause(**row)) {
+            let (from, to) = (self.stimulus.logs[row - 1].0, self.stimulus.logs[*row].0);
+            all[from.min(to)..to].fill(true);
+        }
+        all
     }
 
     /// Ticks at whose beginning somebody looks at the plant, in order: at which a row lies or in which it does, at which a
@@ -110,12 +121,11 @@ fn passes(
 }
 
 /// Which ticks of a course (shaft speed, axial flow, current at every tick's start and the last one's end)
-/// are smooth, with nothing but smooth ticks within `reach` before and after: the command's jumps may yet
-/// be moved within a log interval.
-fn smooth(course: &[[f64; 3]], reach: usize) -> Vec<bool> {
+/// are smooth, with nothing but smooth ticks, and none in which the command may jump, within `reach` before and after.
+fn smooth(course: &[[f64; 3]], may_jump: &[bool], reach: usize) -> Vec<bool> {
     let ticks = course.len().saturating_sub(1);
     let tops = tops(course);
-    let calm: Vec<bool> = (0..ticks).map(|n| n >= 2 && is_smooth(course, n, tops)).collect();
+    let calm: Vec<bool> = (0..ticks).map(|n| n >= 2 && !may_jump[n] && is_smooth(course, n, tops)).collect();
     (0..ticks).map(|n| (n.saturating_sub(reach)..(n + reach + 1).min(ticks)).all(|m| calm[m])).collect()
 }
 
@@ -210,7 +220,7 @@ mod tests {
                 [50.0 * (1.0 - (-since / 20.0).exp()), 0.0, if n > 50 { 6.0 } else { 0.0 }]
             })
             .collect();
-        let smooth = smooth(&course, 7);
+        let smooth = smooth(&course, &vec![false; 399], 7);
         assert_eq!(smooth.len(), 399);
         assert!(smooth[20..40].iter().all(|s| *s), "at rest");
         assert!(smooth[44..58].iter().all(|s| !s), "about the jump");

@@ -3,9 +3,11 @@
 
 mod common;
 
+use std::sync::Arc;
+
 use common::{CRITERION, RIG, recording};
 use kort_identify::data::available;
-use kort_identify::hypothesis::{Hypothesis, Member};
+use kort_identify::hypothesis::{Hypothesis, Inputs, Member};
 use kort_identify::setup::Setup;
 use kort_identify::simulate::Problem;
 use kort_thruster::effects;
@@ -50,4 +52,27 @@ fn every_effect_responds_as_in_single_ticks() {
         }
     }
     assert!(compared > 60, "{compared} starts of effects");
+}
+
+/// A step of the command fell into a gap of the log, in which the shaft had settled: wherever in the gap it is tried.
+#[test]
+fn a_step_moved_through_a_gap_acts_as_in_single_ticks() {
+    let rig = Rig::from_toml(RIG).unwrap();
+    let mut series = recording(&rig, &[], &LEVELS, [0.0; 2]);
+    let kept: Vec<usize> =
+        (0..series.time_s.len()).filter(|row| !(3.81..4.03).contains(&series.time_s[*row])).collect();
+    let keep = |all: &mut Vec<f64>| *all = kept.iter().map(|row| all[*row]).collect();
+    keep(&mut series.time_s);
+    series.columns.iter_mut().for_each(|(_, column)| keep(column));
+    let Setup { problem, baseline, .. } = Setup::new(&[series], &rig, ModelName::Model2, CRITERION).unwrap();
+    let mut single = problem.clone();
+    single.recordings[0].strides.fill(1);
+    let after_gap = problem.recordings[0].edges.iter().position(|row| kept[*row] == 403).unwrap();
+    for ticks in (0..110).step_by(10) {
+        let mut edges = baseline.inputs.edges.clone();
+        edges[0][after_gap] = ticks;
+        let inputs = Arc::new(Inputs::new(&problem.recordings, edges));
+        let apart = apart(&problem, &single, &Hypothesis { inputs, ..baseline.clone() });
+        assert!(apart < 2e-3, "{ticks} ticks before its row: {apart}");
+    }
 }
