@@ -3,6 +3,8 @@
 
 #[path = "logs/bags.rs"]
 mod bags;
+#[path = "logs/clocks.rs"]
+mod clocks;
 #[path = "common/lab.rs"]
 mod lab;
 #[path = "logs/writers.rs"]

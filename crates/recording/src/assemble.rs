@@ -1,7 +1,10 @@
 //! From rows of a file to a recording: names, units, time, maps. The same for every format.
 
+use std::cmp::Reverse;
+
 use crate::columns::{self, nearest};
 use crate::error::{Place, Problem};
+use crate::log::{Back, longest_is_read};
 use crate::map::{ColumnMap, Mapped, Time};
 use crate::recording::{Column, Recording};
 
@@ -22,6 +25,9 @@ pub(crate) const CLOCK: &str = "the log's clock";
 /// A point of a settled table shows its measured values this far into its hold.
 const SETTLED_AT: f64 = 0.95;
 
+/// Stamps beyond this, s, count from 1970: three years, as long as no board and no test runs.
+const SINCE_1970_S: f64 = 1e8;
+
 /// Takes rows one by one.
 pub(crate) struct Assembler<'m> {
     source: Vec<String>,
@@ -31,6 +37,8 @@ pub(crate) struct Assembler<'m> {
     recording: Recording,
     last_time: Option<f64>,
     stale_rows: u64,
+    /// Where each stretch between resets of the clock begins.
+    stretches: Vec<usize>,
     rows: usize,
     row: Vec<f64>,
 }
@@ -65,6 +73,7 @@ impl<'m> Assembler<'m> {
             recording,
             last_time: None,
             stale_rows: 0,
+            stretches: vec![0],
             rows: 0,
         })
     }
@@ -91,16 +100,24 @@ impl<'m> Assembler<'m> {
                 if raw.is_nan() {
                     return Err(Problem::TimeEmpty { place, column: self.source[*index].clone() });
                 }
+                let time_s = raw * to_s;
                 if let Some(before) = self.last_time.filter(|before| raw <= *before) {
-                    if *drop_stale {
-                        self.stale_rows += 1;
-                        return Ok(());
+                    if !drop_stale {
+                        let column = self.source[*index].clone();
+                        return Err(Problem::TimeNotIncreasing { place, column, before, value: raw });
                     }
-                    let column = self.source[*index].clone();
-                    return Err(Problem::TimeNotIncreasing { place, column, before, value: raw });
+                    let stretch = &self.recording.time_s[self.stretches.last().copied().unwrap_or(0)..];
+                    match Back::of(time_s, stretch) {
+                        Back::Late => {
+                            self.stale_rows += 1;
+                            return Ok(());
+                        }
+                        Back::NewestDamaged => self.drop_newest(),
+                        Back::Anew => self.stretches.push(self.recording.rows()),
+                    }
                 }
                 self.last_time = Some(raw);
-                raw * to_s
+                time_s
             }
         };
         self.row.clear();
@@ -131,6 +148,36 @@ impl<'m> Assembler<'m> {
         for ((column, take), value) in self.recording.columns.iter_mut().zip(&self.takes).zip(&self.row) {
             column.values.push(if measured || take.command { *value } else { f64::NAN });
         }
+    }
+
+    fn drop_newest(&mut self) {
+        self.recording.time_s.pop();
+        for column in &mut self.recording.columns {
+            column.values.pop();
+        }
+        self.rows -= 1;
+        self.stale_rows += 1;
+    }
+
+    /// Keeps the stretch between resets of the clock with the most rows, the first of several; what that costs.
+    fn keep_longest(&mut self) -> Option<String> {
+        let resets = self.stretches.len() - 1;
+        if resets == 0 {
+            return None;
+        }
+        let rows = self.recording.rows();
+        let ends = self.stretches.iter().skip(1).copied().chain([rows]);
+        let stretches = self.stretches.iter().zip(ends).map(|(from, to)| *from..to);
+        let longest = stretches.min_by_key(|stretch| Reverse(stretch.len()))?;
+        let left_out = format!("{} row(s)", rows - longest.len());
+        let lost = longest_is_read(resets, self.recording.time_s.get(longest.clone())?, &left_out);
+        let columns = self.recording.columns.iter_mut().map(|column| &mut column.values);
+        for values in columns.chain([&mut self.recording.time_s]) {
+            values.truncate(longest.end);
+            values.drain(..longest.start);
+        }
+        self.rows = longest.len();
+        lost
     }
 
     fn number(&self, place: Place, index: usize, cell: Cell<'_>) -> Result<f64, Problem> {
@@ -167,16 +214,19 @@ impl<'m> Assembler<'m> {
             let column = self.source[index].clone();
             return Err(Problem::NothingSelected { column, wanted: wanted.into(), found: list(&seen) });
         }
+        let resets = self.keep_longest();
         if self.rows < 2 {
             return Err(Problem::TooFewRows { found: self.rows });
         }
         let mut recording = self.recording;
         recording.losses = losses;
+        recording.losses.extend(resets);
         if self.stale_rows > 0 {
             let rows = self.stale_rows;
             recording.losses.push(format!("{rows} row(s) with a stale time stamp skipped"));
         }
         if matches!(self.time, TimeColumn::Stamps { .. }) {
+            count_from_the_first(&mut recording);
             note_gaps(&mut recording);
         }
         for column in &recording.columns {
@@ -186,6 +236,17 @@ impl<'m> Assembler<'m> {
         }
         Ok(recording)
     }
+}
+
+/// Stamps of the time of day are counted from the first row: in what is told of them seconds since 1970 have no digits left.
+fn count_from_the_first(recording: &mut Recording) {
+    let Some(first_s) = recording.time_s.first().copied().filter(|first_s| *first_s > SINCE_1970_S) else {
+        return;
+    };
+    recording.time_s.iter_mut().for_each(|time_s| *time_s -= first_s);
+    recording.notes.push(format!(
+        "the stamps begin at {first_s:.6} s, as those that count from 1970; here they count from the first row"
+    ));
 }
 
 fn note_gaps(recording: &mut Recording) {
@@ -227,7 +288,7 @@ fn native<'m>(source: &[String], recording: &mut Recording) -> Result<Plan<'m>, 
     let Some(time) = source.iter().position(|n| n == "time_s") else {
         let hint = match source {
             [one] if one.contains([';', '\t']) => {
-                "cells must be parted by commas, not by semicolons or tabs".into()
+                "its cells are parted by semicolons or tabs; such a log comes in through a column map (--columns NAME): `kort columns LOG` names the one that fits, or proposes one".into()
             }
             _ => match nearest("time_s", source.iter().map(String::as_str)) {
                 Some(near) => format!(

@@ -48,7 +48,7 @@ pub(crate) fn recording(name: &str, log: &Log, map: &ColumnMap) -> Result<Record
         return Err(Problem::ClockWanted { map: map.name.clone(), format: log.format });
     };
     let found = find(log, map)?;
-    let stretch = longest(log, &found);
+    let stretch = log.longest(found.values().map(|(topic, _)| *topic));
     let mut taken: Vec<Taken> = found
         .iter()
         .map(|(source, (topic, field))| {
@@ -141,14 +141,6 @@ fn missing(log: &Log, map: &ColumnMap, wanted: &str) -> Problem {
         found: format!("{}{more}", near.join(", ")),
         hint,
     }
-}
-
-/// The stretch between resets of the clock with the most messages.
-fn longest(log: &Log, found: &Found) -> usize {
-    let count = |stretch: usize| -> usize {
-        found.values().map(|(topic, _)| log.topics[*topic].stretch(stretch).len()).sum()
-    };
-    (0..=log.resets).max_by_key(|stretch| (count(*stretch), log.resets - stretch)).unwrap_or(0)
 }
 
 /// The topic whose messages are the rows.

@@ -11,6 +11,37 @@ pub use survey::{FieldSurvey, GapSurvey, Proposal, Survey, TopicSurvey, survey};
 /// logger.
 const RESET_S: f64 = 1.0;
 
+/// What a stamp is that does not come after the newest of its stretch.
+pub(crate) enum Back {
+    /// Disorder of the logger, or one stamp twice.
+    Late,
+    /// One stamp was far ahead, and then it goes on as before: that one was damaged, the clock is not.
+    NewestDamaged,
+    /// The clock began anew: a start, midnight.
+    Anew,
+}
+
+impl Back {
+    /// Judges a stamp by those of the stretch before it.
+    pub fn of(stamp_s: f64, stretch_s: &[f64]) -> Self {
+        match stretch_s {
+            [.., newest] if newest - stamp_s <= RESET_S => Back::Late,
+            [.., before, _] if *before < stamp_s => Back::NewestDamaged,
+            _ => Back::Anew,
+        }
+    }
+}
+
+/// What the clock's resets cost: only one stretch between them is read.
+pub(crate) fn longest_is_read(resets: usize, stretch_s: &[f64], left_out: &str) -> Option<String> {
+    let (from, to) = (stretch_s.first()?, stretch_s.last()?);
+    (resets > 0).then(|| {
+        format!(
+            "the clock begins anew {resets} time(s); the longest stretch, {from:.3} to {to:.3} s, is read, and {left_out} outside it are left out"
+        )
+    })
+}
+
 /// What a log holds.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Log {
@@ -62,17 +93,19 @@ pub(crate) struct Field {
     pub range: Option<(f64, f64)>,
 }
 
+impl Log {
+    /// The stretch between resets of the clock in which these topics have the most messages, the first of several.
+    pub fn longest(&self, topics: impl Iterator<Item = usize> + Clone) -> usize {
+        let count =
+            |stretch: usize| -> usize { topics.clone().map(|t| self.topics[t].stretch(stretch).len()).sum() };
+        (0..=self.resets).rev().max_by_key(|stretch| count(*stretch)).unwrap_or(0)
+    }
+}
+
 impl Topic {
     /// The name by which a column map calls a field.
     pub fn source(&self, field: &Field) -> String {
         if self.name.is_empty() { field.name.clone() } else { format!("{}.{}", self.name, field.name) }
-    }
-
-    /// The stamp before the newest, in the same stretch.
-    fn before_newest(&self) -> Option<f64> {
-        let begins = self.stretches.last()?.1;
-        let at = self.stamps_s.len().checked_sub(2)?;
-        (at >= begins).then(|| self.stamps_s[at])
     }
 
     fn drop_newest(&mut self) {
@@ -162,15 +195,15 @@ impl<'w> Gather<'w> {
         let of = &mut self.log.topics[topic];
         self.skip = !stamp_s.is_finite();
         let here = of.stretches.last().is_some_and(|(stretch, _)| *stretch == self.stretch);
-        if let Some(newest) = of.stamps_s.last().copied().filter(|newest| here && stamp_s <= *newest) {
-            if newest - stamp_s <= RESET_S {
-                self.skip = true;
-            } else if of.before_newest().is_some_and(|before| before < stamp_s) {
-                // One stamp far ahead, and then on as before: that one was damaged, the clock is not.
-                of.drop_newest();
-            } else {
-                self.stretch += 1;
-                self.log.resets += 1;
+        if here && of.stamps_s.last().is_some_and(|newest| stamp_s <= *newest) {
+            let begins = of.stretches.last().map_or(0, |(_, begins)| *begins);
+            match Back::of(stamp_s, &of.stamps_s[begins..]) {
+                Back::Late => self.skip = true,
+                Back::NewestDamaged => of.drop_newest(),
+                Back::Anew => {
+                    self.stretch += 1;
+                    self.log.resets += 1;
+                }
             }
         }
         if self.skip {

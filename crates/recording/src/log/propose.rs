@@ -318,6 +318,9 @@ fn toml(log: &Log, chosen: &Chosen, table: bool) -> String {
         let _ = write!(out, "\n[columns.{column}]\nsource = {:?}\n", topic.source(field));
         let (low, high) = field.range.unwrap_or_default();
         match unit_of(field) {
+        if log.resets > 0 || log.topics[0].stale > 0 {
+            out += "stale_rows = \"drop\"   # there are such rows; where the clock begins anew the longest stretch is read\n";
+        }
             Some(unit) => {
                 let whence = if field.unit.is_some() { "as the log says" } else { "as its name says" };
                 let _ = writeln!(out, "unit = {:?}   # {whence}; {low} to {high} in this log", unit.symbol);

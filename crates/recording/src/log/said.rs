@@ -1,6 +1,6 @@
 //! What is said of how a log of messages became rows: rates, gaps, clocks, and what was left out.
 
-use super::{Log, Topic, steps};
+use super::{Log, Topic, longest_is_read, steps};
 
 /// A topic that begins and ends so much later than the rows is said to.
 const SHIFT_S: f64 = 1.0;
@@ -9,15 +9,8 @@ const SHIFT_S: f64 = 1.0;
 pub(super) fn other_stretches(log: &Log, grid: usize, stretch: usize) -> Option<String> {
     let topic = &log.topics[grid];
     let range = topic.stretch(stretch);
-    let (from, to) = (topic.stamps_s.get(range.start)?, topic.stamps_s.get(range.end.checked_sub(1)?)?);
-    (log.resets > 0).then(|| {
-        format!(
-            "the clock begins anew {} time(s); the longest stretch, {from:.3} to {to:.3} s, is read, and {} messages of `{}` outside it are left out",
-            log.resets,
-            topic.stamps_s.len() - range.len(),
-            topic.name
-        )
-    })
+    let left_out = format!("{} messages of `{}`", topic.stamps_s.len() - range.len(), topic.name);
+    longest_is_read(log.resets, &topic.stamps_s[range], &left_out)
 }
 
 /// Topics that are in the log and not in the map.

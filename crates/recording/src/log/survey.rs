@@ -20,7 +20,8 @@ pub struct Survey {
     pub format: &'static str,
     /// What its stamps count from.
     pub clock: &'static str,
-    /// From the first to the last stamp of its longest topic, s; none if there are no stamps with a known unit.
+    /// From the first to the last stamp of its longest topic, s, where the clock begins anew within the stretch that is
+    /// read; none if there are no stamps.
     pub duration_s: Option<f64>,
     /// How often the clock begins anew.
     pub resets: usize,
@@ -41,9 +42,9 @@ pub struct TopicSurvey {
     pub name: String,
     /// How many.
     pub messages: usize,
-    /// First stamp, s.
+    /// First stamp, s, of the stretch that is read if the clock begins anew.
     pub from_s: Option<f64>,
-    /// Last stamp, s.
+    /// Last stamp of it, s.
     pub to_s: Option<f64>,
     /// Usual rate, Hz.
     pub rate_hz: Option<f64>,
@@ -111,10 +112,13 @@ fn of(name: &str, log: &Log) -> Survey {
     let (proposal, chosen) = propose(log);
     let topics: Vec<TopicSurvey> = log
         .topics
+    let stretch = log.longest(0..log.topics.len());
         .iter()
         .enumerate()
         .filter(|(_, topic)| !topic.stamps_s.is_empty() || topic.name.is_empty())
-        .map(|(t, topic)| topic_survey(topic, |f| chosen.get(&(t, f)).map(|name| (*name).to_string())))
+        .map(|(t, topic)| {
+            topic_survey(topic, stretch, |f| chosen.get(&(t, f)).map(|name| (*name).to_string()))
+        })
         .collect();
     let span = |topic: &TopicSurvey| topic.to_s.zip(topic.from_s).map(|(to, from)| to - from);
     Survey {
@@ -131,14 +135,15 @@ fn of(name: &str, log: &Log) -> Survey {
     }
 }
 
-fn topic_survey(topic: &Topic, column: impl Fn(usize) -> Option<String>) -> TopicSurvey {
+fn topic_survey(topic: &Topic, stretch: usize, column: impl Fn(usize) -> Option<String>) -> TopicSurvey {
     let (step_s, gaps) = steps(&topic.stamps_s);
     let longest = gaps.iter().max_by(|a, b| (a.1 - a.0).total_cmp(&(b.1 - b.0)));
     TopicSurvey {
+    let read_s = &topic.stamps_s[topic.stretch(stretch)];
         name: topic.name.clone(),
         messages: topic.stamps_s.len(),
-        from_s: topic.stamps_s.first().copied(),
-        to_s: topic.stamps_s.last().copied(),
+        from_s: read_s.first().copied(),
+        to_s: read_s.last().copied(),
         rate_hz: (step_s > 0.0).then(|| 1.0 / step_s),
         gaps: gaps.len(),
         longest_gap: longest.map(|(from_s, to_s)| GapSurvey { from_s: *from_s, to_s: *to_s }),

@@ -79,7 +79,12 @@ fn text(found: &Survey, all: bool) -> String {
     }
     let _ = writeln!(out, "\nstamps: {}", found.clock);
     if found.resets > 0 {
-        let _ = writeln!(out, "the clock begins anew {} time(s): the longest stretch is read", found.resets);
+        let what = if found.proposal.native {
+            "kort reads no recording of its own like this: part it there"
+        } else {
+            "the longest stretch is read"
+        };
+        let _ = writeln!(out, "the clock begins anew {} time(s): {what}", found.resets);
     }
     for note in &found.notes {
         let _ = writeln!(out, "note: {note}");
