@@ -47,6 +47,20 @@ pub enum Problem {
         /// The system's words.
         message: String,
     },
+    /// A folder, as a ROS 2 bag is.
+    #[error("is a folder; allowed: a file{}", inside.as_ref().map_or(String::new(), |log| format!(", as `{log}` in it")))]
+    Folder {
+        /// A log in it.
+        inside: Option<String>,
+    },
+    /// Packed as kort does not unpack.
+    #[error("is packed with {with}; allowed: plain or gzip")]
+    Packed {
+        /// With what.
+        with: &'static str,
+        /// What to do.
+        hint: &'static str,
+    },
     /// The name of a file to write ends in nothing kort writes.
     #[error("file name ends in {found}; allowed: .csv, .csv.gz, .mcap or .parquet")]
     UnknownFormat {
@@ -57,7 +71,9 @@ pub enum Problem {
     #[error("is empty; a recording has a header row and at least two rows")]
     Empty,
     /// Bytes that are no text.
-    #[error("{place} is not UTF-8 text; allowed: CSV in UTF-8 (plain or gzip), or MCAP")]
+    #[error(
+        "{place} is not UTF-8 text, and the file begins like no log that kort reads; allowed: CSV in UTF-8, MCAP, PX4 ULog, ArduPilot DataFlash, ROS 2 bag, Betaflight or INAV blackbox, candump; plain or gzip"
+    )]
     NotUtf8 {
         /// Where.
         place: Place,
@@ -229,10 +245,13 @@ impl Problem {
     pub fn hint(&self) -> String {
         match self {
             Problem::Unreadable { .. } => "check the path and that the file may be read".into(),
+            Problem::Folder { inside: Some(log) } => format!("name {log}; the files of a bag in several parts are read one by one"),
+            Problem::Folder { inside: None } => "name the log itself; no .db3 or .mcap is in this folder".into(),
+            Problem::Packed { hint, .. } => (*hint).into(),
             Problem::UnknownFormat { .. } => "name the file REC.csv, REC.csv.gz or REC.mcap".into(),
             Problem::Empty => "was the logger stopped before its first row?".into(),
             Problem::NotUtf8 { .. } => {
-                "save the log as CSV in UTF-8; a spreadsheet or another log format must be exported first".into()
+                "a table, or a spreadsheet, must be saved as CSV in UTF-8; a log of another format must be converted to one of these".into()
             }
             Problem::DuplicateColumn { .. } => "rename or remove one of the two".into(),
             Problem::UnnamedColumn { .. } => {

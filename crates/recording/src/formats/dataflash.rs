@@ -120,35 +120,36 @@ pub(super) fn log(input: impl BufRead, wanted: Option<&[String]>) -> Result<Log,
         skipped: 0,
         skipped_at: 0,
     };
-    while reader.record()? {}
+    while reader.record() {}
     reader.finish()
 }
 
 impl<R: BufRead> Reader<'_, R> {
     /// One message; false at the end.
-    fn record(&mut self) -> Result<bool, Problem> {
+    fn record(&mut self) -> bool {
         let from = self.stream.at();
         let mut head = [0; 3];
-        let got = self.stream.fill(&mut head).map_err(super::unreadable)?;
-        if got < head.len() {
-            return Ok(false);
+        if self.stream.fill(&mut head) < head.len() {
+            return false;
         }
         let known = head.starts_with(MARK).then(|| self.layouts.get(&head[2]).map(|l| l.length)).flatten();
         let Some(length) = known else { return self.resume(from, head) };
         let mut data = Vec::new();
-        if !self.stream.take(&mut data, length - head.len()).map_err(super::unreadable)? {
-            self.gather.loss(format!("the file ends in a message at byte {from}; what followed is lost"));
-            return Ok(false);
+        if !self.stream.take(&mut data, length - head.len()) {
+            if self.stream.torn().is_none() {
+                self.gather.loss(format!("the file ends in a message at byte {from}; what followed is lost"));
+            }
+            return false;
         }
         match head[2] {
             FMT => self.describe(&data),
             kind => self.message(kind, &data),
         }
-        Ok(true)
+        true
     }
 
     /// Passes over what is no message, up to one that is.
-    fn resume(&mut self, from: u64, head: [u8; 3]) -> Result<bool, Problem> {
+    fn resume(&mut self, from: u64, head: [u8; 3]) -> bool {
         let mut last = head;
         let mut passed = 0;
         let mut empty = true;
@@ -160,11 +161,11 @@ impl<R: BufRead> Reader<'_, R> {
             empty &= last[0] == 0xff || last[0] == 0;
             passed += 1;
             let mut byte = [0];
-            if self.stream.fill(&mut byte).map_err(super::unreadable)? == 0 {
+            if self.stream.fill(&mut byte) == 0 {
                 if !empty {
                     self.count(from, passed + 2);
                 }
-                return Ok(false);
+                return false;
             }
             last = [last[1], last[2], byte[0]];
         }
@@ -173,14 +174,14 @@ impl<R: BufRead> Reader<'_, R> {
         }
         let mut data = Vec::new();
         let length = self.layouts.get(&last[2]).map_or(3, |l| l.length);
-        if !self.stream.take(&mut data, length - last.len()).map_err(super::unreadable)? {
-            return Ok(false);
+        if !self.stream.take(&mut data, length - last.len()) {
+            return false;
         }
         match last[2] {
             FMT => self.describe(&data),
             kind => self.message(kind, &data),
         }
-        Ok(true)
+        true
     }
 
     fn count(&mut self, from: u64, passed: u64) {
@@ -302,6 +303,9 @@ impl<R: BufRead> Reader<'_, R> {
                     }
                 }
             }
+        }
+        if let Some(torn) = self.stream.torn() {
+            self.gather.loss(torn);
         }
         if self.skipped > 0 {
             self.gather.loss(format!(

@@ -27,6 +27,8 @@ use crate::map::{ColumnMap, Time};
 use crate::recording::Recording;
 
 const GZIP: &[u8] = &[0x1f, 0x8b];
+/// What ROS 2 packs bags with, whole or message by message.
+const ZSTD: &[u8] = &[0x28, 0xb5, 0x2f, 0xfd];
 
 /// Decodes by content.
 pub(crate) fn decode(
@@ -48,6 +50,7 @@ fn decode_plain(name: &str, mut input: impl BufRead, map: Option<&ColumnMap>) ->
     let messages = map.is_some_and(|map| matches!(map.time, Time::Clock { .. }));
     match Content::of(input.fill_buf().map_err(unreadable)?) {
         Content::Empty => Err(Problem::Empty),
+        Content::Zstd => Err(ZSTD_FILE),
         Content::Mcap if !messages => mcap::decode(name, input, map),
         Content::Csv => csv::decode(name, input, map),
         kind => {
@@ -73,6 +76,7 @@ pub(crate) fn log(mut input: impl BufRead, wanted: Option<&[String]>) -> Result<
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Content {
     Empty,
+    Zstd,
     Csv,
     Mcap,
     Ulog,
@@ -86,6 +90,7 @@ impl Content {
     fn of(start: &[u8]) -> Self {
         match () {
             () if start.is_empty() => Content::Empty,
+            () if start.starts_with(ZSTD) => Content::Zstd,
             () if start.starts_with(::mcap::MAGIC) => Content::Mcap,
             () if start.starts_with(ulog::MAGIC) => Content::Ulog,
             () if start.starts_with(dataflash::MAGIC) => Content::DataFlash,
@@ -100,6 +105,7 @@ impl Content {
     fn name(self) -> &'static str {
         match self {
             Content::Empty => "empty",
+            Content::Zstd => "zstd",
             Content::Csv => "CSV",
             Content::Mcap => "MCAP",
             Content::Ulog => "PX4 ULog",
@@ -113,6 +119,7 @@ impl Content {
     fn log(self, input: impl BufRead, wanted: Option<&[String]>) -> Result<Log, Problem> {
         match self {
             Content::Empty => Err(Problem::Empty),
+            Content::Zstd => Err(ZSTD_FILE),
             Content::Csv => csv::log(input, wanted),
             Content::Mcap => mcap::log(input, wanted),
             Content::Ulog => ulog::log(input, wanted),
@@ -123,6 +130,12 @@ impl Content {
         }
     }
 }
+
+const ZSTD_FILE: Problem = Problem::Packed { with: "zstd", hint: "`zstd -d FILE` unpacks it" };
+const ZSTD_MESSAGES: Problem = Problem::Packed {
+    with: "zstd, message by message",
+    hint: "`ros2 bag convert` writes a bag without compression",
+};
 
 fn unreadable(error: io::Error) -> Problem {
     Problem::Unreadable { message: error.to_string() }

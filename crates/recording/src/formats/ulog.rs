@@ -117,7 +117,7 @@ struct Reader<'w, R> {
 pub(super) fn log(input: impl BufRead, wanted: Option<&[String]>) -> Result<Log, Problem> {
     let mut stream = Stream::new(input);
     let mut start = [0; 16];
-    let got = stream.fill(&mut start).map_err(super::unreadable)?;
+    let got = stream.fill(&mut start);
     if got < start.len() {
         return Err(broken(format!("the header has {got} of 16 bytes")));
     }
@@ -132,7 +132,7 @@ pub(super) fn log(input: impl BufRead, wanted: Option<&[String]>) -> Result<Log,
         skipped: 0,
         bad: 0,
     };
-    while reader.record()? {}
+    while reader.record() {}
     reader.finish()
 }
 
@@ -150,38 +150,34 @@ fn broken(message: String) -> Problem {
 
 impl<R: BufRead> Reader<'_, R> {
     /// One record; false at the end.
-    fn record(&mut self) -> Result<bool, Problem> {
+    fn record(&mut self) -> bool {
         let mut data = Vec::new();
         let from = self.stream.at();
         if let Some(place) = self.next_appended(from, 3) {
             return self.pass_to(place);
         }
         let mut head = [0; 3];
-        let got = match self.stream.fill(&mut head) {
-            Ok(got) => got,
-            Err(e) => return self.torn(e.to_string()),
-        };
+        let got = self.stream.fill(&mut head);
         if got < head.len() {
-            return if got == 0 { Ok(false) } else { self.torn(format!("in a record at byte {from}")) };
+            return got > 0 && self.ends_in(from);
         }
         let size = usize::from(u16::from_le_bytes([head[0], head[1]]));
         if !b"BFIMPQARDLCSO".contains(&head[2]) {
             self.stream.put_back(&head[1..]);
             let subscribed = &self.subscribed;
             let whole = |ahead: &[u8]| ahead == SYNC || begins_message(ahead, subscribed);
-            let (passed, found) = self.stream.seek(SYNC.len(), whole).map_err(super::unreadable)?;
+            let (passed, found) = self.stream.seek(SYNC.len(), whole);
             self.skipped += passed + 1;
-            return Ok(found);
+            return found;
         }
         if let Some(place) = self.next_appended(from, 3 + size) {
             return self.pass_to(place);
         }
-        match self.stream.take(&mut data, size) {
-            Ok(true) => self.take(head[2], &data),
-            Ok(false) => return self.torn(format!("in a record at byte {from}")),
-            Err(e) => return self.torn(e.to_string()),
+        if !self.stream.take(&mut data, size) {
+            return self.ends_in(from);
         }
-        Ok(true)
+        self.take(head[2], &data);
+        true
     }
 
     /// A place with appended data that a record of this length would run over.
@@ -189,16 +185,19 @@ impl<R: BufRead> Reader<'_, R> {
         self.appended.iter().copied().find(|place| from < *place && *place < from + size as u64)
     }
 
-    fn pass_to(&mut self, place: u64) -> Result<bool, Problem> {
+    fn pass_to(&mut self, place: u64) -> bool {
         let left = place - self.stream.at().min(place);
-        let passed = self.stream.skip(left).map_err(super::unreadable)?;
+        let passed = self.stream.skip(left);
         self.skipped += passed;
-        Ok(passed == left)
+        passed == left
     }
 
-    fn torn(&mut self, why: String) -> Result<bool, Problem> {
-        self.gather.loss(format!("the file ends {why}; what followed is lost"));
-        Ok(false)
+    /// The file ends in the record that begins here; false, as at every end.
+    fn ends_in(&mut self, from: u64) -> bool {
+        if self.stream.torn().is_none() {
+            self.gather.loss(format!("the file ends in a record at byte {from}; what followed is lost"));
+        }
+        false
     }
 
     fn take(&mut self, kind: u8, data: &[u8]) {
@@ -343,6 +342,9 @@ impl<R: BufRead> Reader<'_, R> {
                 self.dropouts,
                 self.dropped_ms as f64 * 1e-3
             ));
+        }
+        if let Some(torn) = self.stream.torn() {
+            self.gather.loss(torn);
         }
         if self.skipped > 0 {
             self.gather.loss(format!("{} byte(s) are no records and were passed over", self.skipped));

@@ -9,6 +9,7 @@ mod header;
 
 use std::io::BufRead;
 
+use super::stream::whole;
 use crate::error::Problem;
 use crate::log::{Gather, Log};
 use fields::{Bytes, Frame, Kind};
@@ -21,9 +22,8 @@ const NAME: &str = "Betaflight blackbox";
 const APART_US: i64 = 10_000_000;
 
 /// Every log of the file, one after the other: a board begins one whenever it is armed.
-pub(super) fn log(mut input: impl BufRead, wanted: Option<&[String]>) -> Result<Log, Problem> {
-    let mut data = Vec::new();
-    input.read_to_end(&mut data).map_err(super::unreadable)?;
+pub(super) fn log(input: impl BufRead, wanted: Option<&[String]>) -> Result<Log, Problem> {
+    let (data, torn) = whole(input);
     let starts: Vec<usize> =
         (0..data.len().saturating_sub(MAGIC.len() - 1)).filter(|at| data[*at..].starts_with(MAGIC)).collect();
     let mut gather = Gather::new(NAME, "seconds since the board started", wanted);
@@ -42,7 +42,7 @@ pub(super) fn log(mut input: impl BufRead, wanted: Option<&[String]>) -> Result<
         let message = refused.first().cloned().unwrap_or_else(|| "no whole frame is in it".into());
         return Err(Problem::Broken { format: NAME, message });
     }
-    refused.into_iter().for_each(|why| gather.loss(why));
+    refused.into_iter().chain(torn).for_each(|why| gather.loss(why));
     Ok(gather.finish())
 }
 

@@ -8,6 +8,7 @@ use serde_json::Value;
 
 use super::super::cdr::Layout;
 use super::super::ros::Topic;
+use super::super::{ZSTD, ZSTD_MESSAGES};
 use super::{BESIDE, records};
 use crate::error::Problem;
 use crate::log::{Gather, Log};
@@ -41,10 +42,7 @@ pub(in crate::formats) fn log(input: impl Read, wanted: Option<&[String]>) -> Re
         messages: 0,
         bad: 0,
     };
-    let damage = records(input, |record| {
-        all.take(record);
-        Ok(())
-    })?;
+    let damage = records(input, |record| all.take(record))?;
     for loss in damage.losses(all.messages)? {
         all.gather.loss(loss);
     }
@@ -65,7 +63,7 @@ pub(in crate::formats) fn log(input: impl Read, wanted: Option<&[String]>) -> Re
 }
 
 impl Messages<'_> {
-    fn take(&mut self, record: Record<'_>) {
+    fn take(&mut self, record: Record<'_>) -> Result<(), Problem> {
         match record {
             Record::Schema { header, data } => {
                 self.schemas.insert(header.id, (header.name, header.encoding, data.into_owned()));
@@ -76,7 +74,7 @@ impl Messages<'_> {
                 if self.channels.contains_key(&channel.id)
                     || schema.is_some_and(|s| BESIDE.contains(&s.0.as_str()))
                 {
-                    return;
+                    return Ok(());
                 }
                 let name = channel.topic.trim_start_matches('/');
                 let read = match (channel.message_encoding.as_str(), schema) {
@@ -102,9 +100,11 @@ impl Messages<'_> {
                     }
                 }
             }
+            Record::Message { data, .. } if data.starts_with(ZSTD) => return Err(ZSTD_MESSAGES),
             Record::Message { header, data } => self.message(&header, &data),
             _ => {}
         }
+        Ok(())
     }
 
     fn message(&mut self, header: &MessageHeader, data: &[u8]) {
