@@ -170,6 +170,22 @@ fn a_flushed_mcap_keeps_its_rows_without_an_end() {
     assert_eq!(messages.filter(|message| message.is_ok()).count(), 100);
 }
 
+/// What is left of a filtered signal long after its end has three hundred zeros behind the point.
+#[test]
+fn the_smallest_numbers_are_short_in_csv_too() {
+    let mut out = Cursor::new(Vec::new());
+    let mut writer = Writer::create(Format::Csv, "t1", &["thrust_n"], &mut out).unwrap();
+    let values = [5e-324, -1.5e-310, 2.5e-7, 1e-6, 0.0];
+    for (i, value) in values.into_iter().enumerate() {
+        writer.row(i as f64, &[value]).unwrap();
+    }
+    writer.finish().unwrap();
+    let bytes = out.into_inner();
+    let text = String::from_utf8(bytes.clone()).unwrap();
+    assert_eq!(text, "time_s,thrust_n\n0,5e-324\n1,-1.5e-310\n2,2.5e-7\n3,0.000001\n4,0\n");
+    assert_eq!(decode("rec", bytes.as_slice(), None).unwrap().column("thrust_n").unwrap(), values);
+}
+
 #[test]
 fn a_map_takes_over_what_it_names() {
     let map = ColumnMap::from_toml(

@@ -103,6 +103,9 @@ impl<R: Read> Read for &mut Tail<R> {
     }
 }
 
+/// Smaller numbers are written with an exponent.
+const SMALLEST_WRITTEN_OUT: f64 = 1e-6;
+
 /// Writes rows.
 pub(super) struct Rows<W: Write> {
     output: W,
@@ -125,10 +128,11 @@ impl<W: Write> Rows<W> {
         let mut cells = || -> std::fmt::Result {
             write!(self.line, "{time_s}")?;
             for value in values {
-                if value.is_nan() {
-                    self.line.push(',');
-                } else {
-                    write!(self.line, ",{value}")?;
+                match value.abs() {
+                    size if size.is_nan() => self.line.push(','),
+                    // Written out, what is left of a signal that died away would be hundreds of zeros.
+                    size if size > 0.0 && size < SMALLEST_WRITTEN_OUT => write!(self.line, ",{value:e}")?,
+                    _ => write!(self.line, ",{value}")?,
                 }
             }
             Ok(())
