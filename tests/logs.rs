@@ -7,6 +7,8 @@ mod bags;
 mod clocks;
 #[path = "common/lab.rs"]
 mod lab;
+#[path = "logs/refused.rs"]
+mod refused;
 #[path = "logs/torn.rs"]
 mod torn;
 #[path = "logs/writers.rs"]

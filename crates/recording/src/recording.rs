@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufReader, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::columns;
 use crate::error::{Problem, RecordingError};
@@ -77,12 +77,10 @@ impl Recording {
     /// # Errors
     /// The file cannot be opened, or is a folder.
     pub fn open(path: &Path) -> Result<File, RecordingError> {
-        let fail = |message: String| {
-            RecordingError::new(&path.display().to_string(), Problem::Unreadable { message })
-        };
-        let file = File::open(path).map_err(|e| fail(e.to_string()))?;
+        let fail = |problem| RecordingError::new(&path.display().to_string(), problem);
+        let file = File::open(path).map_err(|e| fail(Problem::Unreadable { message: e.to_string() }))?;
         match file.metadata() {
-            Ok(about) if about.is_dir() => Err(fail("it is a folder".into())),
+            Ok(about) if about.is_dir() => Err(fail(Problem::Folder { inside: log_in(path) })),
             _ => Ok(file),
         }
     }
@@ -137,6 +135,13 @@ impl Recording {
         let at = ((steps.len() - 1) as f64 * part) as usize;
         *steps.select_nth_unstable_by(at, f64::total_cmp).1
     }
+}
+
+/// The first file of a ROS 2 bag in its folder.
+fn log_in(folder: &Path) -> Option<String> {
+    let files = std::fs::read_dir(folder).ok()?.filter_map(|entry| Some(entry.ok()?.path()));
+    let is_log = |path: &PathBuf| path.extension().is_some_and(|ending| ending == "db3" || ending == "mcap");
+    files.filter(is_log).min().map(|path| path.display().to_string())
 }
 
 #[cfg(test)]

@@ -120,6 +120,16 @@ fn find(log: &Log, map: &ColumnMap) -> Result<Found, Problem> {
     Ok(found)
 }
 
+/// Whether two sources end in nearly the same name: a topic and a number that they share make them no kin.
+fn nearly_spelt(wanted: &str, source: &str) -> bool {
+    let name = |source: &str| {
+        let last = source.rsplit('.').next().unwrap_or(source);
+        last.split('[').next().unwrap_or(last).to_lowercase()
+    };
+    let (a, b) = (name(wanted), name(source));
+    strsim::osa_distance(&a, &b) <= (a.len() / 3).max(1)
+}
+
 fn missing(log: &Log, map: &ColumnMap, wanted: &str) -> Problem {
     let all: Vec<String> = log.topics.iter().flat_map(|t| t.fields.iter().map(|f| t.source(f))).collect();
     let topic = wanted.split(['.', '[']).next().unwrap_or(wanted);
@@ -129,7 +139,8 @@ fn missing(log: &Log, map: &ColumnMap, wanted: &str) -> Problem {
     }
     let more = if near.len() > 30 { ", …" } else { "" };
     near.truncate(30);
-    let hint = match nearest(wanted, all.iter().map(String::as_str)) {
+    let alike = all.iter().map(String::as_str).filter(|source| nearly_spelt(wanted, source));
+    let hint = match nearest(wanted, alike) {
         Some(near) => {
             format!("did you mean `{near}`? `kort columns LOG` lists what is in the log and which map fits")
         }

@@ -204,7 +204,7 @@ fn fit(rule: &Rule, topic: &Topic, field: &Field) -> Option<(bool, usize, bool)>
 pub(super) fn propose(log: &Log) -> (Proposal, Chosen) {
     let table = log.topics.len() == 1 && log.topics[0].name.is_empty();
     let native = log.topics.iter().any(is_native);
-    let shipped: Vec<String> = if log.format == "candump" {
+    let maps: Vec<ColumnMap> = if log.format == "candump" {
         let ids = log
             .topics
             .iter()
@@ -212,18 +212,17 @@ pub(super) fn propose(log: &Log) -> (Proposal, Chosen) {
         let nodes: BTreeSet<i32> = ids.flat_map(|id| [id, id & 0x7F]).collect();
         let maps = ColumnMap::shipped()
             .flat_map(|name| nodes.iter().filter_map(move |node| ColumnMap::of_node(name, *node)));
-        maps.filter(|map| map.sources().all(|(source, _)| on_bus(source, log)))
-            .map(|map| map.call())
-            .collect()
+        maps.filter(|map| map.sources().all(|(source, _)| on_bus(source, log))).collect()
     } else {
         ColumnMap::shipped()
             .filter_map(|name| ColumnMap::example(name).filter(|map| suits(map, log, table)))
-            .map(|map| map.call())
             .collect()
     };
     let chosen = choose(log, table);
     let map = (!native && !chosen.is_empty()).then(|| toml(log, &chosen, table));
-    (Proposal { native, shipped, map }, if native { Chosen::new() } else { chosen })
+    let shipped = maps.iter().map(ColumnMap::call).collect();
+    let silent = maps.iter().filter(|map| !responds(map, log)).map(ColumnMap::call).collect();
+    (Proposal { native, shipped, without_response: silent, map }, if native { Chosen::new() } else { chosen })
 }
 
 fn is_native(topic: &Topic) -> bool {
@@ -244,13 +243,22 @@ fn on_bus(source: &str, log: &Log) -> bool {
     long_enough().unwrap_or(false)
 }
 
+fn is_in(log: &Log, source: &str) -> bool {
+    let said = |topic: &Topic, f: &Field| f.samples + f.texts > 0 && same_source(&topic.source(f), source);
+    log.topics.iter().any(|topic| topic.fields.iter().any(|field| said(topic, field)))
+}
+
+/// Whether the map makes of this log a column that a model can be compared with.
+fn responds(map: &ColumnMap, log: &Log) -> bool {
+    const RESPONSES: [&str; 5] =
+        ["shaft_speed_rad_s", "shaft_angle_rad", "thrust_n", "torque_n_m", "flow_m_s"];
+    let mut columns = map.columns.iter().filter(|column| RESPONSES.contains(&column.name.as_str()));
+    columns.any(|column| !column.optional || is_in(log, &column.source))
+}
+
 /// Every source that the map must have is in the log.
 fn suits(map: &ColumnMap, log: &Log, table: bool) -> bool {
-    let there = |source: &str| {
-        log.topics
-            .iter()
-            .any(|t| t.fields.iter().any(|f| f.samples + f.texts > 0 && same_source(&t.source(f), source)))
-    };
+    let there = |source: &str| is_in(log, source);
     let stamps = match &map.time {
         Time::Clock { .. } => !table,
         Time::Column { source, .. } => table && there(source),
@@ -310,6 +318,9 @@ fn toml(log: &Log, chosen: &Chosen, table: bool) -> String {
             Some(unit) => format!("unit = {:?}\n", unit.symbol),
             None => "# unit = \"…\"   the log does not say it: s, ms, us or ns\n".into(),
         };
+        if log.resets > 0 || log.topics[0].stale > 0 {
+            out += "stale_rows = \"drop\"   # there are such rows; where the clock begins anew the longest stretch is read\n";
+        }
     } else {
         out += "# source = \"…\"   no column looks like a time stamp; settle_s = 2.0 instead for settled points\n";
     }
@@ -318,9 +329,6 @@ fn toml(log: &Log, chosen: &Chosen, table: bool) -> String {
         let _ = write!(out, "\n[columns.{column}]\nsource = {:?}\n", topic.source(field));
         let (low, high) = field.range.unwrap_or_default();
         match unit_of(field) {
-        if log.resets > 0 || log.topics[0].stale > 0 {
-            out += "stale_rows = \"drop\"   # there are such rows; where the clock begins anew the longest stretch is read\n";
-        }
             Some(unit) => {
                 let whence = if field.unit.is_some() { "as the log says" } else { "as its name says" };
                 let _ = writeln!(out, "unit = {:?}   # {whence}; {low} to {high} in this log", unit.symbol);

@@ -93,6 +93,8 @@ pub struct Proposal {
     pub native: bool,
     /// Shipped maps that fit, as they stand behind `--columns`.
     pub shipped: Vec<String>,
+    /// Those of them that give no measured response, for `kort convert`: there is nothing to compare a model with.
+    pub without_response: Vec<String>,
     /// A column map as TOML, made from names and units; to be checked by a person. None if nothing in the log looks
     /// like a column of kort.
     pub map: Option<String>,
@@ -110,9 +112,9 @@ pub fn survey(name: &str, reader: impl Read) -> Result<Survey, RecordingError> {
 
 fn of(name: &str, log: &Log) -> Survey {
     let (proposal, chosen) = propose(log);
+    let stretch = log.longest(0..log.topics.len());
     let topics: Vec<TopicSurvey> = log
         .topics
-    let stretch = log.longest(0..log.topics.len());
         .iter()
         .enumerate()
         .filter(|(_, topic)| !topic.stamps_s.is_empty() || topic.name.is_empty())
@@ -137,9 +139,9 @@ fn of(name: &str, log: &Log) -> Survey {
 
 fn topic_survey(topic: &Topic, stretch: usize, column: impl Fn(usize) -> Option<String>) -> TopicSurvey {
     let (step_s, gaps) = steps(&topic.stamps_s);
+    let read_s = &topic.stamps_s[topic.stretch(stretch)];
     let longest = gaps.iter().max_by(|a, b| (a.1 - a.0).total_cmp(&(b.1 - b.0)));
     TopicSurvey {
-    let read_s = &topic.stamps_s[topic.stretch(stretch)];
         name: topic.name.clone(),
         messages: topic.stamps_s.len(),
         from_s: read_s.first().copied(),

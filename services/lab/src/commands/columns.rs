@@ -154,8 +154,15 @@ fn proposal(found: &Survey) -> String {
             writeln!(out, "a recording of kort: no map is needed\n  kort diagnose {} --rig RIG", found.file);
     }
     for name in &found.proposal.shipped {
-        let _ =
-            writeln!(out, "a shipped map fits\n  kort diagnose {} --rig RIG --columns {name}", found.file);
+        let file = &found.file;
+        let _ = if found.proposal.without_response.contains(name) {
+            writeln!(
+                out,
+                "a shipped map fits, without a measured response: nothing to diagnose, but to convert or replay\n  kort convert {file} --columns {name} -o REC.csv"
+            )
+        } else {
+            writeln!(out, "a shipped map fits\n  kort diagnose {file} --rig RIG --columns {name}")
+        };
     }
     match &found.proposal.map {
         Some(map) => {
