@@ -8,6 +8,8 @@ mod browser;
 mod common;
 mod desk;
 mod load;
+mod plots;
+mod told;
 
 use std::time::Duration;
 

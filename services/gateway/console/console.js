@@ -51,6 +51,15 @@ async function call(method, path, body, quiet, leaseId = lease) {
 function askToken() {
   $("login").hidden = false;
 }
+// A link cannot carry the token: with one, the page is fetched and opened.
+async function openPage(event, link) {
+  if (!token) return;
+  event.preventDefault();
+  const answer = await fetch(link.href, { headers: { Authorization: `Bearer ${token}` } });
+  if (!answer.ok) { log(`${link.textContent}: ${answer.status}`, true); return; }
+  window.open(URL.createObjectURL(await answer.blob()), "_blank");
+}
+$("metrics").addEventListener("click", (event) => openPage(event, $("metrics")));
 const base = () => `/v1/thrusters/${encodeURIComponent(thruster)}`;
 // A click whose failure is already in the log.
 const click = (id, action) => $(id).addEventListener("click", () => action().catch(() => {}));
@@ -71,21 +80,27 @@ function connect() {
       if (next.type === "urn:kort:problem:lease-lost") lease = null;
       return;
     }
+    const first = !state;
     state = next; heard_ms = performance.now();
+    if (first) proposeInForce();
     record(state);
   };
   socket.onclose = () => setTimeout(connect, 1000);
 }
 
 function record(s) {
-  const set = s.setpoint || {}, cmd = s.commanded || {}, est = s.estimated, sides = {};
+  const set = s.setpoint || {}, cmd = s.commanded || {}, est = s.estimated, sides = {}, more = {};
   for (const [name, of] of [["thrust_n", "thrust"], ["flow_m_s", "flow"], ["ambient_m_s", "ambient"]]) { // one standard error, where the observer has one
     const doubt = est.parameters.find((p) => p.name === name)?.std_error ?? null;
     if (doubt !== null && est[name] !== null) { sides[`estimated_${of}_low`] = est[name] - doubt; sides[`estimated_${of}_high`] = est[name] + doubt; }
   }
+  for (const p of est.parameters) { // what an observer or an estimator has beside these depends on the rig and the law
+    if (!(p.name in est)) { addSignal(`estimated_${p.name}`, p.unit, `${p.name.replaceAll("_", " ")}, estimated`); more[`estimated_${p.name}`] = p.value; }
+  }
+  for (const { path, level } of s.mismatch?.paths ?? []) { addSignal(`mismatch_${path}`, LEVEL, path); more[`mismatch_${path}`] = level; }
   const before_s = live.t[live.t.length - 1];
   if (s.time_s - before_s > HOLE_S) loadHistory(before_s, s.time_s).catch(() => {});
-  live.push(s.time_s, { ...s.measured, ...cmd, ...sides, thrust_cmd_n: set.thrust_n ?? cmd.thrust_cmd_n, speed_cmd_rad_s: set.speed_rad_s ?? cmd.speed_cmd_rad_s,
+  live.push(s.time_s, { ...s.measured, ...cmd, ...sides, ...more, thrust_cmd_n: set.thrust_n ?? cmd.thrust_cmd_n, speed_cmd_rad_s: set.speed_rad_s ?? cmd.speed_cmd_rad_s,
     estimated_thrust_n: est.thrust_n, estimated_flow_m_s: est.flow_m_s, estimated_ambient_m_s: est.ambient_m_s });
 }
 
@@ -144,6 +159,7 @@ function showState(s, fresh) {
 function faultItem(fault) {
   const item = document.createElement("li"), link = document.createElement("a");
   link.href = `/v1/faults/${fault.code}`; link.target = "_blank"; link.textContent = `${fault.code} ${fault.name}`;
+  link.addEventListener("click", (event) => openPage(event, link));
   const before = fault.before && fault.before.thrust_n !== null ? `, at ${fault.before.thrust_n.toFixed(1)} N` : "";
   const when = fault.since ? `${new Date(fault.since).toLocaleString()}${before}: ` : "";
   item.append(link, document.createElement("br"), when + fault.help);
@@ -212,12 +228,19 @@ $("slider").addEventListener("input", () => { $("entry").value = $("slider").val
 $("slider").addEventListener("keydown", (event) => { if (event.key === "Enter") $("send").click(); });
 $("entry").addEventListener("input", () => { $("slider").value = $("entry").value; });
 document.querySelectorAll("input[name=kind]").forEach((radio) => radio.addEventListener("change", showKind));
+// What is in force when the page begins is what it proposes.
+function proposeInForce() {
+  const named = Object.keys(state.setpoint ?? {})[0], radio = document.querySelector(`input[name=kind][value=${named}]`);
+  if (radio) radio.checked = true;
+  showKind();
+}
 function showKind() {
   const bound = limitsOf?.[kind()] ?? 100;
   $("unit").textContent = kind() === "thrust_n" ? "N" : "rad/s";
   const step = bound > 20 ? 0.5 : 0.01, end = Math.floor(bound / step) * step; // steps count from min: zero must be one
   $("slider").min = -end; $("slider").max = end; $("slider").step = step;
-  $("slider").value = 0; $("entry").value = 0; $("entry").min = -bound; $("entry").max = bound;
+  const now = state?.setpoint?.[kind()] ?? 0;
+  $("slider").value = now; $("entry").value = now; $("entry").min = -bound; $("entry").max = bound;
 }
 
 async function loadController() {

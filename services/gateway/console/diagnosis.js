@@ -9,9 +9,11 @@ const percent = (share) => (share === null || share === undefined ? "–" : `${M
 
 // A light for each path; ten times a second with the state would be read aloud ten times.
 function showPaths(mismatch) {
+  const doubted = (mismatch?.paths ?? []).filter((path) => path.level >= 0.5);
   const words = !mismatch ? "The controller is away."
     : mismatch.alarm ? `The ${mismatch.alarm} path is off since ${new Date(Date.now() - 1000 * mismatch.since_s).toLocaleTimeString()}.`
     : mismatch.paths.some((path) => path.level === null) ? "What is usual is being learnt; it takes some minutes of driving."
+    : doubted.length ? `The ${doubted.map((path) => `${path.path} path (${Math.round(10 * path.level) * 10} %)`).join(" and the ")} may be off: at 100 % it is said to be.`
     : "The thruster agrees with its rig description.";
   says("mismatch-text", words);
   const kinds = (mismatch ? mismatch.paths : []).map((path) =>
@@ -37,14 +39,16 @@ setInterval(showDiagnosis, 200);
 async function loadDiagnosis() {
   if (!thruster || !state) return;
   const [list, rig] = [await call("GET", diagnosesOf()), await call("GET", `${base()}/rig`)];
-  found = list.length ? list[list.length - 1] : null;
+  const newest = list.at(-1) ?? null;
+  found = list.findLast((item) => item.state === "done") ?? newest; // what ended otherwise takes nothing away
   $("back").disabled = rig.before === null || isStale();
   says("rig-text", `In force: revision ${rig.number} of the rig, from ${rig.source}${rig.note ? ` (${rig.note})` : ""}.`);
   if (!found || found.state === "running") return;
-  const shown = `${found.id} ${found.state}`;
+  const ended = newest.state === "done" || newest.state === "running" ? "" : `${newest.id}: ${newest.state}${newest.cause ? `, ${newest.cause}` : ""}`;
+  const shown = `${found.id} ${found.state} ${ended}`;
   if ($("findings").dataset.shown === shown) return;
   $("findings").dataset.shown = shown;
-  says("diagnosis-text", found.state === "done" ? found.summary : `${found.id}: ${found.state}${found.cause ? `, ${found.cause}` : ""}`);
+  says("diagnosis-text", found.state !== "done" ? ended : ended ? `${ended}. ${found.id}: ${found.summary}` : found.summary);
   $("findings").replaceChildren(...found.findings.map((f) =>
     cells([f.effect.replaceAll("_", " "), f.path, f.probability.toFixed(2), percent(f.excess_error_removed), f.statement])));
   const link = Object.assign(document.createElement("a"), { href: `${diagnosesOf()}/${found.id}/report`, target: "_blank", textContent: `report of ${found.id}` });
@@ -77,15 +81,6 @@ click("overlay", async () => {
   showRun({ a: before, b: since, names: ["the minute before", `since revision ${revised.number}`], at_s: null, playing: null, difference: false });
 });
 setInterval(() => { if (!document.hidden) loadDiagnosis().catch(() => {}); }, LOOK_EVERY_MS);
-
-// A link cannot carry the token: with one, the page is fetched and opened.
-async function openPage(event, link) {
-  if (!token) return;
-  event.preventDefault();
-  const answer = await fetch(link.href, { headers: { Authorization: `Bearer ${token}` } });
-  if (!answer.ok) { log(`${link.textContent}: ${answer.status}`, true); return; }
-  window.open(URL.createObjectURL(await answer.blob()), "_blank");
-}
 
 click("diagnose", async () => {
   const recording = $("diagnosis-of").value.startsWith("recording ") ? $("diagnosis-of").value.slice(10) : null;

@@ -64,7 +64,7 @@ class Mate {
     if (this.plot.width !== width) this.plot.setSize({ width, height: 110 });
     const end_s = this.state.time_s, first = Math.max(0, lowerBound(this.live.t, end_s - FLEET_SPAN_S) - 1);
     const t = this.live.t.slice(first).map((at_s) => at_s - end_s);
-    this.plot.batch(() => { this.plot.setData([t, this.live.c.thrust_cmd_n.slice(first), this.live.c.thrust_n.slice(first)], false); this.plot.setScale("x", { min: -FLEET_SPAN_S, max: 0 }); });
+    this.plot.batch(() => { this.plot.setData([t, this.live.of("thrust_cmd_n").slice(first), this.live.of("thrust_n").slice(first)], false); this.plot.setScale("x", { min: -FLEET_SPAN_S, max: 0 }); });
     tell(this.course, null, `thrust of ${this.id} in the last minute, in N${old ? ", old" : ""}`);
   }
   redraw() { this.plot?.destroy(); this.plot = null; }

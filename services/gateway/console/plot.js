@@ -15,35 +15,47 @@ const SIGNALS = [
   ["torque_n_m", "N m", "blade torque", "--green", [], false], ["temperature_c", "°C", "motor", "--red", [], false],
   ["duty_cmd", "1", "duty, commanded", "--quiet", [], false], ["shaft_angle_rad", "rad", "shaft angle", "--blue", [], false], ["depth_m", "m", "depth", "--blue", [], false],
 ];
-const TITLES = { N: "thrust", "rad/s": "shaft speed", A: "motor current", "m/s": "axial flow", V: "voltage", "N m": "torque", "°C": "temperature", 1: "duty", rad: "angle", m: "depth" };
+const LEVEL = "1 = alarm"; // unit of the paths' levels
+const TITLES = { [LEVEL]: "mismatch", N: "thrust", "rad/s": "shaft speed", A: "motor current", "m/s": "axial flow", V: "voltage", "N m": "torque", "°C": "temperature", 1: "shares", rad: "angle", m: "depth" };
 const IDS = { N: "plot-thrust", "rad/s": "plot-speed", A: "plot-current", "m/s": "plot-flow" };
+const HUES = ["--blue", "--orange", "--green", "--purple", "--red"];
 const shownSignals = new Set(SIGNALS.filter((signal) => signal[5]).map(([name]) => name));
 
 // Columns over time. Nothing measured is null: a gap.
 class Columns {
   constructor() { this.clear(); }
-  clear() { this.t = []; this.lines = {}; this.c = Object.fromEntries(SIGNALS.map(([name]) => [name, []])); }
+  clear() { this.t = []; this.lines = {}; this.c = {}; }
+  // A column; one that was not known before has nothing in it.
+  of(name) { return (this.c[name] ??= this.t.map(() => null)); }
   push(t, row) {
     if (this.t.length && t <= this.t[this.t.length - 1]) { if (t < this.t[this.t.length - 1]) this.clear(); else return; }
-    this.t.push(t);
     const error = row.thrust_cmd_n == null || row.thrust_n == null ? null : row.thrust_cmd_n - row.thrust_n;
-    for (const name in this.c) this.c[name].push((name === "thrust_error_n" ? error : row[name]) ?? null);
+    for (const [name] of SIGNALS) this.of(name).push((name === "thrust_error_n" ? error : row[name]) ?? null);
+    this.t.push(t);
     if (this.t.length > LIVE_POINTS) { this.t.splice(0, 2000); for (const name in this.c) this.c[name].splice(0, 2000); }
   }
   // A column as it is drawn; of a recording, which grows no more, without the rows between seldom samples.
-  line(name) { return this.done ? (this.lines[name] ??= bridge(this.t, this.c[name])) : this.c[name]; }
+  line(name) { return this.done ? (this.lines[name] ??= bridge(this.t, this.of(name))) : this.of(name); }
   // The part between two instants, its time from `zero_s` on.
   cut(from_s, to_s, zero_s) {
     const part = new Columns(), a = lowerBound(this.t, from_s), b = lowerBound(this.t, to_s);
     part.t = this.t.slice(a, b).map((t) => t - zero_s);
     for (const name in this.c) part.c[name] = this.c[name].slice(a, b);
+    part.done = true;
     return part;
+  }
+  // The lines at these instants; outside the columns' own there is nothing.
+  over(times) {
+    const lines = new Columns();
+    lines.t = times;
+    for (const name in this.c) lines.c[name] = at(times, this.t, this.line(name));
+    return lines;
   }
   // Root mean square of a column between two instants; null for less than a second of it.
   rms(name, from_s = -Infinity, to_s = Infinity) {
     let sum = 0, n = 0, first = null, last = null;
     for (let i = lowerBound(this.t, from_s); i < this.t.length && this.t[i] <= to_s; i += 1) {
-      const v = this.c[name][i];
+      const v = this.of(name)[i];
       if (v === null) continue;
       sum += v * v; n += 1; first ??= this.t[i]; last = this.t[i];
     }
@@ -69,6 +81,16 @@ function bridge(t, values) {
     for (let i = a + 1; i < b; i += 1) line[i] = values[a] + (values[b] - values[a]) * (t[i] - t[a]) / (t[b] - t[a]);
   }
   return line;
+}
+// Two runs over the instants of both, and B − A.
+function side(a, b) {
+  const t = [...new Set([...a.t, ...b.t])].sort((x, y) => x - y), lines = { a: a.over(t), b: b.over(t), less: new Columns() };
+  lines.less.t = t;
+  for (const [name] of SIGNALS) {
+    const mine = lines.a.of(name);
+    lines.less.c[name] = lines.b.of(name).map((v, k) => (v === null || mine[k] === null ? null : v - mine[k]));
+  }
+  return lines;
 }
 // Values of another run at these instants, on straight lines; null outside it and beside its gaps.
 function at(times, from, values) {
@@ -108,15 +130,37 @@ function thin(t, columns, first, last, width) {
 
 class Chart {
   constructor(unit) {
-    this.unit = unit; this.title = TITLES[unit];
-    this.signals = SIGNALS.filter((signal) => signal[1] === unit);
-    this.figure = document.createElement("figure");
-    this.box = Object.assign(document.createElement("div"), { id: IDS[unit] ?? `plot-${this.title}` });
+    this.unit = unit; this.title = TITLES[unit] ?? "estimated";
+    this.signals = signalsOf(unit);
+    this.figure = Object.assign(document.createElement("figure"), { tabIndex: 0, ariaLabel: `${this.title} in ${unit}: arrows move the cursor, + and − zoom, Home shows the whole window` });
+    this.figure.setAttribute("role", "group");
+    this.figure.addEventListener("keydown", (event) => this.key(event));
+    this.box = Object.assign(document.createElement("div"), { id: IDS[unit] ?? `plot-${TITLES[unit] ?? unit.replace(/\W+/g, "-")}` });
     this.box.setAttribute("role", "img"); this.box.setAttribute("aria-label", this.title);
     this.figure.append(this.box);
     new ResizeObserver(() => this.fit()).observe(this.figure);
   }
   fit() { const width = this.figure.clientWidth - 16; if (this.plot && width > 0 && width !== this.plot.width) this.plot.setSize({ width, height: 210 }); }
+  // As a mouse would: what is under the cursor is told, in every chart and in words.
+  key(event) {
+    const steps = { ArrowLeft: -1, ArrowRight: 1 }[event.key], closer = { "+": 0.5, "=": 0.5, "-": 2, "−": 2 }[event.key];
+    if (event.ctrlKey || event.metaKey || event.altKey || !this.plot) return;
+    if (steps) {
+      const width = this.plot.over.clientWidth, now = this.plot.cursor.left >= 0 ? this.plot.cursor.left : width;
+      const left = Math.max(0, Math.min(width, now + steps * width / (event.shiftKey ? 10 : 100)));
+      this.plot.setCursor({ left, top: this.plot.over.clientHeight / 2 }, true, true);
+      const { idx } = this.plot.cursor;
+      const said = this.plot.series.flatMap((series, k) => (series.show && k > 0 ? [`${series.label} ${text(this.plot.data[k][idx], 2)}`] : []));
+      says("cursor-text", `${text(this.plot.data[0][idx], 2)} s: ${said.join(", ")} ${this.unit}`);
+    } else if (closer) {
+      const { min, max } = this.plot.scales.x, { left } = this.plot.cursor, from = left >= 0 ? this.plot.posToVal(left, "x") : (min + max) / 2;
+      const [, whole_from, whole_to] = wholeNow(), [low, high] = [from - (from - min) * closer, from + (max - from) * closer];
+      if (high - low >= whole_to - whole_from) zoomTo(null, null); else zoomTo(low, high);
+    } else if (event.key === "Home" || event.key === "0") {
+      zoomTo(null, null);
+    } else { return; }
+    event.preventDefault();
+  }
   // Series: each signal of run A and of run B; what is compared is dashed.
   build() {
     const css = getComputedStyle(document.documentElement), color = (name) => css.getPropertyValue(name).trim();
@@ -157,7 +201,7 @@ class Chart {
     this.figure.hidden = names.length === 0;
     if (this.figure.hidden) return;
     if (!this.plot) this.build();
-    const { a, b, difference } = source, both = Boolean(b);
+    const { a, b, difference } = source, both = Boolean(b), second = difference ? source.less : b;
     const shown = `${names}|${both}|${difference}`;
     if (this.shown !== shown) {
       this.signals.forEach(([name, , label], i) => {
@@ -173,14 +217,10 @@ class Chart {
       this.shown = shown;
     }
     const first = Math.max(0, lowerBound(a.t, from_s) - 1), last = lowerBound(a.t, to_s) + 1;
-    const [t, drawn] = thin(a.t, names.map((name) => a.line(name)), first, last, both ? Infinity : this.plot.width);
-    const mine = this.signals.map(([name]) => (shownSignals.has(name) ? drawn[names.indexOf(name)] : []));
-    const theirs = this.signals.map(([name], i) => {
-      if (!both || !shownSignals.has(name)) return [];
-      const other = at(t, b.t, b.line(name));
-      return difference ? other.map((v, k) => (v === null || mine[i][k] === null ? null : v - mine[i][k])) : other;
-    });
-    this.last = this.signals.map(([name]) => a.c[name][Math.min(last, a.t.length) - 1] ?? null);
+    const [t, drawn] = thin(a.t, [a, ...(both ? [second] : [])].flatMap((of) => names.map((name) => of.line(name))), first, last, this.plot.width);
+    const series = (from) => this.signals.map(([name]) => (shownSignals.has(name) ? drawn[from + names.indexOf(name)] : []));
+    const mine = series(0), theirs = both ? series(names.length) : this.signals.map(() => []);
+    this.last = this.signals.map(([name]) => a.of(name)[Math.min(last, a.t.length) - 1] ?? null);
     const pad = (columns) => columns.map((values) => (values.length ? values : t.map(() => null)));
     this.plot.batch(() => {
       this.plot.setData([t, ...pad(mine), ...pad(theirs)], false);
@@ -195,7 +235,18 @@ class Chart {
     this.box.setAttribute("aria-label", `${this.title} in ${this.unit}: ${says.map(([, label, v]) => `${label} ${v === null ? "not measured" : v.toFixed(1)}`).join(", ")}`);
   }
 }
-const charts = Object.keys(TITLES).sort((x, y) => SIGNALS.findIndex((s) => s[1] === x) - SIGNALS.findIndex((s) => s[1] === y)).map((unit) => new Chart(unit));
+const signalsOf = (unit) => SIGNALS.filter((signal) => signal[1] === unit);
+const charts = [...new Set(SIGNALS.map((signal) => signal[1]))].map((unit) => new Chart(unit));
+// A signal that only the stream tells of: it gets its chart, and its place in the picker.
+const known = new Set(SIGNALS.map(([name]) => name));
+function addSignal(name, unit, label) {
+  if (known.has(name)) return;
+  known.add(name);
+  SIGNALS.push([name, unit, label, HUES[signalsOf(unit).length % HUES.length], [6, 3], false]);
+  const chart = charts.find((one) => one.unit === unit);
+  if (chart) { chart.signals = signalsOf(unit); if (chart.plot) chart.build(); } else charts.push(new Chart(unit));
+  showPicker();
+}
 const live = new Columns();
 let zoomed = null; // [from_s, to_s], or none: the usual window
 function zoomTo(from_s, to_s) {
@@ -209,33 +260,44 @@ function save(name, blob) {
   Object.assign(document.createElement("a"), { href: url, download: name }).click();
   setTimeout(() => URL.revokeObjectURL(url), 1000);
 }
-function tableOf(source, from_s, to_s) {
-  const names = SIGNALS.map(([name]) => name).filter((name) => shownSignals.has(name)), { a, b } = source;
-  const others = b ? names.map((name) => at(a.t, b.t, b.line(name))) : [];
-  const rows = [["time_s", ...names, ...(b ? names.map((name) => `b_${name}`) : [])].join(",")];
+function tableOf({ a, b, difference, less }, from_s, to_s) {
+  const names = SIGNALS.map(([name]) => name).filter((name) => shownSignals.has(name));
+  const parts = [["", a], ...(b ? [["b_", b]] : []), ...(difference ? [["difference_", less]] : [])];
+  const rows = [["time_s", ...parts.flatMap(([before]) => names.map((name) => `${before}${name}`))].join(",")];
   for (let i = lowerBound(a.t, from_s); i < a.t.length && a.t[i] <= to_s; i += 1) {
-    rows.push([a.t[i], ...names.map((name) => a.c[name][i]), ...others.map((values) => values[i])].map((v) => v ?? "").join(","));
+    rows.push([a.t[i], ...parts.flatMap(([, of]) => names.map((name) => of.of(name)[i]))].map((v) => v ?? "").join(","));
   }
   return `${rows.join("\n")}\n`;
 }
+// Words one after the other in lines of this width: [words, hue, left, line].
+function inLines(pen, words, width, edge, gap) {
+  let left = edge, line = 0;
+  return words.map(([said, hue]) => {
+    const wide = pen.measureText(said).width;
+    if (left > edge && left + wide > width - edge) { left = edge; line += 1; }
+    const placed = [said, hue, left, line];
+    left += wide + gap;
+    return placed;
+  });
+}
 function pictureOf({ b, difference }) {
-  const of = !b ? "" : difference ? ", B − A" : ", B dashed";
-  const drawn = charts.filter((chart) => !chart.figure.hidden && chart.plot), scale = window.devicePixelRatio || 1;
-  const width = Math.max(...drawn.map((chart) => chart.plot.ctx.canvas.width)), line = 24 * scale;
-  const sheet = Object.assign(document.createElement("canvas"), { width, height: drawn.reduce((sum, chart) => sum + chart.plot.ctx.canvas.height + line, 0) });
-  const pen = sheet.getContext("2d"), css = getComputedStyle(document.documentElement);
-  pen.fillStyle = css.getPropertyValue("--card"); pen.fillRect(0, 0, width, sheet.height);
+  const of = !b ? "" : difference ? ", B − A" : ", B dashed", scale = window.devicePixelRatio || 1, line = 20 * scale;
+  const sheet = document.createElement("canvas"), pen = sheet.getContext("2d"), css = getComputedStyle(document.documentElement);
+  const font = `${13 * scale}px system-ui, sans-serif`, shown = charts.filter((chart) => !chart.figure.hidden && chart.plot);
+  pen.font = font;
+  const parts = shown.map((chart) => {
+    const { canvas } = chart.plot.ctx, signals = chart.signals.filter((signal) => shownSignals.has(signal[0]));
+    const words = inLines(pen, [[`${chart.title} [${chart.unit}]${of}`, "--ink"], ...signals.map(([, , label, hue]) => [label, hue])], canvas.width, 6 * scale, 12 * scale);
+    return { canvas, words, above: (words.at(-1)[3] + 1) * line + 4 * scale };
+  });
+  sheet.width = Math.max(...parts.map((part) => part.canvas.width)); sheet.height = parts.reduce((sum, part) => sum + part.above + part.canvas.height, 0);
+  pen.fillStyle = css.getPropertyValue("--card"); pen.fillRect(0, 0, sheet.width, sheet.height);
+  pen.font = font; // a canvas that is sized begins anew
   let top = 0;
-  for (const chart of drawn) {
-    let left = 6 * scale;
-    pen.font = `${13 * scale}px system-ui, sans-serif`; pen.fillStyle = css.getPropertyValue("--ink");
-    const title = `${chart.title} [${chart.unit}]${of}`;
-    pen.fillText(title, left, top + 16 * scale); left += pen.measureText(`${title}   `).width;
-    for (const [name, , label, hue] of chart.signals.filter((signal) => shownSignals.has(signal[0]))) {
-      pen.fillStyle = css.getPropertyValue(hue); pen.fillText(label, left, top + 16 * scale); left += pen.measureText(`${label}   `).width;
-    }
-    pen.drawImage(chart.plot.ctx.canvas, 0, top + line);
-    top += chart.plot.ctx.canvas.height + line;
+  for (const { canvas, words, above } of parts) {
+    for (const [said, hue, left, row] of words) { pen.fillStyle = css.getPropertyValue(hue); pen.fillText(said, left, top + row * line + 16 * scale); }
+    pen.drawImage(canvas, 0, top + above);
+    top += above + canvas.height;
   }
   return new Promise((done) => sheet.toBlob(done, "image/png"));
 }

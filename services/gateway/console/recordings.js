@@ -1,6 +1,6 @@
 "use strict";
 // Recordings over the plots: one played back, or two compared; live again at a click.
-let run = null; // { a, b, names, at_s, playing, difference }
+let run = null; // { a, b, names, at_s, playing, difference }, of two runs also what is drawn of them: { lines }
 
 async function fetchRun(name) {
   const answer = await fetch(`/v1/recordings/${encodeURIComponent(name)}?format=csv`, { headers: token ? { Authorization: `Bearer ${token}` } : {} });
@@ -19,15 +19,15 @@ async function fetchRun(name) {
   columns.done = true;
   return columns;
 }
-const lengthOf = (columns) => columns.t[columns.t.length - 1] ?? 0;
+const lengthOf = (columns) => columns?.t.at(-1) ?? 0, endOf = ({ a, b }) => Math.max(lengthOf(a), lengthOf(b));
 function showRun(next) {
-  run = next; zoomTo(null, null);
+  run = next && { ...next, lines: next.b && side(next.a, next.b) }; zoomTo(null, null);
   $("run").hidden = !run;
   document.body.classList.toggle("past", Boolean(run));
   if (!run) return;
   const told = (columns, name) => { const error = columns.rms("thrust_error_n"); return `${name} (${lengthOf(columns).toFixed(1)} s${error === null ? "" : `, thrust error ${error.toFixed(2)} N rms`})`; };
   says("run-text", run.b ? `A: ${told(run.a, run.names[0])} · B, dashed: ${told(run.b, run.names[1])}` : `Not live: ${told(run.a, run.names[0])}`);
-  $("run-at").max = lengthOf(run.a); $("run-at").value = 0; $("difference").checked = false;
+  $("run-at").max = endOf(run); $("run-at").value = 0; $("difference").checked = false;
   $("difference").parentElement.hidden = !run.b; $("run-play").textContent = "Play";
 }
 async function replay(name) { showRun({ a: await fetchRun(name), b: null, names: [name], at_s: null, playing: null, difference: false }); }
@@ -35,25 +35,29 @@ async function compare(name) {
   if (!run) { log("show a recording first, then compare another with it", true); return; }
   showRun({ ...run, b: await fetchRun(name), names: [run.names[0], name], at_s: null, playing: null, difference: false });
 }
-// What the plots show now, and between which instants.
-function shownNow() {
+// What the plots show now, and between which instants if nothing is zoomed.
+function wholeNow() {
   const span_s = Number($("span").value);
   if (!run) {
     const end_s = paused_s ?? (state ? state.time_s + (isStale() ? 0 : Math.min(0.2, (performance.now() - heard_ms) / 1000)) : 0);
-    return [{ a: live, b: null, difference: false }, ...(zoomed ?? [end_s - span_s, end_s])];
+    return [{ a: live, b: null, difference: false }, end_s - span_s, end_s];
   }
   if (run.playing) {
-    run.at_s = Math.min(lengthOf(run.a), run.playing.from_s + (performance.now() - run.playing.at_ms) / 1000 * Number($("run-speed").value));
+    run.at_s = Math.min(endOf(run), run.playing.from_s + (performance.now() - run.playing.at_ms) / 1000 * Number($("run-speed").value));
     $("run-at").value = run.at_s;
-    if (run.at_s >= lengthOf(run.a)) stopRun();
+    if (run.at_s >= endOf(run)) stopRun();
   }
-  const window_s = run.at_s === null ? [0, Math.max(lengthOf(run.a), run.b ? lengthOf(run.b) : 0, 0.1)] : [run.at_s - span_s, run.at_s];
-  return [run, ...(zoomed ?? window_s)];
+  const window_s = run.at_s === null ? [0, Math.max(endOf(run), 0.1)] : [run.at_s - span_s, run.at_s];
+  return [{ ...run, ...run.lines }, ...window_s];
+}
+function shownNow() {
+  const [source, ...whole_s] = wholeNow();
+  return [source, ...(zoomed ?? whole_s)];
 }
 function stopRun() { run.playing = null; $("run-play").textContent = "Play"; }
 $("run-play").addEventListener("click", () => {
   if (run.playing) { stopRun(); return; }
-  const from_s = run.at_s === null || run.at_s >= lengthOf(run.a) ? 0 : run.at_s;
+  const from_s = run.at_s === null || run.at_s >= endOf(run) ? 0 : run.at_s;
   zoomTo(null, null);
   run.playing = { from_s, at_ms: performance.now() }; $("run-play").textContent = "Halt";
 });
@@ -68,18 +72,21 @@ $("zoom-out").addEventListener("click", () => zoomTo(null, null));
 $("fix-y").addEventListener("change", () => charts.forEach((chart) => chart.fix($("fix-y").checked)));
 $("save-csv").addEventListener("click", () => { const [source, from_s, to_s] = shownNow(); save(`${thruster}-plots.csv`, new Blob([tableOf(source, from_s, to_s)], { type: "text/csv" })); });
 $("save-png").addEventListener("click", async () => save(`${thruster}-plots.png`, await pictureOf(shownNow()[0])));
-document.querySelector(".plots").replaceChildren(...charts.map((chart) => chart.figure));
-$("signals").replaceChildren(...charts.map((chart) => {
-  const group = document.createElement("fieldset"), legend = document.createElement("legend");
-  legend.textContent = `${chart.title} [${chart.unit}]`;
-  group.append(legend, ...chart.signals.map(([name, , words]) => {
-    const label = document.createElement("label"), box = Object.assign(document.createElement("input"), { type: "checkbox", checked: shownSignals.has(name), id: `show-${name}` });
-    box.addEventListener("change", () => { if (box.checked) shownSignals.add(name); else shownSignals.delete(name); });
-    label.append(box, ` ${words}`);
-    return label;
+function showPicker() {
+  document.querySelector(".plots").append(...charts.map((chart) => chart.figure).filter((figure) => !figure.isConnected));
+  $("signals").replaceChildren(...charts.map((chart) => {
+    const group = document.createElement("fieldset"), legend = document.createElement("legend");
+    legend.textContent = `${chart.title} [${chart.unit}]`;
+    group.append(legend, ...chart.signals.map(([name, , words]) => {
+      const label = document.createElement("label"), box = Object.assign(document.createElement("input"), { type: "checkbox", checked: shownSignals.has(name), id: `show-${name}` });
+      box.addEventListener("change", () => { if (box.checked) shownSignals.add(name); else shownSignals.delete(name); });
+      label.append(box, ` ${words}`);
+      return label;
+    }));
+    return group;
   }));
-  return group;
-}));
+}
+showPicker();
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { charts.forEach((chart) => { if (chart.plot) chart.build(); }); preview(); });
 
 // What the gateway has kept: with it the plots begin, and a hole that a lost connection left is filled.
@@ -90,6 +97,7 @@ async function loadHistory(from_s, to_s) {
   const until_s = to_s ?? live.t[0] ?? Infinity;
   kept.time_s.forEach((t, i) => { if (t > (from_s ?? -Infinity) && t < until_s) part.push(t, Object.fromEntries(names.map((name) => [name, kept.columns[name][i]]))); });
   const place = lowerBound(live.t, until_s);
+  for (const name in part.c) live.of(name);
   live.t.splice(place, 0, ...part.t);
-  for (const name in live.c) live.c[name].splice(place, 0, ...part.c[name]);
+  for (const name in live.c) live.c[name].splice(place, 0, ...part.of(name));
 }

@@ -31,18 +31,19 @@ function showFields() {
 function asked() {
   const kind = $("signal-kind").value, limit = $("signal-limit").value === "" ? {} : { limit: Number($("signal-limit").value) };
   if (kind === "file") return scenarioText === null ? null : { toml: scenarioText, ...limit };
-  if (kind === "experiment") return found ? { diagnosis: found.id, ...limit } : null;
+  if (kind === "experiment") return proposed ? { diagnosis: proposed, ...limit } : null;
   const values = Object.fromEntries(Object.keys(KINDS[kind][1]).map((name) => [name, Number($(`signal-${name}`).value)]));
   return { command: $("signal-of").value, segments: KINDS[kind][2]?.(values) ?? [{ kind, ...values }], ...limit };
 }
 let waiting = null;
-function preview() { clearTimeout(waiting); waiting = setTimeout(() => showPreview().catch(() => {}), 250); }
+// Until its course is shown nothing is played.
+function preview() { $("play").dataset.ready = ""; clearTimeout(waiting); waiting = setTimeout(() => showPreview().catch(() => {}), 250); }
 async function showPreview() {
   const body = asked(), mine = ++previewed;
   if (!limitsOf) return; // showFields asks again once they are there
-  if (!body || !thruster) { says("signal-text", $("signal-kind").value === "file" ? "Choose a scenario file." : "There is no diagnosis that proposes an experiment."); return; }
+  if (!body || !thruster) { noSignal("quiet", $("signal-kind").value === "file" ? "Choose a scenario file." : "There is no diagnosis that proposes an experiment."); return; }
   let would;
-  try { would = await call("POST", `${base()}/excitation?dry_run=true`, body, true); } catch (error) { if (mine === previewed) { signalRefused(error.message); } return; }
+  try { would = await call("POST", `${base()}/excitation?dry_run=true`, body, true); } catch (error) { if (mine === previewed) noSignal("warn-text", error.message); return; }
   if (mine !== previewed) return;
   const unit = would.command === "thrust_n" ? "N" : "rad/s";
   says("signal-text", `${would.name}: ${would.duration_s.toFixed(1)} s, up to ${would.peak.toFixed(1)} ${unit}, limit ${would.limit} ${unit}.${would.left_out.length ? ` The thruster brings its own ${would.left_out.join(", ")}.` : ""}`);
@@ -56,7 +57,11 @@ async function showPreview() {
     [would.preview.map(([t]) => t), would.preview.map(([, v]) => v)], $("signal-plot"));
   $("signal-plot").setAttribute("aria-label", `course of the signal: ${would.name}, ${would.duration_s.toFixed(1)} s, up to ${would.peak.toFixed(1)} ${unit}`);
 }
-function signalRefused(words) { $("play").dataset.ready = ""; $("signal-text").className = "warn-text"; says("signal-text", words); }
+function noSignal(kind, words) {
+  previewPlot?.destroy(); previewPlot = null;
+  $("signal-plot").setAttribute("aria-label", "no course to show");
+  $("signal-text").className = kind; says("signal-text", words);
+}
 
 async function play(body) {
   const begun = await call("POST", `${base()}/excitation`, body);

@@ -1,0 +1,133 @@
+//! The plots: by keyboard, of two runs of unequal length, as a table and a picture, and every signal that the stream holds.
+
+use serde_json::{Value, json};
+
+use crate::browser::Browser;
+use crate::common::{self, Stack};
+use crate::text_is;
+
+/// Opened, and live.
+fn open(stack: &Stack) -> Option<Browser> {
+    let mut page = Browser::open(&format!("http://127.0.0.1:{}/", stack.site.port))?;
+    page.until("document.readyState === 'complete' && typeof state !== 'undefined' && state !== null");
+    page.until(&text_is("link", "live"));
+    page.until("charts[0].plot !== null && charts[0].plot !== undefined && live.t.length > 50");
+    Some(page)
+}
+
+fn press(page: &mut Browser, key: &str) {
+    for kind in ["keyDown", "keyUp"] {
+        page.call("Input.dispatchKeyEvent", json!({"type": kind, "key": key}));
+    }
+}
+
+/// Two runs as a recording gives them: A of 7.1 s, B of 13 s, 20 N more.
+const RUNS: &str = "(() => {
+  const made = (end_s, step_s, more) => { const c = new Columns(); for (let t = 0; t <= end_s + 1e-9; t += step_s) c.push(t, { thrust_n: more + t, thrust_cmd_n: more, shaft_speed_rad_s: 10 * more }); c.done = true; return c; };
+  showRun({ a: made(7.1, 0.05, 10), b: made(13, 0.04, 30), names: ['first', 'second'], at_s: null, playing: null, difference: false });
+})()";
+
+fn table(page: &mut Browser) -> (Vec<String>, Vec<Vec<Option<f64>>>) {
+    let text = page.eval("tableOf(...shownNow())").as_str().unwrap().to_owned();
+    let mut lines = text.lines().map(|line| line.split(',').map(str::to_owned).collect::<Vec<_>>());
+    let head = lines.next().unwrap();
+    (head, lines.map(|cells| cells.iter().map(|cell| cell.parse().ok()).collect()).collect())
+}
+
+#[test]
+fn plots_go_by_keyboard_to_the_end_of_both_runs_and_are_saved_whole() {
+    common::in_real_time(|| {
+        let stack = Stack::start();
+        let Some(mut page) = open(&stack) else { return };
+        let reached = page.eval("[...document.querySelectorAll('.plots [tabindex=\"0\"]')].filter((e) => e.checkVisibility() && e.ariaLabel.includes('arrows')).length");
+        assert_eq!(reached, json!(4), "every chart that is shown takes the keyboard, and says what it does");
+        page.eval("charts[0].figure.focus()");
+        press(&mut page, "ArrowLeft");
+        press(&mut page, "ArrowLeft");
+        page.until(
+            "charts[1].plot.cursor.left > 0 && charts[1].plot.cursor.left < charts[1].plot.over.clientWidth",
+        );
+        page.until("/^[0-9.]+ s: commanded .*measured .* N$/.test($('cursor-text').textContent)");
+        let span = "zoomed === null ? null : zoomed[1] - zoomed[0]";
+        press(&mut page, "+");
+        assert!((page.eval(span).as_f64().unwrap() - 15.0).abs() < 1e-6, "half of 30 s");
+        press(&mut page, "-");
+        assert_eq!(page.eval(span), Value::Null, "the whole window again");
+        press(&mut page, "+");
+        press(&mut page, "Home");
+        assert_eq!(page.eval(span), Value::Null);
+
+        page.eval(RUNS);
+        page.until("charts[0].shown.endsWith('true|false') && charts[0].plot.data[0].at(-1) > 12.9");
+        let b = "charts[0].plot.data[1 + charts[0].signals.length + charts[0].signals.findIndex((s) => s[0] === 'thrust_n')]";
+        assert!(page.eval(&format!("{b}.at(-1)")).as_f64().unwrap() > 42.0, "B goes on behind the end of A");
+        let (head, rows) = table(&mut page);
+        let at = |name: &str| head.iter().position(|one| one == name).unwrap_or_else(|| panic!("{head:?}"));
+        assert!(!head.iter().any(|name| name.starts_with("difference_")));
+        let last = rows.last().unwrap();
+        assert!(last[0].unwrap() > 12.9 && last[at("thrust_n")].is_none(), "{last:?}");
+        assert!(last[at("b_thrust_n")].unwrap() > 42.0, "{last:?}");
+        page.eval("$('difference').click()");
+        page.until("charts[0].shown.endsWith('true|true')");
+        let (head, rows) = table(&mut page);
+        let at = head.iter().position(|name| name == "difference_thrust_n").unwrap();
+        let less: Vec<f64> = rows.iter().filter_map(|row| row[at]).collect();
+        assert!(
+            less.len() > 200 && less.iter().all(|newton| (newton - 20.0).abs() < 1e-9),
+            "B is 20 N above A"
+        );
+
+        // In a picture as narrow as a phone every word of the legend stands within it.
+        page.eval("SIGNALS.filter((s) => s[1] === 'N' || s[1] === 'm/s').forEach(([name]) => shownSignals.add(name))");
+        page.show_as("light", 390);
+        let outside = "(() => { const pen = document.createElement('canvas').getContext('2d'); pen.font = '13px system-ui, sans-serif'; \
+            const words = charts.find((c) => c.unit === 'm/s').signals.map(([, , label]) => [label, '--ink']), placed = inLines(pen, words, 350, 6, 12); \
+            return [placed.at(-1)[3], placed.filter(([said, , left]) => left + pen.measureText(said).width > 344).length]; })()";
+        let told = page.eval(outside);
+        assert!(told[0].as_u64().unwrap() >= 1 && told[1] == json!(0), "lines, and words outside: {told}");
+        page.eval("pictureOf(shownNow()[0]).then((blob) => { const r = new FileReader(); r.onload = () => { window.pictured = r.result; }; r.readAsDataURL(blob); }); 0");
+        page.until("window.pictured !== undefined");
+        page.eval("(() => { const saved = new Image(); saved.src = window.pictured; document.body.prepend(saved); })()");
+        page.picture(concat!(env!("CARGO_MANIFEST_DIR"), "/target/console-saved-390.png"));
+        assert_eq!(page.errors, Vec::<String>::new());
+    });
+}
+
+#[test]
+fn every_signal_of_the_stream_can_be_plotted() {
+    common::in_real_time(|| {
+        let stack = Stack::start();
+        let Some(mut page) = open(&stack) else { return };
+        page.until("state.estimated.parameters.length > 0 && state.mismatch !== null");
+        let missing = page.eval(
+            "[...state.estimated.parameters.map((p) => `estimated_${p.name}`), ...state.mismatch.paths.map((p) => `mismatch_${p.path}`)]\
+             .filter((name) => !$(`show-${name}`) && !(name.slice(10) in state.estimated))",
+        );
+        assert_eq!(missing, json!([]));
+        let name = page.eval(
+            "state.estimated.parameters.find((p) => !(p.name in state.estimated) && p.value !== null).name",
+        );
+        let name = name.as_str().unwrap();
+        page.eval(&format!("$('show-estimated_{name}').click(); $('show-mismatch_shaft').click()"));
+        let chart = "charts.find((c) => c.signals.some((s) => s[0] === SHOWN))";
+        for (shown, of) in [
+            (format!("estimated_{name}"), "state.estimated.parameters"),
+            ("mismatch_shaft".into(), "state.mismatch.paths"),
+        ] {
+            let chart = chart.replace("SHOWN", &format!("'{shown}'"));
+            page.until(&format!(
+                "{chart}.plot !== undefined && !{chart}.figure.hidden && {chart}.figure.isConnected"
+            ));
+            let line = format!("{chart}.plot.data[1 + {chart}.signals.findIndex((s) => s[0] === '{shown}')]");
+            page.until(&format!("{line}.length === {chart}.plot.data[0].length && ({of}.every((p) => (p.value ?? p.level) === null) || {line}.some((v) => v !== null))"));
+        }
+        for (theme, width) in [("light", 1280), ("dark", 390)] {
+            page.show_as(theme, width);
+            page.picture(&format!(
+                "{}/target/console-signals-{theme}-{width}.png",
+                env!("CARGO_MANIFEST_DIR")
+            ));
+        }
+        assert_eq!(page.errors, Vec::<String>::new());
+    });
+}

@@ -1,0 +1,123 @@
+//! What the page says is so: of a signal that is not there, of path lights, of diagnoses, of a setpoint after a reload, of links.
+
+use serde_json::{Value, json};
+
+use crate::browser::Browser;
+use crate::common::{self, Site, Stack, wait};
+use crate::text_is;
+
+#[test]
+fn nothing_is_offered_or_shown_that_is_not_so() {
+    common::in_real_time(|| {
+        let stack = Stack::start();
+        let Some(mut page) = Browser::open(&format!("http://127.0.0.1:{}/", stack.site.port)) else { return };
+        page.until("document.readyState === 'complete' && typeof state !== 'undefined' && state !== null");
+        page.until(&text_is("link", "live"));
+        page.until(&text_is("signal-text", "staircase: 14.0 s"));
+        page.eval("lease_ttl_ms = 60000");
+        page.click("take");
+        page.until(&text_is("lease-text", "You have the lease"));
+        page.click("arm");
+        page.until("state.armed && !$('play').disabled");
+        // A file that is not chosen yet, an experiment that nobody proposes, a signal that is refused: no course, no Play.
+        let choose = |page: &mut Browser, kind: &str| {
+            page.eval(&format!(
+                "$('signal-kind').value = '{kind}'; $('signal-kind').dispatchEvent(new Event('change'))"
+            ));
+        };
+        for (kind, words) in
+            [("file", "Choose a scenario file"), ("experiment", "no diagnosis that proposes")]
+        {
+            choose(&mut page, "staircase");
+            page.until(
+                "!$('play').disabled && document.querySelectorAll('#signal-plot canvas').length === 1",
+            );
+            choose(&mut page, kind);
+            page.until(&text_is("signal-text", words));
+            page.until("$('play').disabled && document.querySelectorAll('#signal-plot canvas').length === 0");
+        }
+
+        // A chip that is orange has its words.
+        let told = |page: &mut Browser, level: Value, alarm: Value| -> String {
+            let mismatch = json!({"alarm": alarm, "since_s": 3.0, "paths": [{"path": "drive", "level": 0.0}, {"path": "shaft", "level": level}]});
+            let chip = "$('paths').children[1].className";
+            page.eval(&format!("(showPaths({mismatch}), $('mismatch-text').textContent + ' ' + {chip})"))
+                .as_str()
+                .unwrap()
+                .to_owned()
+        };
+        let orange = told(&mut page, json!(0.72), Value::Null);
+        assert!(orange.contains("shaft path (70 %) may be off") && orange.contains("warn"), "{orange}");
+        assert!(told(&mut page, json!(0.2), Value::Null).contains("agrees with its rig"));
+        assert!(told(&mut page, json!(1.2), json!("shaft")).contains("The shaft path is off since"));
+
+        // A diagnosis that was cancelled takes nothing away from the one before.
+        let list = json!([
+            {"id": "d1", "state": "done", "summary": "Rotational flow is missing.", "findings": [], "usable": false, "rig_revision": 1},
+            {"id": "d2", "state": "cancelled", "cause": null, "findings": []},
+        ]);
+        page.eval(&format!("(() => {{ const real = call; call = (method, path, ...rest) => path === diagnosesOf() ? Promise.resolve({list}) : path.endsWith('/d1') ? Promise.resolve({{ report: null }}) : real(method, path, ...rest); loadDiagnosis(); }})()"));
+        page.until(&text_is("diagnosis-text", "Rotational flow is missing."));
+        page.until(&text_is("diagnosis-text", "d2: cancelled"));
+        assert_eq!(page.eval("found.id"), "d1");
+        page.until("document.querySelector('#report a').textContent === 'report of d1'");
+        // On a phone its words have the page's width.
+        let statement = "The wake turns with the propeller: the blades meet less than the shaft's own speed, and lose lift with it.";
+        page.eval(&format!("$('findings').replaceChildren(cells(['rotational flow', 'blade', '0.97', '85 %', {statement:?}]))"));
+        page.show_as("light", 390);
+        let wide =
+            page.eval("document.querySelector('#findings td:last-child').clientWidth").as_u64().unwrap();
+        assert!(wide > 280, "{wide} px");
+        page.picture(concat!(env!("CARGO_MANIFEST_DIR"), "/target/console-findings-390.png"));
+
+        page.eval("$('entry').value = 60");
+        page.click("send");
+        page.until("state.setpoint.thrust_n === 60");
+        page.call("Page.reload", json!({}));
+        page.until("document.readyState === 'complete' && typeof state !== 'undefined' && state !== null && limitsOf !== null");
+        page.until("Number($('entry').value) === 60 && Number($('slider').value) === 60");
+        assert_eq!(page.errors, Vec::<String>::new());
+    });
+}
+
+/// Where tokens are asked for no link opens a refusal: what is behind it is fetched with the token, and opened.
+#[test]
+fn links_carry_the_token() {
+    common::in_real_time(|| {
+        let site = Site::new();
+        site.add("[gateway]", "require_tokens = true");
+        let mut command = std::process::Command::new(common::KORT);
+        command.args(["token", "new", "bridge", "--role", "viewer", "--config"]).arg(site.config());
+        let made = common::run(command.current_dir(site.folder.path()));
+        let token = String::from_utf8(made.stdout).unwrap().trim().to_owned();
+        let mut supervisor = site.spawn("up");
+        let home = format!("http://127.0.0.1:{}", site.port);
+        wait("the gateway", || {
+            let asked =
+                ureq::get(format!("{home}/readyz")).header("Authorization", format!("Bearer {token}")).call();
+            asked.is_ok().then_some(())
+        });
+        if let Some(mut page) = Browser::open(&format!("{home}/")) {
+            page.until("document.readyState === 'complete' && !document.getElementById('login').hidden");
+            page.eval(&format!("$('token').value = {token:?}; $('login').requestSubmit()"));
+            page.until(
+                "document.readyState === 'complete' && typeof state !== 'undefined' && state !== null",
+            );
+            page.eval("window.opened = []; window.open = (address) => opened.push(address); URL.createObjectURL = (blob) => { blob.text().then((text) => { window.got = text; }); return 'blob:'; }");
+            for (link, words) in [
+                ("$('metrics')", "kort_"),
+                (
+                    "(document.body.append(faultItem({ code: 4, name: 'command_timeout', help: '' })), document.querySelector('body > li a'))",
+                    "command",
+                ),
+            ] {
+                page.eval(&format!("window.got = ''; {link}.click(); 0"));
+                page.until(&format!("window.got.includes({words:?})"));
+                assert_eq!(page.eval("window.got.includes('token-required')"), json!(false));
+            }
+            assert_eq!(page.eval("opened.length"), json!(2));
+        }
+        common::kill(supervisor.id(), "TERM");
+        supervisor.wait().unwrap();
+    });
+}
