@@ -45,7 +45,9 @@ impl Stage for Direction {
         if self.pulse.is_none() {
             let sure = (0..3).all(|k| !facts.measures(WITNESSES[k]) || facts.sign_of(k) != 0.0);
             if sure && self.pulses >= 2 || seen.path_rad > WAY_RAD || self.pulses >= PULSES {
-                return verdict(facts);
+                contradiction(facts)?;
+                self.leave_out(seen, facts);
+                return Ok(Step::Done);
             }
             let side = if self.pulses.is_multiple_of(2) { 1.0 } else { -1.0 };
             // Twice what moved it first, and twice again every other pulse.
@@ -71,8 +73,25 @@ impl Stage for Direction {
     }
 }
 
+impl Direction {
+    /// Notes what gave no sure answer.
+    fn leave_out(&self, seen: &Seen, facts: &mut Facts) {
+        let why = if self.pulses == 0 {
+            format!("no pulse was given, for the shaft had turned by {:.2} rad already", seen.path_rad)
+        } else {
+            "no answer within half a turn".to_owned()
+        };
+        for (k, signal) in WITNESSES.iter().enumerate() {
+            if facts.measures(signal) && facts.sign_of(k) == 0.0 {
+                let words = format!("{signal}: {why}; the first level of the working range tells");
+                facts.left_out.push(("direction", words));
+            }
+        }
+    }
+}
+
 /// Who is wrong, if anybody.
-fn verdict(facts: &mut Facts) -> Result<Step, Stop> {
+pub(super) fn contradiction(facts: &Facts) -> Result<(), Stop> {
     let (thrust, flow, torque) = (facts.sign_of(0), facts.sign_of(1), facts.sign_of(2));
     let words = |sign: f64, what: &str| match sign {
         s if s > 0.0 => Some(format!("{what} goes ahead")),
@@ -110,12 +129,5 @@ fn verdict(facts: &mut Facts) -> Result<Step, Stop> {
     if torque < 0.0 {
         return Err(against("torque_n_m", ""));
     }
-    for (k, signal) in WITNESSES.iter().enumerate() {
-        if facts.measures(signal) && facts.sign_of(k) == 0.0 {
-            let words =
-                format!("{signal}: no answer within half a turn; the first level of the working range tells");
-            facts.left_out.push(("direction", words));
-        }
-    }
-    Ok(Step::Done)
+    Ok(())
 }
