@@ -1,5 +1,6 @@
 //! The working range: levels ahead and astern that grow, each held until it settles, and quick steps among them.
 
+use super::direction::contradiction;
 use super::{Stage, Step, hear, unit};
 use crate::facts::{ALL_INSIDE, Facts, Level, WITNESSES};
 use crate::plan::Plan;
@@ -148,16 +149,12 @@ impl WorkingRange {
         if drive * speed < 0.0 && speed.abs() > STANDS_RAD_S {
             return Err(Stop::OneWay);
         }
-        // What did not answer within half a turn must answer now.
-        for (k, signal) in WITNESSES.into_iter().enumerate().filter(|(_, s)| facts.measures(s)) {
-            let sign = facts.sign_of(k);
-            if sign < 0.0 {
-                let witness = format!("at {drive:.3} {} ahead it goes astern", unit(plan.kind));
-                return Err(Stop::SignalReversed { signal, witness });
-            }
-            if sign == 0.0 && share.abs() >= LEVELS[1] {
-                return Err(Stop::Silent { signal });
-            }
+        // What did not answer to pulses answers now, and is judged as there: one witness alone does not tell whether it
+        // or the whole thruster is the wrong way round.
+        contradiction(facts)?;
+        let unsure = |k: &usize| facts.measures(WITNESSES[*k]) && facts.sign_of(*k) == 0.0;
+        if let Some(k) = (0..3).find(unsure).filter(|_| share.abs() >= LEVELS[1]) {
+            return Err(Stop::Silent { signal: WITNESSES[k] });
         }
         // Speed grows with the square root of torque at most as with torque itself.
         let most = SPEED_SHARE * plan.speed_max_rad_s;
@@ -172,5 +169,40 @@ impl WorkingRange {
             facts.left_out.push(("working_range", words));
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use kort_proto::signals::{SIGNALS, Signals};
+    use kort_thruster::rig::Rig;
+
+    use super::*;
+    use crate::facts::{Answer, RestReading};
+
+    /// A drive without a shaft sensor of its own turns motor and speed together when two of its wires are swapped: then
+    /// the force cell, which answers late, is right.
+    #[test]
+    fn a_thrust_that_goes_astern_at_the_first_level_may_be_the_thrusters_or_the_cells() {
+        let rig = include_str!("../../../../config/thrusters/whitcomb-yoerger-1999.toml");
+        let plan = Plan::new(&Rig::from_toml(rig).unwrap(), 9.0, 80.0, 1e-3, 0.5);
+        let rest = RestReading { count: 2000, sigma: 0.1, memory: 1.0, ..RestReading::default() };
+        let rest = SIGNALS.iter().map(|s| if s.name == "thrust_n" { rest } else { RestReading::default() });
+        let mut facts = Facts { rest: rest.collect(), side: 1.0, ..Facts::default() };
+        let mut stage = WorkingRange::default();
+        let mut stopped = None;
+        for k in 0..10_000 {
+            let fresh = Signals { shaft_speed_rad_s: 20.0, thrust_n: -30.0, ..Signals::UNKNOWN };
+            let time_s = f64::from(k) * 1e-3;
+            let seen = Seen { time_s, speed_rad_s: 20.0, angle_rad: 0.0, path_rad: 0.0, fresh };
+            if let Err(stop) = stage.tick(&plan, &seen, &mut facts) {
+                stopped = Some(stop);
+                break;
+            }
+        }
+        let words = stopped.unwrap().to_string();
+        assert!(words.contains("pushes astern") && words.contains("`reversed = true`"), "{words}");
+        assert!(words.contains("if it does push ahead, `thrust_n` has the wrong sign"), "{words}");
+        assert_eq!(facts.answers[1], Answer::default());
     }
 }
