@@ -162,7 +162,7 @@ pub fn steps(facts: &Facts, estimate: Option<&Estimate>) -> Vec<StepReport> {
                 together.skipped_because.push(format!("{} is not fixed: {}", names.join(", "), group.why));
             }
         }
-        if !facts.measures("torque_n_m") {
+        if torque_constant(estimate).is_none() {
             together.skipped_because.push("torque_constant_nm_a: nothing measures torque; as stated".into());
         }
         if !facts.measures("current_a") {

@@ -23,7 +23,7 @@ pub enum Stop {
     },
     /// No motion is seen, whatever is commanded, and nothing else answers either.
     #[error(
-        "the shaft shows no motion at {drive:.3} {unit}: it is blocked, or its sensor is dead{seen}\nhint: switch the supply off and turn the shaft by hand: it must turn freely, and `shaft_angle_rad` must follow"
+        "the shaft shows no motion at {drive:.3} {unit}: it is blocked, or its sensor is dead{seen}\nhint: switch the supply off and turn the shaft by hand: it must turn freely, and `shaft_angle_rad` must follow; `full_drive_s` in [thrusters.ID.limits] longer than 0.05 keeps a short pulse from its drive"
     )]
     NoMotion {
         /// The largest drive tried.
