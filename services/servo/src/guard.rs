@@ -8,6 +8,7 @@ use kort_proto::signals::Signals;
 
 use crate::direction::Direction;
 use crate::settings::Limits;
+use crate::still::Stillness;
 
 /// Readings that must be bad in a row before a value trips.
 const OVER_TICKS: u32 = 2;
@@ -29,10 +30,9 @@ pub struct Guard {
     supply: u32,
     spikes: u32,
     since_spike: u32,
-    still_s: f64,
+    still: Stillness,
     since_speed: u64,
     direction: Direction,
-    last_angle_rad: f64,
     last_speed_rad_s: f64,
     held_speed_rad_s: f64,
     held_current_a: f64,
@@ -54,10 +54,9 @@ impl Guard {
             supply: 0,
             spikes: 0,
             since_spike: SPIKE_WINDOW,
-            still_s: 0.0,
+            still: Stillness::new(),
             since_speed: 0,
             direction: Direction::default(),
-            last_angle_rad: f64::NAN,
             last_speed_rad_s: f64::NAN,
             held_speed_rad_s: 0.0,
             held_current_a: 0.0,
@@ -123,20 +122,14 @@ impl Guard {
         }
         trip(Fault::SensorSpike, self.spikes >= SPIKES && self.since_spike < SPIKE_WINDOW);
 
-        // A shaft that shows no motion at all while the motor pulls.
-        let angle = measured.shaft_angle_rad;
-        let same_angle = angle == self.last_angle_rad || angle.is_nan();
-        let same_speed = speed == self.last_speed_rad_s || speed.is_nan();
+        // A shaft that shows no motion while the motor pulls.
         let pulls = drive.abs() > l.drive_max / 3.0;
-        self.still_s = if pulls && same_angle && same_speed { self.still_s + dt } else { 0.0 };
-        trip(Fault::SensorFrozen, self.still_s > l.frozen_s);
+        let still_s = self.still.while_pulled(measured, pulls, l.frozen_s, dt);
+        trip(Fault::SensorFrozen, still_s > l.frozen_s);
         // A jump that is left out above says nothing of the direction either.
         let shown = if jump { f64::NAN } else { speed };
         let current = if self.current_told { self.held_current_a } else { f64::NAN };
         trip(Fault::SensorReversed, self.direction.is_reversed(&l, shown, current, drive, dt));
-        if angle.is_finite() {
-            self.last_angle_rad = angle;
-        }
         if speed.is_finite() {
             self.last_speed_rad_s = speed;
             self.since_speed = 0;
@@ -292,6 +285,12 @@ pub(crate) mod tests {
         );
         assert_eq!(after(|_, s| s.shaft_speed_rad_s = f64::NAN, 10, 0.0), Fault::SensorNotFinite.bit());
         assert_eq!(after(|_, s| s.shaft_angle_rad = 1.0, 300, 5.0), Fault::SensorFrozen.bit());
+        let blocked = |i: u32, s: &mut Signals| {
+            s.shaft_speed_rad_s = f64::from(i % 7) * 0.1;
+            s.shaft_angle_rad = 1.0 + f64::from(i % 2) * 0.002;
+        };
+        assert_eq!(after(blocked, 300, 5.0), Fault::SensorFrozen.bit());
+        assert_eq!(after(blocked, 300, 2.0), 0, "against friction it may stand");
         assert_eq!(after(|_, s| s.supply_v = 50.0, 20, 0.0), Fault::SupplyOutOfRange.bit());
         assert_eq!(after(|_, s| s.temperature_c = 150.0, 3, 0.0), Fault::OverTemperature.bit());
         assert_eq!(after(|_, s| s.current_a = 9.0, 5000, 5.0), Fault::ThermalOverload.bit());

@@ -18,6 +18,7 @@ pub mod link;
 mod process;
 pub mod sensors;
 pub mod settings;
+mod still;
 pub mod tick;
 
 #[cfg(feature = "process")]
