@@ -59,6 +59,23 @@ pub struct Devices {
 }
 
 impl Devices {
+    /// Starts all devices: the drive last, for from the moment that it is confirmed it wants to hear of ticks, and an
+    /// instrument may keep the start waiting.
+    ///
+    /// # Errors
+    /// No thread or no descriptor is to be had. A device that is not there is a fault, not an error.
+    #[cfg(feature = "process")]
+    pub fn start(
+        drive: crate::drives::Chosen,
+        sensors: Vec<crate::sensors::Chosen>,
+        id: &str,
+        priority: i32,
+    ) -> std::io::Result<Self> {
+        let sensors: std::io::Result<_> = sensors.into_iter().map(|s| s.start(id, priority)).collect();
+        let (sensors, drive) = (sensors?, drive.start(id, priority)?);
+        Ok(Self::new(drive, sensors, kort_proto::transport::monotonic_ns()))
+    }
+
     /// Devices that have just been started.
     pub fn new(drive: Box<dyn Drive>, sensors: Vec<Sensor>, now_ns: u64) -> Self {
         let mut taken = [false; Signals::COUNT];

@@ -1,5 +1,6 @@
 //! The servo's process: clock, real-time scheduling, shared memory around the pure tick.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -85,8 +86,13 @@ pub fn problems(config: &Config, id: &str) -> Vec<ServoError> {
     // Bounds that are crossed by a value that is wrong already are told by that one.
     let settings = settings.err().filter(|_| wrong.is_empty());
     wrong.extend(settings);
-    wrong.extend(drives::choose(config, id, thruster, &rig).err());
-    wrong.extend(sensors::choose(config, id, thruster).err());
+    let (drive, sensors) =
+        (drives::choose(config, id, thruster, &rig), sensors::choose(config, id, thruster));
+    if let (Ok(drive), Ok(sensors)) = (&drive, &sensors) {
+        wrong.extend(ports_apart(config, id, drive, sensors).err());
+    }
+    wrong.extend(drive.err());
+    wrong.extend(sensors.err());
     wrong.into_iter().map(Into::into).collect()
 }
 
@@ -95,11 +101,38 @@ fn read(config: &Config, id: &str) -> Result<(Settings, drives::Chosen, Vec<sens
     let thruster = config.thruster(id)?;
     let (file, text) = config.rig_text(id, thruster)?;
     let rig = Rig::from_toml(&text).map_err(|error| ServoError::Rig { file, error })?;
-    Ok((
-        Settings::new(config, id, thruster, &rig)?,
-        drives::choose(config, id, thruster, &rig)?,
-        sensors::choose(config, id, thruster)?,
-    ))
+    let settings = Settings::new(config, id, thruster, &rig)?;
+    let (drive, sensors) =
+        (drives::choose(config, id, thruster, &rig)?, sensors::choose(config, id, thruster)?);
+    ports_apart(config, id, &drive, &sensors)?;
+    Ok((settings, drive, sensors))
+}
+
+/// Two devices on one serial port take each other's answers.
+fn ports_apart(
+    config: &Config,
+    id: &str,
+    drive: &drives::Chosen,
+    sensors: &[sensors::Chosen],
+) -> Result<(), ConfigError> {
+    let drive = match drive {
+        drives::Chosen::OnWire(wired, _) => Some(("drive".to_owned(), &wired.port)),
+        drives::Chosen::Simulated(_) => None,
+    };
+    let sensors = sensors.iter().filter_map(|sensor| match &sensor.kind {
+        sensors::Kind::SerialLine(line) => Some((format!("sensors.{}", sensor.name), &line.port)),
+        sensors::Kind::Iio(_) => None,
+    });
+    let mut taken: Vec<(String, &PathBuf)> = Vec::new();
+    for (name, port) in drive.into_iter().chain(sensors) {
+        if let Some((other, _)) = taken.iter().find(|(_, there)| *there == port) {
+            return Err(config.error(format!(
+                "`thrusters.{id}.{name}.port` = {port:?} is `thrusters.{id}.{other}.port` too; allowed is one device a port\nhint: /dev/serial/by-id has a name for each"
+            )));
+        }
+        taken.push((name, port));
+    }
+    Ok(())
 }
 
 /// Runs the servo of one thruster until SIGTERM, SIGINT or SIGHUP. With `join` another process owns the
@@ -138,9 +171,7 @@ pub fn run(
         amplifier = thruster.amplifier,
         "servo runs, disarmed"
     );
-    let drive = drive.start(id, priority).map_err(ServoError::Device)?;
-    let sensors: Result<_, _> = sensors.into_iter().map(|sensor| sensor.start(id, priority)).collect();
-    let mut devices = Devices::new(drive, sensors.map_err(ServoError::Device)?, monotonic_ns());
+    let mut devices = Devices::start(drive, sensors, id, priority).map_err(ServoError::Device)?;
     let life_ns = devices.reading_life_ns();
     let settings = settings.with_reading_life(life_ns);
     let servo = Servo::new(settings, monotonic_ns()).with_latched(inherited.latched, inherited.tripped);
@@ -237,4 +268,29 @@ fn own(
         Err(_) => return Err(ServoError::Signals(std::io::Error::other("the owner's thread ended"))),
     }
     Ok(thread)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn drive_and_instrument_on_one_port_are_refused_by_name() {
+        let sensor = |port: &str| {
+            format!(
+                "[thrusters.t1]\nrig = \"thrusters/whitcomb-yoerger-1999.toml\"\namplifier = \"vesc\"\n\
+                 [thrusters.t1.drive]\nport = \"/dev/p\"\npole_pairs = 7\n\
+                 [thrusters.t1.sensors.cell]\nkind = \"serial_line\"\nport = \"{port}\"\n\
+                 signals = {{ thrust_n = {{ column = 1, unit = \"N\" }} }}\n"
+            )
+        };
+        let wrong = |port: &str| {
+            let config = Config::parse(&sensor(port), None).unwrap();
+            problems(&config, "t1").iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
+        };
+        assert_eq!(wrong("/dev/q"), "");
+        let words = wrong("/dev/p");
+        assert!(words.contains("`thrusters.t1.sensors.cell.port` = \"/dev/p\""), "{words}");
+        assert!(words.contains("`thrusters.t1.drive.port` too") && words.contains("\nhint: "), "{words}");
+    }
 }
