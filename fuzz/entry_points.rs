@@ -123,9 +123,9 @@ pub fn wire(bytes: &[u8]) {
             protocol.ask(&mut out, &mut |_| ());
             protocol.hear(piece, &mut |_| ());
             protocol.reply(&mut out);
-            protocol.tell(Some(1.0), &mut out);
+            protocol.tell(Some(1.0), true, &mut out);
             protocol.hear(piece, &mut |_| ());
-            protocol.tell(None, &mut out);
+            protocol.tell(None, true, &mut out);
         }
         assert!(!out.is_empty(), "{kind} says nothing");
     }

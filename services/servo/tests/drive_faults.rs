@@ -1,14 +1,20 @@
 //! What a drive on a wire says of itself, from its emulator through its protocol and its thread to the tick: a fault is
 //! there while the drive has it, and ends with it, by itself or by a reset.
 
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-use kort_emulators::{Adapter, ArduSub, Bench, Cia402, Moteus, ODrive, Vesc, ardusub, cia402, moteus, vesc};
+use kort_emulators::{
+    Adapter, ArduSub, Bench, Cia402, Device, Mischief, Moteus, ODrive, Printer, Truth, Vesc, ardusub, cia402,
+    moteus, vesc,
+};
 use kort_proto::config::Config;
 use kort_proto::faults::Fault;
 use kort_proto::transport::monotonic_ns;
 use kort_servo::devices::{At, Devices};
-use kort_servo::drives;
+use kort_servo::{drives, sensors};
 use kort_thruster::rig::Rig;
 
 /// How long anything may take on a busy machine.
@@ -20,15 +26,21 @@ struct Loop {
     devices: Devices,
 }
 
+/// The configuration of a thruster on this emulator.
+fn config(kind: &str, keys: &str, emulator: &Bench) -> Config {
+    let drive = format!("\"{kind}\"\ndrive = {{ port = {:?}, {keys} }}", emulator.port());
+    let text = include_str!("../../../config/kort.toml")
+        .replace("amplifier = \"simulated\"", &format!("amplifier = {drive}"));
+    Config::parse(&text, None).unwrap()
+}
+
+fn rig() -> Rig {
+    Rig::from_toml(include_str!("../../../config/thrusters/whitcomb-yoerger-1999.toml")).unwrap()
+}
+
 impl Loop {
     fn new(kind: &str, keys: &str, emulator: Bench, rig: &Rig) -> Self {
-        let drive = format!(
-            "\"{kind}\"\ndrive = {{ port = {:?}, reading_life_ms = 300, timeout_ms = 510, {keys} }}",
-            emulator.port()
-        );
-        let text = include_str!("../../../config/kort.toml")
-            .replace("amplifier = \"simulated\"", &format!("amplifier = {drive}"));
-        let config = Config::parse(&text, None).unwrap();
+        let config = config(kind, &format!("reading_life_ms = 300, timeout_ms = 510, {keys}"), &emulator);
         let thruster = config.thruster("t1").unwrap();
         let drive = drives::choose(&config, "t1", thruster, rig).unwrap().start("t1", 0).unwrap();
         Self { emulator, devices: Devices::new(drive, Vec::new(), monotonic_ns()) }
@@ -54,7 +66,7 @@ impl Loop {
 
 #[test]
 fn a_drives_own_fault_ends_with_it_and_with_a_reset() {
-    let rig = Rig::from_toml(include_str!("../../../config/thrusters/whitcomb-yoerger-1999.toml")).unwrap();
+    let rig = rig();
     let vesc = Bench::start(Vesc::new(vesc::Make::default(), &rig)).unwrap();
     let odrive = Bench::start(ODrive::new(&rig, false)).unwrap();
     let moteus = Bench::start(Moteus::new(moteus::Make::default(), &rig)).unwrap();
@@ -82,4 +94,96 @@ fn a_drives_own_fault_ends_with_it_and_with_a_reset() {
         let reset = Fault::DriveRestarted.bit() | Fault::DriveLost.bit();
         servo.until(&format!("{kind} after its reset"), |now, seen| now == 0 && seen & reset != 0);
     }
+}
+
+/// A drive behind a slow line: its answers go out one after the other, and each takes its time.
+struct Late<D> {
+    device: D,
+    takes_s: f64,
+    waiting: VecDeque<(f64, Vec<u8>)>,
+    /// Most answers that waited at once.
+    most: Arc<AtomicUsize>,
+}
+
+impl<D: Device> Device for Late<D> {
+    fn hear(&mut self, now_s: f64, bytes: &[u8]) -> Vec<Vec<u8>> {
+        for answer in self.device.hear(now_s, bytes) {
+            let before_s = self.waiting.back().map_or(now_s, |last| last.0.max(now_s));
+            self.waiting.push_back((before_s + self.takes_s, answer));
+        }
+        self.most.fetch_max(self.waiting.len(), Ordering::Relaxed);
+        Vec::new()
+    }
+    fn live(&mut self, now_s: f64) -> Vec<Vec<u8>> {
+        let mut said = self.device.live(now_s);
+        let due = self.waiting.partition_point(|(at_s, _)| *at_s <= now_s);
+        said.extend(self.waiting.drain(..due).map(|(_, answer)| answer));
+        said
+    }
+    fn restart(&mut self, now_s: f64) {
+        self.device.restart(now_s);
+    }
+    fn report(&mut self, code: u32) {
+        self.device.report(code);
+    }
+    fn truth(&self) -> Truth {
+        self.device.truth()
+    }
+}
+
+/// A drive that is slower than the exchange is asked as often as it answers, and what it tells is as old as its question.
+#[test]
+fn late_answers_do_not_pile_up_and_are_told_by_their_age() {
+    const TAKES: Duration = Duration::from_millis(10);
+    let (rig, most) = (rig(), Arc::new(AtomicUsize::new(0)));
+    fn bench<D: Device + 'static>(device: D, most: &Arc<AtomicUsize>) -> Bench {
+        let (takes_s, most) = (TAKES.as_secs_f64(), Arc::clone(most));
+        Bench::start(Late { device, takes_s, waiting: VecDeque::new(), most }).unwrap()
+    }
+    let vesc = bench(Vesc::new(vesc::Make::default(), &rig), &most);
+    let odrive = bench(ODrive::new(&rig, false), &most);
+    // An ODrive's answer is six lines.
+    for (kind, keys, lines, emulator) in
+        [("vesc", "pole_pairs = 7", 1, vesc), ("odrive", "baud = 115200", 6, odrive)]
+    {
+        let mut servo = Loop::new(kind, keys, emulator, &rig);
+        servo.until(&format!("{kind} to be ready"), |now, _| now == 0);
+        most.store(0, Ordering::Relaxed);
+        let mut readings = 0;
+        let end = Instant::now() + PATIENCE;
+        while readings < 40 && Instant::now() < end {
+            let now_ns = monotonic_ns();
+            let shown = servo.devices.show(At { now_ns, ticks: 1 });
+            servo.devices.drive(now_ns, Some(0.0));
+            if shown.signals.shaft_speed_rad_s.is_finite() {
+                readings += 1;
+                let age = Duration::from_nanos(shown.shaft_age_ns);
+                assert!(age >= TAKES, "{kind}: a reading of {age:?} took {TAKES:?} to come");
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        assert_eq!(readings, 40, "{kind}");
+        let most = most.load(Ordering::Relaxed);
+        assert!(most <= 2 * lines, "{kind}: {most} lines piled up");
+    }
+}
+
+/// An instrument that keeps the start waiting does not make the servo silent to the drive, however short a reading's life.
+#[test]
+fn a_slow_instrument_does_not_cost_the_drive_its_first_ticks() {
+    let instrument = Bench::start(Printer::new(1.0, 10.0)).unwrap();
+    instrument.spoil(Mischief::Silent);
+    let emulator = Bench::start(Vesc::new(vesc::Make::default(), &rig())).unwrap();
+    let mut config = config("vesc", "pole_pairs = 7", &emulator);
+    let cell = format!(
+        "kind = \"serial_line\"\nport = {:?}\nsignals = {{ flow_m_s = {{ column = 1, unit = \"m/s\" }} }}",
+        instrument.port()
+    );
+    let cell = cell.parse().unwrap();
+    config.thrusters.get_mut("t1").unwrap().sensors.insert("meter".into(), cell);
+    let thruster = config.thruster("t1").unwrap();
+    let drive = drives::choose(&config, "t1", thruster, &rig()).unwrap();
+    let sensors = sensors::choose(&config, "t1", thruster).unwrap();
+    let mut devices = Devices::start(drive, sensors, "t1", 0).unwrap();
+    assert_eq!(devices.show(At { now_ns: monotonic_ns(), ticks: 1 }).faults, 0);
 }

@@ -10,6 +10,8 @@ pub mod can;
 mod lines;
 #[cfg(feature = "process")]
 mod port;
+#[cfg(any(feature = "process", test))]
+mod questions;
 #[cfg(feature = "process")]
 mod thread;
 #[cfg(feature = "process")]
@@ -101,8 +103,13 @@ pub trait Protocol: Send {
     /// What is to be said at once after what was just heard: the next step of a conversation in many.
     fn reply(&mut self, _out: &mut Vec<u8>) {}
 
-    /// One exchange: the command (`None`: output off), and the question for the measurements.
-    fn tell(&mut self, drive: Option<f64>, out: &mut Vec<u8>);
+    /// One exchange: the command (`None`: output off) and, where `question` says so, the question for the measurements.
+    fn tell(&mut self, drive: Option<f64>, question: bool, out: &mut Vec<u8>);
+
+    /// Whether each of its readings answers a question; a device that speaks by itself is as late as its wire.
+    fn answers(&self) -> bool {
+        true
+    }
 
     /// Takes bytes as they come, split and joined at will.
     fn hear(&mut self, bytes: &[u8], heard: &mut dyn FnMut(Heard));

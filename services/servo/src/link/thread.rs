@@ -13,6 +13,7 @@ use tracing::{info, warn};
 use triple_buffer::{Input, Output};
 
 use super::port::Port;
+use super::questions::Questions;
 use super::wire::{Command, Told, Wire};
 use super::{Heard, Protocol};
 
@@ -40,6 +41,7 @@ pub(super) struct Serving {
     driving: bool,
     /// When its time-out was confirmed, on CLOCK_MONOTONIC, ns.
     guarded_ns: u64,
+    questions: Questions,
 }
 
 impl Serving {
@@ -51,6 +53,7 @@ impl Serving {
         waker: Arc<OwnedFd>,
         ending: Arc<AtomicBool>,
     ) -> Self {
+        let questions = Questions::new(wire.reading_life_ns);
         Self {
             wire,
             protocol,
@@ -64,6 +67,7 @@ impl Serving {
             answered: false,
             driving: false,
             guarded_ns: 0,
+            questions,
         }
     }
 
@@ -115,7 +119,7 @@ impl Serving {
         loop {
             if self.ending.load(Ordering::Relaxed) {
                 out.clear();
-                self.protocol.tell(None, &mut out);
+                self.protocol.tell(None, false, &mut out);
                 return port.send(&out);
             }
             self.wait(port)?;
@@ -129,7 +133,7 @@ impl Serving {
                 // Perhaps it still hears, though it is not heard: off, while it is known how it wants to be spoken to.
                 if std::mem::take(&mut self.driving) {
                     out.clear();
-                    self.protocol.tell(None, &mut out);
+                    self.protocol.tell(None, false, &mut out);
                     port.send(&out)?;
                 }
                 // Whoever answers next may have been reset, or be another one.
@@ -143,7 +147,7 @@ impl Serving {
             if !self.told.guarded {
                 if std::mem::take(&mut self.driving) {
                     // It was reset, or is not to be driven any more: off.
-                    self.protocol.tell(None, &mut out);
+                    self.protocol.tell(None, false, &mut out);
                 } else if now >= ask_next {
                     ask_next = now + ASK_AGAIN;
                     self.converse(|protocol, heard| protocol.ask(&mut out, heard));
@@ -154,7 +158,13 @@ impl Serving {
                 if now >= next || off {
                     next = (next + period).max(now);
                     self.driving = command.drive.is_some();
-                    self.protocol.tell(command.drive, &mut out);
+                    // Late answers would pile up, and old ones pass for new, if it were asked on.
+                    let now_ns = monotonic_ns();
+                    let question = !self.protocol.answers() || self.questions.may_ask(now_ns);
+                    if question && self.protocol.answers() {
+                        self.questions.ask(now_ns);
+                    }
+                    self.protocol.tell(command.drive, question, &mut out);
                 }
             }
             port.send(&out)?;
@@ -164,6 +174,7 @@ impl Serving {
     /// A new conversation: what was known of the device is known no more, its fault neither.
     fn begin(&mut self) {
         self.protocol.begin();
+        self.questions.forget();
         self.answered = false;
         self.fault = None;
         self.told.guarded = false;
@@ -197,21 +208,27 @@ impl Serving {
     }
 
     fn converse(&mut self, talk: impl FnOnce(&mut dyn Protocol, &mut dyn FnMut(Heard))) {
-        let Self { protocol, wire, told, answered, complaint, fault, guarded_ns, .. } = self;
+        let Self { protocol, wire, told, answered, complaint, fault, guarded_ns, questions, .. } = self;
         let mut restarted = false;
+        let answers = protocol.answers();
         talk(protocol.as_mut(), &mut |heard| match heard {
             Heard::Known(words) => {
-                info!("{}: {words}", wire.name);
+                info!("{}: {}", wire.name, printable(&words));
                 *answered = true;
             }
             Heard::Reading(signals) => {
-                told.readings = told.readings.wrapping_add(1);
-                told.stamp_ns = monotonic_ns();
-                told.signals = signals;
+                let now_ns = monotonic_ns();
+                // One that nobody asked for is an answer of before.
+                let stamp_ns = if answers { questions.answered(now_ns) } else { Some(now_ns) };
+                if let Some(stamp_ns) = stamp_ns {
+                    told.readings = told.readings.wrapping_add(1);
+                    told.stamp_ns = stamp_ns;
+                    told.signals = signals;
+                }
             }
             Heard::Fault(reported) => {
                 if let Some(words) = reported.as_ref().filter(|_| *fault != reported) {
-                    warn!("{}: {words}", wire.name);
+                    warn!("{}: {}", wire.name, printable(words));
                 }
                 *fault = reported;
             }
@@ -221,7 +238,7 @@ impl Serving {
                 restarted = true;
             }
             Heard::Guarded(words) => {
-                info!("{}: {words}", wire.name);
+                info!("{}: {}", wire.name, printable(&words));
                 told.guarded = true;
                 *guarded_ns = monotonic_ns();
                 complaint.clear();
@@ -229,7 +246,7 @@ impl Serving {
             Heard::Unguarded(words) => {
                 told.guarded = false;
                 if *complaint != words {
-                    warn!("{}: {words}", wire.name);
+                    warn!("{}: {}", wire.name, printable(&words));
                     *complaint = words;
                 }
             }
@@ -246,5 +263,22 @@ impl Serving {
             warn!("{}: {words}", self.wire.name);
             self.complaint = words;
         }
+    }
+}
+
+/// Words with something of a device in them, as they may stand in a log: no control character but the break before a hint.
+fn printable(words: &str) -> String {
+    let escaped =
+        |c: char| if c.is_control() && c != '\n' { c.escape_default().collect() } else { c.to_string() };
+    words.chars().map(escaped).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_device_prints_cannot_steer_a_terminal() {
+        assert_eq!(printable("prints `\u{1b}[2J 1.0`\nhint: é"), "prints `\\u{1b}[2J 1.0`\nhint: é");
     }
 }

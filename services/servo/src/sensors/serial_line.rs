@@ -82,8 +82,12 @@ impl Protocol for Listening {
         out.extend(self.instrument.ask.as_bytes());
     }
 
-    fn tell(&mut self, _: Option<f64>, out: &mut Vec<u8>) {
+    fn tell(&mut self, _: Option<f64>, _: bool, out: &mut Vec<u8>) {
         out.extend(self.instrument.ask.as_bytes());
+    }
+
+    fn answers(&self) -> bool {
+        false
     }
 
     fn hear(&mut self, bytes: &[u8], heard: &mut dyn FnMut(Heard)) {

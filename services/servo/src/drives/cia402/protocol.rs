@@ -67,7 +67,6 @@ pub struct Protocol {
     emergency: Option<u16>,
     told: Told,
     supply_v: f64,
-    due: u32,
     exchanges: u32,
     exchanges_on: u32,
     /// It was in operation since the output was switched on.
@@ -88,7 +87,6 @@ impl Protocol {
             emergency: None,
             told: Told::default(),
             supply_v: f64::NAN,
-            due: 0,
             exchanges: 0,
             exchanges_on: 0,
             entered: false,
@@ -249,13 +247,12 @@ impl Protocol {
         }
     }
 
-    /// An answer that was asked for, if it makes a reading with the other one.
+    /// An answer, if it makes a reading with the other one.
     fn reading(&mut self, heard: &mut dyn FnMut(Heard)) {
-        if self.due == 0 || self.stage != Stage::Guarded {
+        if self.stage != Stage::Guarded {
             return self.told.forget();
         }
         let Some((state, read)) = self.told.take() else { return };
-        self.due = 0;
         self.entered = self.on && (self.entered || state == State::Enabled);
         self.exchanges_on = if self.on { self.exchanges_on.saturating_add(1) } else { 0 };
         heard(Heard::Fault(self.fault(state)));
@@ -358,7 +355,8 @@ impl link::Protocol for Protocol {
         }
     }
 
-    fn tell(&mut self, drive: Option<f64>, out: &mut Vec<u8>) {
+    // The command acts at the SYNC, which is the question too: it is never left out.
+    fn tell(&mut self, drive: Option<f64>, _: bool, out: &mut Vec<u8>) {
         // Four heartbeats in the time-out, and only with a command: a servo that stands still feeds nothing.
         let every = (self.drive.wired.timeout_s * self.drive.wired.rate_hz / 4.0) as u32;
         if self.exchanges.is_multiple_of(every.max(1)) {
@@ -387,7 +385,6 @@ impl link::Protocol for Protocol {
         self.on = drive.is_some();
         self.entered &= self.on;
         self.exchanges = self.exchanges.wrapping_add(1);
-        self.due = self.due.saturating_add(1);
     }
 
     fn hear(&mut self, bytes: &[u8], heard: &mut dyn FnMut(Heard)) {

@@ -331,7 +331,11 @@ impl link::Protocol for Protocol {
         self.question(out);
     }
 
-    fn tell(&mut self, drive: Option<f64>, out: &mut Vec<u8>) {
+    fn answers(&self) -> bool {
+        false
+    }
+
+    fn tell(&mut self, drive: Option<f64>, _: bool, out: &mut Vec<u8>) {
         self.vehicle.want(drive.is_some());
         self.exchanges = self.exchanges.wrapping_add(1);
         if self.exchanges.is_multiple_of(HEARTBEAT_EVERY) {

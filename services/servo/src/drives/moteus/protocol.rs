@@ -70,7 +70,6 @@ pub struct Protocol {
     set: bool,
     /// What came through the diagnostic channel and is no whole line yet.
     said: String,
-    due: u32,
     milliseconds: Option<i32>,
     on: bool,
     exchanges_on: u32,
@@ -88,7 +87,6 @@ impl Protocol {
             known: false,
             set: false,
             said: String::new(),
-            due: 0,
             milliseconds: None,
             on: false,
             exchanges_on: 0,
@@ -193,8 +191,7 @@ impl Protocol {
                 }
             }
         }
-        if let Some(milliseconds) = milliseconds.filter(|_| self.due > 0) {
-            self.due = 0;
+        if let Some(milliseconds) = milliseconds {
             self.values(&kept, milliseconds, heard);
         }
     }
@@ -252,7 +249,7 @@ impl link::Protocol for Protocol {
         self.send(&[STREAM_POLL, STREAM_CHANNEL, STREAM_MAX], true, out);
     }
 
-    fn tell(&mut self, drive: Option<f64>, out: &mut Vec<u8>) {
+    fn tell(&mut self, drive: Option<f64>, question: bool, out: &mut Vec<u8>) {
         let sign = self.moteus.wired.sign();
         let mut data = Vec::with_capacity(64);
         match drive {
@@ -271,10 +268,19 @@ impl link::Protocol for Protocol {
                 data.extend((self.moteus.wired.timeout_s as f32).to_le_bytes());
             }
         }
-        data.extend([READ_FLOAT, 5, MODE as u8, READ_FLOAT | 3, VOLTAGE as u8, READ_INT32 | 1, MILLISECONDS]);
+        if question {
+            data.extend([
+                READ_FLOAT,
+                5,
+                MODE as u8,
+                READ_FLOAT | 3,
+                VOLTAGE as u8,
+                READ_INT32 | 1,
+                MILLISECONDS,
+            ]);
+        }
         self.on = drive.is_some();
-        self.send(&data, true, out);
-        self.due = self.due.saturating_add(1);
+        self.send(&data, question, out);
     }
 
     fn hear(&mut self, bytes: &[u8], heard: &mut dyn FnMut(Heard)) {

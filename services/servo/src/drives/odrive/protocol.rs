@@ -60,7 +60,6 @@ pub struct Protocol {
     /// Angle and speed of the answer under way, turns and turns a second, and the numbers behind them.
     moving: Option<(f64, f64)>,
     numbers: Vec<f64>,
-    due: u32,
     on: bool,
     exchanges_on: u32,
 }
@@ -79,7 +78,6 @@ impl Protocol {
             torque_constant_nm_a: f64::NAN,
             moving: None,
             numbers: Vec::new(),
-            due: 0,
             on: false,
             exchanges_on: 0,
         }
@@ -158,10 +156,6 @@ impl Protocol {
 
     fn values(&mut self, (turns, turns_s): (f64, f64), numbers: &[f64], heard: &mut dyn FnMut(Heard)) {
         let [iq_a, supply_v, error, state, enabled] = *numbers else { return };
-        if self.due == 0 {
-            return;
-        }
-        self.due = 0;
         if enabled != 1.0 {
             return heard(Heard::Restarted);
         }
@@ -224,7 +218,7 @@ impl link::Protocol for Protocol {
         }
     }
 
-    fn tell(&mut self, drive: Option<f64>, out: &mut Vec<u8>) {
+    fn tell(&mut self, drive: Option<f64>, question: bool, out: &mut Vec<u8>) {
         let sign = self.odrive.wired.sign();
         match drive {
             Some(drive) => {
@@ -242,8 +236,9 @@ impl link::Protocol for Protocol {
             }
         }
         self.on = drive.is_some();
-        ask_for(&VALUES, out);
-        self.due = self.due.saturating_add(1);
+        if question {
+            ask_for(&VALUES, out);
+        }
     }
 
     fn hear(&mut self, bytes: &[u8], heard: &mut dyn FnMut(Heard)) {

@@ -59,8 +59,6 @@ pub struct Protocol {
     /// The app configuration with the time-out as it must be, as it is sent.
     settings: Vec<u8>,
     supply_v: f64,
-    /// Questions whose answer is due: one that was not asked for is old.
-    due: u32,
     steps: Option<u32>,
 }
 
@@ -75,7 +73,6 @@ impl Protocol {
             asked: 0,
             set: false,
             settings: Vec::with_capacity(PAYLOAD_MAX),
-            due: 0,
             steps: None,
         }
     }
@@ -86,7 +83,7 @@ impl Protocol {
             (Some((&FW_VERSION, rest)), Stage::Version) => self.version(rest, heard),
             (Some((&GET_APPCONF, _)), Stage::Settings) => self.time_out(payload, heard),
             (Some((&SET_APPCONF_NO_STORE, _)), Stage::Setting) => self.stage = Stage::Settings,
-            (Some((&GET_VALUES_SELECTIVE, rest)), _) => self.values(rest, heard),
+            (Some((&GET_VALUES_SELECTIVE, rest)), Stage::Guarded) => self.values(rest, heard),
             _ => (),
         }
     }
@@ -155,9 +152,6 @@ impl Protocol {
 
     /// The values of [`VALUES`], in the order of their bits, behind the mask.
     fn values(&mut self, rest: &[u8], heard: &mut dyn FnMut(Heard)) {
-        if self.due == 0 {
-            return;
-        }
         let mut read = Reader(rest);
         let (Some(VALUES), Some(temperature), Some(iq), Some(erpm), Some(supply), Some(steps), Some(total)) =
             (read.u32(), read.i16(), read.i32(), read.i32(), read.i16(), read.i32(), read.u32())
@@ -165,7 +159,6 @@ impl Protocol {
             return;
         };
         let [fault, _id, status] = *read.0 else { return };
-        self.due = 0;
         if self.steps.replace(total).is_some_and(|before| before.wrapping_sub(total) as i32 > 0) {
             return heard(Heard::Restarted);
         }
@@ -211,7 +204,7 @@ impl link::Protocol for Protocol {
         }
     }
 
-    fn tell(&mut self, drive: Option<f64>, out: &mut Vec<u8>) {
+    fn tell(&mut self, drive: Option<f64>, question: bool, out: &mut Vec<u8>) {
         let sign = self.vesc.wired.sign();
         let scaled = |value: f64, scale: f64| (sign * value * scale).round() as i32;
         let (command, value) = match (drive, self.vesc.kind) {
@@ -226,9 +219,10 @@ impl link::Protocol for Protocol {
         };
         let [a, b, c, d] = value.to_be_bytes();
         frame(&[command, a, b, c, d], out);
-        let [a, b, c, d] = VALUES.to_be_bytes();
-        frame(&[GET_VALUES_SELECTIVE, a, b, c, d], out);
-        self.due = self.due.saturating_add(1);
+        if question {
+            let [a, b, c, d] = VALUES.to_be_bytes();
+            frame(&[GET_VALUES_SELECTIVE, a, b, c, d], out);
+        }
     }
 
     fn hear(&mut self, bytes: &[u8], heard: &mut dyn FnMut(Heard)) {
