@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 
 use kort_proto::transport::monotonic_ns;
 use serde_json::json;
+use tokio_tungstenite::tungstenite;
 
 use crate::common::{self, Stack, wait};
 use crate::{T1, ask, take};
@@ -105,6 +106,21 @@ fn bodies_that_never_come_lock_nobody_out() {
         took.sort();
         assert!(took[took.len() / 2] < Duration::from_nanos(common::PERIOD_NS), "{took:?}");
     });
+}
+
+/// Connections that are kept back for stop are no way to more streams than one peer may have.
+#[test]
+fn idle_connections_among_them_do_not_raise_the_cap_on_streams() {
+    let stack = Stack::start();
+    let port = stack.site.port;
+    let mut idle = Vec::new();
+    let streams = (0..120).filter_map(|_| {
+        idle.extend(TcpStream::connect(("127.0.0.1", port)));
+        tungstenite::connect(format!("ws://127.0.0.1:{port}{T1}/stream?hz=1")).ok()
+    });
+    let streams: Vec<_> = streams.collect();
+    assert!((32..=64).contains(&streams.len()), "{} streams of one peer", streams.len());
+    assert_eq!(ask(port, "POST", "/v1/stop", &[], "").0, 200);
 }
 
 /// The value below which this share lies.

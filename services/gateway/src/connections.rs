@@ -84,30 +84,30 @@ impl Connections {
     /// A place for a new connection of this peer; none if there is no room at all.
     pub fn admit(&self, peer: IpAddr) -> Option<Arc<Slot>> {
         let mut open = lock(&self.open);
-        let of_peer = open.iter().filter(|slot| slot.peer == peer).count();
-        let mut reserved = false;
-        if of_peer >= self.caps.per_peer || open.len() >= self.caps.total {
-            let candidate = |slot: &&Arc<Slot>| of_peer < self.caps.per_peer || slot.peer == peer;
-            let idlest = open
-                .iter()
-                .filter(candidate)
-                .map(|slot| (slot.idle_since_ms.load(Ordering::Relaxed), slot.number))
-                .filter(|(since_ms, _)| *since_ms > 0)
-                .min();
-            match idlest.and_then(|(_, number)| open.iter().position(|slot| slot.number == number)) {
-                Some(at) => {
-                    open.swap_remove(at).evicted.notify_one();
-                    self.evicted.fetch_add(1, Ordering::Relaxed);
-                }
-                // All are at work: what comes now may only stop.
-                None if open.iter().filter(|slot| slot.reserved).count() < self.caps.reserve => {
-                    reserved = true
-                }
+        let (kept_back, of_all): (Vec<&Arc<Slot>>, _) = open.iter().partition(|slot| slot.reserved);
+        let of_peer = of_all.iter().filter(|slot| slot.peer == peer).count();
+        let full = of_peer >= self.caps.per_peer || of_all.len() >= self.caps.total;
+        let idlest = |of: &[&Arc<Slot>]| {
+            let candidates = of.iter().filter(|slot| of_peer < self.caps.per_peer || slot.peer == peer);
+            let waiting = candidates.map(|slot| (slot.idle_since_ms.load(Ordering::Relaxed), slot.number));
+            waiting.filter(|(since_ms, _)| *since_ms > 0).min().map(|(_, number)| number)
+        };
+        let (reserved, in_place_of) = match (full, idlest(&of_all)) {
+            (false, _) => (false, None),
+            (true, Some(idle)) => (false, Some(idle)),
+            // All are at work: what comes now may only stop, in place of another of that kind too.
+            (true, None) if kept_back.len() < self.caps.reserve => (true, None),
+            (true, None) => match idlest(&kept_back) {
+                Some(idle) => (true, Some(idle)),
                 None => {
                     self.refused.fetch_add(1, Ordering::Relaxed);
                     return None;
                 }
-            }
+            },
+        };
+        if let Some(at) = in_place_of.and_then(|number| open.iter().position(|slot| slot.number == number)) {
+            open.swap_remove(at).evicted.notify_one();
+            self.evicted.fetch_add(1, Ordering::Relaxed);
         }
         let slot = Arc::new(Slot {
             number: self.next.fetch_add(1, Ordering::Relaxed),
@@ -236,5 +236,20 @@ mod tests {
         }
         assert!(table.admit(PEERS[0]).is_none());
         assert_eq!(table.counts(), (6, 1, 0));
+    }
+
+    /// Connections that only stop are no way around the caps: who takes the place of one may only stop too.
+    #[test]
+    fn who_takes_a_place_that_is_kept_back_gets_no_other() {
+        let table = table();
+        for _ in 0..4 {
+            table.admit(PEERS[0]).unwrap().busy();
+        }
+        for _ in 0..20 {
+            let idle = table.admit(PEERS[0]).unwrap();
+            assert!(idle.reserved);
+        }
+        assert_eq!(table.counts().0, 6, "four at work and two kept back");
+        assert!(!table.admit(PEERS[1]).unwrap().reserved, "another peer has its own");
     }
 }
