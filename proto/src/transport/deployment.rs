@@ -17,6 +17,7 @@ use rustix::fs::{FlockOperation, flock};
 
 use super::clock::monotonic_ns;
 use super::error::TransportError;
+use super::files::{allow_files, none_left};
 use super::ours::{nobody_else_may_replace, ours_alone, write_whole};
 use super::ports::{Services, create_services};
 use super::room;
@@ -63,13 +64,13 @@ impl Deployment {
     /// # Errors
     /// [`TransportError::NoGeneration`] if there is none, [`TransportError::Version`] if its messages are others.
     pub(super) fn generation_of_our_version(&self) -> Result<u64, TransportError> {
-        let none = || TransportError::NoGeneration { root: self.root.clone() };
         // Whoever else could write these could have us take part in a deployment of theirs.
         ours_alone(&self.root)?;
         ours_alone(&self.generation_file())?;
-        let text = fs::read_to_string(self.generation_file()).map_err(|_| none())?;
+        let text = fs::read_to_string(self.generation_file()).map_err(|_| self.nothing_here())?;
         let mut words = text.split_whitespace();
-        let generation = words.next().and_then(|number| number.parse().ok()).ok_or_else(none)?;
+        let generation =
+            words.next().and_then(|number| number.parse().ok()).ok_or_else(|| self.nothing_here())?;
         match words.next() {
             Some(version) if version == MESSAGES_VERSION.to_string() => Ok(generation),
             other => {
@@ -90,10 +91,15 @@ impl Deployment {
                 return Ok(generation);
             }
             if std::time::Instant::now() >= end {
-                return Err(TransportError::NoGeneration { root: self.root.clone() });
+                return Err(self.nothing_here());
             }
             std::thread::sleep(Duration::from_millis(20));
         }
+    }
+
+    /// No generation can be read: there is none, or no file can be opened any more.
+    fn nothing_here(&self) -> TransportError {
+        none_left().unwrap_or_else(|| TransportError::NoGeneration { root: self.root.clone() })
     }
 
     /// Becomes the owner: takes the lock and clears root and prefix.
@@ -286,23 +292,6 @@ impl Owner {
                 }
             }
         }
-    }
-}
-
-/// Files that one process opens for its own, and for each thruster.
-const OPEN_FILES: (u64, u64) = (96, 64);
-
-/// Lets this process open as many files as the system permits, and refuses to go on with too few: iceoryx2
-/// would report them as a lack of shared memory.
-fn allow_files(thrusters: u64) -> Result<(), TransportError> {
-    use rustix::process::{Resource, getrlimit, setrlimit};
-    let mut limit = getrlimit(Resource::Nofile);
-    limit.current = limit.maximum.map(|most| most.min(1 << 16)).max(limit.current);
-    let _ = setrlimit(Resource::Nofile, limit);
-    let needed = OPEN_FILES.0 + OPEN_FILES.1 * thrusters;
-    match getrlimit(Resource::Nofile).current {
-        Some(limit) if limit < needed => Err(TransportError::OpenFiles { limit, needed }),
-        _ => Ok(()),
     }
 }
 

@@ -109,6 +109,7 @@ pub enum TransportError {
 
 impl TransportError {
     pub(super) fn iceoryx(what: impl Into<String>, error: impl std::fmt::Debug) -> Self {
-        Self::Iceoryx { what: what.into(), error: format!("{error:?}") }
+        let refused = || Self::Iceoryx { what: what.into(), error: format!("{error:?}") };
+        super::files::none_left().unwrap_or_else(refused)
     }
 }

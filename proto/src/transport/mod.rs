@@ -4,6 +4,7 @@
 mod clock;
 mod deployment;
 mod error;
+mod files;
 mod ours;
 mod ports;
 mod rig;

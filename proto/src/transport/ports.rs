@@ -189,7 +189,8 @@ impl<T: Message + ZeroCopySend> Outbox<T> {
         header.stamp_ns = monotonic_ns();
         match self.publisher.send_copy(*message) {
             Ok(_) => Ok(()),
-            Err(e) => Err(TransportError::iceoryx("sending", e)),
+            // In words of its own: a servo that cannot send has no time to count its open files.
+            Err(e) => Err(TransportError::Iceoryx { what: "sending".into(), error: format!("{e:?}") }),
         }
     }
 
