@@ -9,5 +9,6 @@ mod followed;
 mod foxglove;
 mod kept;
 mod pages;
+mod parts;
 mod recordings;
 mod stream;

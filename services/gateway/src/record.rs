@@ -4,6 +4,7 @@
 //! that reads up to its last second; it is listed as `torn`. One that the disk refuses ends by itself, `failed`,
 //! with the cause; what was written stays readable.
 
+mod counts;
 mod kept;
 mod set;
 mod write;
@@ -13,7 +14,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::mpsc::{SyncSender, sync_channel};
+use std::sync::mpsc::{SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, OnceLock, Weak};
 use std::thread::JoinHandle;
 use std::time::SystemTime;
@@ -31,6 +32,7 @@ use crate::rig::RigDesk;
 use crate::settings::RecordingLimits;
 use crate::thruster::{Thruster, lock};
 use crate::token::{Identity, Role};
+pub use counts::Totals;
 pub use kept::{TAGS_MAX, check_tags};
 pub use set::{RecordingSet, Together};
 use write::{Item, Job};
@@ -110,35 +112,30 @@ pub struct Recorder {
     folder: PathBuf,
     limits: RecordingLimits,
     running: Mutex<Vec<Running>>,
-    /// Held by whoever starts one.
+    /// Held by whoever starts, tags or deletes one, or goes on in another file: names do not change meanwhile.
     starting: Mutex<()>,
     /// What became of recordings, where the disk would not take it.
     unwritten: Mutex<BTreeMap<String, RecordingInfo>>,
-    before: Mutex<BTreeMap<String, Totals>>,
+    totals: Mutex<BTreeMap<String, Totals>>,
     events: OnceLock<Weak<Events>>,
     failures: AtomicU64,
 }
 
-/// Rows and losses of a thruster since the gateway started.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Totals {
-    /// Recordings that run.
-    pub running: u64,
-    /// Rows on the disk: of what is under way, since the last flush (every half second).
-    pub rows: u64,
-    /// Samples lost.
-    pub lost: u64,
-    /// Recordings that ended by themselves.
-    pub failed: u64,
-}
-
 #[derive(Debug)]
 struct Running {
+    /// The name it was started by; that of the file being written stands in `info`.
     name: String,
     thruster: String,
     items: SyncSender<Item>,
     info: Arc<Mutex<RecordingInfo>>,
     thread: JoinHandle<()>,
+}
+
+impl Running {
+    /// Is it called so, as a whole or in the file being written?
+    fn is(&self, name: &str) -> bool {
+        self.name == name || lock(&self.info).name == name
+    }
 }
 
 impl Recorder {
@@ -151,7 +148,7 @@ impl Recorder {
             running: Mutex::default(),
             starting: Mutex::default(),
             unwritten: Mutex::default(),
-            before: Mutex::default(),
+            totals: Mutex::default(),
             events: OnceLock::new(),
             failures: AtomicU64::new(0),
         };
@@ -194,9 +191,8 @@ impl Recorder {
             let stamp = humantime::format_rfc3339_seconds(now).to_string().replace(['-', ':'], "");
             format!("{thruster}-{stamp}")
         });
-        let runs = |is: &dyn Fn(&Running) -> bool| lock(&self.running).iter().any(is);
-        let taken = self.file(&name, "json").exists() || runs(&|other| other.name == name);
-        if taken || (!chosen && runs(&|other| other.thruster == thruster)) {
+        let another = || lock(&self.running).iter().any(|other| other.thruster == thruster);
+        if self.is_taken(&name) || (!chosen && another()) {
             let hint = "choose another name; a second recording of a thruster needs a name of its own";
             return Err(Problem::new(
                 Kind::RecordingActive,
@@ -234,7 +230,7 @@ impl Recorder {
         let theirs = Arc::clone(self);
         let thread = std::thread::Builder::new()
             .name("record".into())
-            .spawn(move || job.run(&theirs, &inbox))
+            .spawn(move || job.run(&theirs, inbox))
             .map_err(|error| failed(&error))?;
         let running = Running { name: name.clone(), thruster, items, info: shared, thread };
         lock(&self.running).push(running);
@@ -252,7 +248,7 @@ impl Recorder {
         self.reap();
         let running = {
             let mut all = lock(&self.running);
-            let at = all.iter().position(|running| running.name == name).ok_or_else(|| {
+            let at = all.iter().position(|running| running.is(name)).ok_or_else(|| {
                 Problem::new(Kind::NoRecording, format!("no recording {name:?} is running"))
                     .hint("POST /v1/recordings starts one")
             })?;
@@ -282,10 +278,21 @@ impl Recorder {
         lock(&self.running).iter().filter(of).map(|running| running.name.clone()).collect()
     }
 
-    /// Names of what runs.
+    /// Names of what runs, each as it was started.
     pub fn names_running(&self) -> Vec<String> {
         self.reap();
         lock(&self.running).iter().map(|running| running.name.clone()).collect()
+    }
+
+    /// Does a recording of this name run?
+    pub fn runs(&self, name: &str) -> bool {
+        self.reap();
+        lock(&self.running).iter().any(|running| running.is(name))
+    }
+
+    /// Is a recording of this name there, or a file of one?
+    fn is_taken(&self, name: &str) -> bool {
+        self.runs(name) || [ENDING, "json"].iter().any(|ending| self.file(name, ending).exists())
     }
 
     /// Stops everything: the gateway ends.
@@ -297,10 +304,14 @@ impl Recorder {
     /// Takes a sample of the bus; never waits for the disk.
     pub fn offer(&self, thruster: &str, telemetry: &Telemetry, lost: u64) {
         for running in lock(&self.running).iter().filter(|running| running.thruster == thruster) {
-            let sample = Item::sample(telemetry);
-            let dropped = u64::from(running.items.try_send(sample).is_err());
-            if lost + dropped > 0 {
-                lock(&running.info).lost_samples += lost + dropped;
+            let lost = match running.items.try_send(Item::sample(telemetry)) {
+                Ok(()) => lost,
+                Err(TrySendError::Full(_)) => lost + 1,
+                // It has ended, and loses nothing any more.
+                Err(TrySendError::Disconnected(_)) => 0,
+            };
+            if lost > 0 {
+                self.count_lost(&mut lock(&running.info), lost);
             }
         }
     }
@@ -340,22 +351,9 @@ impl Recorder {
 
     /// Where a recording's file is, if there is one.
     pub fn find(&self, name: &str) -> Option<PathBuf> {
-        (is_name(name) && self.file(name, "json").is_file())
+        (is_word(name) && self.file(name, "json").is_file())
             .then(|| self.file(name, ENDING))
             .filter(|file| file.is_file())
-    }
-
-    /// How many run, and what was written and lost since the gateway started.
-    pub fn totals(&self, thruster: &str) -> Totals {
-        self.reap();
-        let mut totals = lock(&self.before).get(thruster).copied().unwrap_or_default();
-        for running in lock(&self.running).iter().filter(|running| running.thruster == thruster) {
-            let info = lock(&running.info);
-            totals.running += u64::from(info.state == RecordingState::Recording);
-            totals.rows += info.rows;
-            totals.lost += info.lost_samples;
-        }
-        totals
     }
 
     /// Takes those off the list that ended by themselves.
@@ -380,11 +378,9 @@ impl Recorder {
             info.cause = Some("its thread ended in a panic".into());
             self.note_info(&info);
         }
-        let mut before = lock(&self.before);
-        let totals = before.entry(thruster).or_default();
-        totals.rows += info.rows;
-        totals.lost += info.lost_samples;
-        totals.failed += u64::from(info.state == RecordingState::Failed);
+        if info.state == RecordingState::Failed {
+            self.count(&thruster, |totals| totals.failed += 1);
+        }
         info
     }
 
@@ -448,10 +444,14 @@ fn may(who: &Identity, owner: &str, name: &str) -> Result<(), Problem> {
     .hint("its owner may, and whoever has a token of role admin"))
 }
 
-/// Is this a name of a recording: 1 to 64 letters, digits, `.`, `_` or `-`, the first a letter or digit?
+/// May this be chosen as a name: 1 to 64 letters, digits, `.`, `_` or `-`, the first a letter or digit?
 pub fn is_name(name: &str) -> bool {
-    (1..=64).contains(&name.len())
-        && name.starts_with(|c: char| c.is_ascii_alphanumeric())
+    name.len() <= 64 && is_word(name)
+}
+
+/// The same of any length: a recording that goes on in further files has its number behind its name.
+fn is_word(name: &str) -> bool {
+    name.starts_with(|c: char| c.is_ascii_alphanumeric())
         && name.bytes().all(|b| b.is_ascii_alphanumeric() || b"._-".contains(&b))
 }
 

@@ -62,7 +62,7 @@ pub async fn follow(app: Arc<App>, after: After) {
 /// Stops the recording; begins the diagnosis of a signal that is complete.
 fn finish(app: &App, after: &After, complete: bool) -> Result<Option<String>, Problem> {
     let recorder = app.recorder();
-    if recorder.names_running().contains(&after.recording) {
+    if recorder.runs(&after.recording) {
         recorder.stop(&after.recording, &after.who)?;
     }
     let Some((options, first)) = after.diagnose.as_ref().filter(|_| complete) else { return Ok(None) };

@@ -44,9 +44,8 @@ impl Recorder {
         let _one_at_a_time = lock(&self.starting);
         loop {
             self.reap();
-            let running =
-                lock(&self.running).iter().find(|running| running.name == name).map(|r| r.info.clone());
-            let Some(shared) = running else { break };
+            let infos: Vec<_> = lock(&self.running).iter().map(|running| running.info.clone()).collect();
+            let Some(shared) = infos.into_iter().find(|info| lock(info).name == name) else { break };
             let mut info = lock(&shared);
             // Its thread writes them with the next flush; one that is about to end is waited for.
             if info.state == RecordingState::Recording {
@@ -64,9 +63,13 @@ impl Recorder {
         Ok(info)
     }
 
-    /// Deletes a recording that is done.
-    pub fn delete(&self, name: &str, who: &Identity) -> Result<(), Problem> {
-        let _one_at_a_time = lock(&self.starting);
+    /// Stops a recording that runs, and returns it; deletes one that is done.
+    pub fn remove(&self, name: &str, who: &Identity) -> Result<Option<RecordingInfo>, Problem> {
+        let one_at_a_time = lock(&self.starting);
+        if self.runs(name) {
+            drop(one_at_a_time);
+            return self.stop(name, who).map(Some);
+        }
         let info = self.known(name)?;
         may(who, &info.owner, name)?;
         for ending in [ENDING, "csv", "json"] {
@@ -84,7 +87,7 @@ impl Recorder {
             &who.name,
             format!("{} deleted recording {name}", who.name),
         );
-        Ok(())
+        Ok(None)
     }
 
     fn known(&self, name: &str) -> Result<RecordingInfo, Problem> {

@@ -64,7 +64,9 @@ pub struct Job {
     /// The tags that the file has.
     tagged: Vec<String>,
     part: u32,
+    /// The name it was started by, and the number that its file has behind it.
     base: String,
+    number: u32,
     first_ns: Option<u64>,
     /// Rows and duration that were given to the file; the list tells what the disk has of them.
     given: (u64, f64),
@@ -113,6 +115,7 @@ impl Job {
             file,
             tagged: now.tags,
             part: 1,
+            number: 1,
             first_ns,
             given: (0, 0.0),
             thin: Thin::new(now.rate_hz),
@@ -122,20 +125,23 @@ impl Job {
     }
 
     /// Writes until the recorder lets go of the other end, a limit is reached or the disk refuses.
-    pub fn run(mut self, recorder: &Recorder, inbox: &Receiver<Item>) {
-        let ended = self.write(recorder, inbox);
+    pub fn run(mut self, recorder: &Recorder, inbox: Receiver<Item>) {
+        let ended = self.write(recorder, &inbox);
+        // What comes from here on is none of it.
+        drop(inbox);
         let tags = lock(&self.info).tags.clone();
         let finished = finish(self.file, &self.tagged, tags);
         let info = {
             let mut info = lock(&self.info);
             if finished.is_ok() {
-                (info.rows, info.duration_s) = self.given;
+                recorder.count_rows(&mut info, self.given.0, self.given.1);
             }
             (info.state, info.cause) = match (ended, finished) {
                 (Ok(()), Ok(())) => (RecordingState::Complete, None),
                 (Err(End::Limit(why)), Ok(())) => (RecordingState::Complete, Some(why)),
                 (Err(End::Disk(error)), _) | (_, Err(error)) => {
-                    info.lost_samples += self.given.0.saturating_sub(info.rows);
+                    let lost = self.given.0.saturating_sub(info.rows);
+                    recorder.count_lost(&mut info, lost);
                     (RecordingState::Failed, Some(error.to_string()))
                 }
             };
@@ -165,7 +171,7 @@ impl Job {
                 // Not under the lock: a slow disk must not hold up the bus, which counts losses in it.
                 let info = {
                     let mut info = lock(&self.info);
-                    (info.rows, info.duration_s) = self.given;
+                    recorder.count_rows(&mut info, self.given.0, self.given.1);
                     info.clone()
                 };
                 recorder.note_info(&info);
@@ -216,8 +222,7 @@ impl Job {
 
     /// A file that grew too large is followed by another.
     fn rotate(&mut self, recorder: &Recorder) -> Result<(), End> {
-        let now = lock(&self.info).clone();
-        let path = self.folder.join(format!("{}.{ENDING}", now.name));
+        let path = self.folder.join(format!("{}.{ENDING}", lock(&self.info).name));
         if std::fs::metadata(&path)?.len() < self.limits.file_bytes_max {
             return Ok(());
         }
@@ -225,23 +230,30 @@ impl Job {
             let most = self.limits.files_max;
             return Err(End::Limit(format!("gateway.recording.files_max = {most} is reached")));
         }
+        // Neither tags nor the start of another come in between.
+        let _one_at_a_time = lock(&recorder.starting);
+        let now = lock(&self.info).clone();
         self.part += 1;
         self.began = SystemTime::now();
+        // Somebody may have called another recording so.
+        let free = (self.number + 1..).find(|number| !recorder.is_taken(&format!("{}-{number}", self.base)));
+        self.number = free.ok_or_else(|| io::Error::other("no number is free"))?;
         let next = RecordingInfo {
-            name: format!("{}-{}", self.base, self.part),
+            name: format!("{}-{}", self.base, self.number),
             started: humantime::format_rfc3339_millis(self.began).to_string(),
             rows: 0,
             duration_s: 0.0,
+            lost_samples: 0,
             ..now.clone()
         };
         let file = create(&self.folder, &next, &self.subject, self.began)?;
         let tagged = std::mem::replace(&mut self.tagged, next.tags.clone());
-        finish(std::mem::replace(&mut self.file, file), &tagged, now.tags.clone())?;
-        recorder.note_info(&RecordingInfo { state: RecordingState::Complete, ..now });
-        // Tags may have come meanwhile.
-        let mut info = lock(&self.info);
-        *info = RecordingInfo { tags: info.tags.clone(), ..next };
-        drop(info);
+        finish(std::mem::replace(&mut self.file, file), &tagged, now.tags)?;
+        // Samples that were lost meanwhile are those of the file that ends.
+        let mut ended = std::mem::replace(&mut *lock(&self.info), next);
+        ended.state = RecordingState::Complete;
+        recorder.count_rows(&mut ended, self.given.0, self.given.1);
+        recorder.note_info(&ended);
         (self.first_ns, self.given) = (None, (0, 0.0));
         (self.state_s, self.law_s) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
         Ok(())

@@ -143,7 +143,7 @@ async fn start(
         (Err(problem), None) => return Err(problem),
         (Err(problem), Some(name)) => {
             let (recorder, who) = (Arc::clone(app.recorder()), who.clone());
-            blocking(move || recorder.stop(&name, &who).and_then(|_| recorder.delete(&name, &who))).await?;
+            blocking(move || recorder.stop(&name, &who).and_then(|_| recorder.remove(&name, &who))).await?;
             return Err(problem);
         }
     };

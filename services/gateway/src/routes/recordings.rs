@@ -230,6 +230,8 @@ async fn tag(
 }
 
 /// Stops a recording that runs; deletes one that is done. Its owner may, or an admin.
+///
+/// A recording that went on in further files is stopped by the name it was started by, and by that of the file being written.
 #[utoipa::path(delete, path = "/v1/recordings/{name}", tag = "recordings",
     params(("name" = String, Path, description = "Name of the recording", example = "t1-20260101T120000Z")),
     responses(
@@ -247,11 +249,7 @@ async fn remove(
     let recorder = Arc::clone(app.recorder());
     let done = blocking(move || {
         let name = name.strip_suffix(".mcap").unwrap_or(&name);
-        if recorder.names_running().iter().any(|running| running == name) {
-            recorder.stop(name, &who).map(Some)
-        } else {
-            recorder.delete(name, &who).map(|()| None)
-        }
+        recorder.remove(name, &who)
     });
     Ok(match done.await?? {
         Some(info) => axum::Json(info).into_response(),
