@@ -1,6 +1,7 @@
 //! The event log: who armed, took over, commanded and switched, what tripped and what restarted. One JSON
 //! object a line, appended by the gateway and the supervisor alike, and rotated.
 
+use std::collections::BTreeMap;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
 use std::os::unix::fs::OpenOptionsExt;
@@ -35,7 +36,7 @@ pub enum EventKind {
     LeaseExpired,
     /// The drive was armed.
     Armed,
-    /// The drive was disarmed on request.
+    /// The drive was disarmed on request, or because nobody commands it any more.
     Disarmed,
     /// Every thruster was stopped on request.
     Stopped,
@@ -146,20 +147,40 @@ impl Before {
     }
 }
 
-/// How a fault of a thruster came that stands now, from a log's events, oldest first; none if it was cleared since, for
-/// then the log speaks of an earlier time.
-pub fn latched<'a>(
-    log: impl DoubleEndedIterator<Item = &'a Event>,
-    thruster: &str,
-    fault: Fault,
-) -> Option<&'a Event> {
-    log.rev()
-        .filter(|event| event.thruster.as_deref() == Some(thruster))
-        .find(|event| match event.kind {
-            kind if kind.latches() => event.fault == Some(fault.code()),
-            kind => kind == EventKind::FaultsCleared,
-        })
-        .filter(|event| event.kind.latches())
+/// How the faults came that stand now, by the events of a log: of each thruster those since it was last cleared, for before
+/// that the log speaks of an earlier time. However much is told later, they stand.
+#[derive(Debug, Default)]
+pub struct Standing(BTreeMap<String, (u64, Vec<Event>)>);
+
+impl Standing {
+    /// Takes an event into account; in what order they come does not matter.
+    pub fn take(&mut self, event: &Event) {
+        let Some(thruster) = &event.thruster else { return };
+        let (cleared, latched) = self.0.entry(thruster.clone()).or_default();
+        if event.kind == EventKind::FaultsCleared {
+            *cleared = event.id.max(*cleared);
+            latched.retain(|known| known.id > *cleared);
+        } else if event.kind.latches() && event.id > *cleared {
+            latched.retain(|known| known.fault != event.fault || known.id >= event.id);
+            if latched.iter().all(|known| known.fault != event.fault) {
+                latched.push(event.clone());
+            }
+        }
+    }
+
+    /// How a fault of a thruster came; none if it does not stand.
+    pub fn of(&self, thruster: &str, fault: Fault) -> Option<&Event> {
+        let (_, latched) = self.0.get(thruster)?;
+        latched.iter().find(|event| event.fault == Some(fault.code()))
+    }
+}
+
+impl<'a> FromIterator<&'a Event> for Standing {
+    fn from_iter<T: IntoIterator<Item = &'a Event>>(log: T) -> Self {
+        let mut standing = Self::default();
+        log.into_iter().for_each(|event| standing.take(event));
+        standing
+    }
 }
 
 impl Event {
@@ -334,6 +355,22 @@ mod tests {
         assert_eq!(log.read_after(mark).len(), 1);
         assert_eq!(log.read_after(Mark::default()).len(), 3);
         assert_eq!(read[1].before, Some(Before { thrust_n: Some(80.0), shaft_speed_rad_s: None }));
+    }
+
+    #[test]
+    fn what_is_cleared_stands_no_more_whatever_comes_out_of_turn() {
+        let tripped = || Event::now(EventKind::Tripped, Some("t1"), "servo", "").fault(Fault::ServoLost);
+        let (first, second) = (tripped(), tripped());
+        let cleared = Event::now(EventKind::FaultsCleared, Some("t1"), "bench", "");
+        let third = tripped();
+        let standing: Standing = [&second, &first].into_iter().collect();
+        assert_eq!(standing.of("t1", Fault::ServoLost), Some(&second), "the last of them");
+        assert_eq!(standing.of("t2", Fault::ServoLost), None);
+        assert_eq!(standing.of("t1", Fault::GatewayLost), None);
+        let standing: Standing = [&cleared, &first, &second].into_iter().collect();
+        assert_eq!(standing.of("t1", Fault::ServoLost), None);
+        let standing: Standing = [&first, &third, &cleared].into_iter().collect();
+        assert_eq!(standing.of("t1", Fault::ServoLost), Some(&third));
     }
 
     #[test]

@@ -7,7 +7,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use kort_proto::events::{Event, EventKind, EventLog, Mark};
+use kort_proto::events::{Event, EventKind, EventLog, Mark, Standing};
 use kort_proto::faults::Fault;
 
 use crate::record::Recorder;
@@ -25,8 +25,17 @@ const QUEUE: usize = 4096;
 pub struct Events {
     outbox: SyncSender<Event>,
     waiting: AtomicU64,
-    at_hand: Mutex<VecDeque<Event>>,
+    known: Mutex<Known>,
     recorder: Arc<Recorder>,
+}
+
+/// What is known of the log without reading it.
+#[derive(Debug, Default)]
+struct Known {
+    /// The newest, in the order of ids.
+    newest: VecDeque<Event>,
+    /// However long ago they came.
+    standing: Standing,
 }
 
 impl Events {
@@ -35,7 +44,7 @@ impl Events {
         let log = EventLog::open(folder)?;
         let (outbox, inbox) = sync_channel(QUEUE);
         let waiting = AtomicU64::new(0);
-        let events = Arc::new(Events { outbox, waiting, at_hand: Mutex::default(), recorder });
+        let events = Arc::new(Events { outbox, waiting, known: Mutex::default(), recorder });
         // What is known comes first: faults that stand there need not be told again.
         let mark = log.end();
         events.learn(log.read());
@@ -73,30 +82,33 @@ impl Events {
 
     /// Events after this one, oldest first, at most `most` of the newest.
     pub fn since(&self, id: u64, most: usize) -> Vec<Event> {
-        let at_hand = lock(&self.at_hand);
-        let newer = at_hand.iter().filter(|event| event.id > id);
+        let known = lock(&self.known);
+        let newer = known.newest.iter().filter(|event| event.id > id);
         let skip = newer.clone().count().saturating_sub(most);
         newer.skip(skip).cloned().collect()
     }
 
     /// How a fault of a thruster came that stands now; none if it was cleared since.
     pub fn latched(&self, thruster: &str, fault: Fault) -> Option<Event> {
-        kort_proto::events::latched(lock(&self.at_hand).iter(), thruster, fault).cloned()
+        lock(&self.known).standing.of(thruster, fault).cloned()
     }
 
     /// Takes over what is new, in the order of ids.
     fn learn(&self, events: Vec<Event>) {
-        let mut at_hand = lock(&self.at_hand);
+        let Known { newest, standing } = &mut *lock(&self.known);
         for event in events {
-            let place = at_hand.partition_point(|known| known.id < event.id);
-            if at_hand.get(place).is_some_and(|known| known.id == event.id) {
+            standing.take(&event);
+            let place = newest.partition_point(|known| known.id < event.id);
+            // Older than all at hand: the files were rotated, and read anew.
+            let old = place == 0 && newest.len() >= AT_HAND;
+            if old || newest.get(place).is_some_and(|known| known.id == event.id) {
                 continue;
             }
             self.recorder.note(&event);
-            at_hand.insert(place, event);
-        }
-        while at_hand.len() > AT_HAND {
-            at_hand.pop_front();
+            newest.insert(place, event);
+            if newest.len() > AT_HAND {
+                newest.pop_front();
+            }
         }
     }
 }
@@ -127,5 +139,29 @@ fn keep(log: &EventLog, mut mark: Mark, inbox: &Receiver<Event>, events: &Events
             events.learn(log.read_after(mark));
             mark = end;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::RecordingLimits;
+
+    #[test]
+    fn a_fault_keeps_its_time_however_much_is_told_after_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let recorder = Recorder::open(&folder.path().join("recordings"), RecordingLimits::default()).unwrap();
+        let events = Events::start(&folder.path().join("events"), Arc::new(recorder)).unwrap();
+        let tripped = Event::now(EventKind::Tripped, Some("t1"), "servo", "").fault(Fault::ServoLost);
+        events.note(tripped.clone());
+        for _ in 0..=AT_HAND {
+            events.learn(vec![Event::now(EventKind::Commanded, Some("t1"), "bench", "")]);
+        }
+        assert!(events.since(0, usize::MAX).iter().all(|event| event.id > tripped.id), "long past");
+        assert_eq!(events.latched("t1", Fault::ServoLost), Some(tripped.clone()));
+        events.learn(vec![tripped.clone()]);
+        assert_eq!(events.since(0, usize::MAX).len(), AT_HAND, "what is read anew is not told anew");
+        events.tell(EventKind::FaultsCleared, Some("t1"), "bench", "");
+        assert_eq!(events.latched("t1", Fault::ServoLost), None);
     }
 }

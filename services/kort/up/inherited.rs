@@ -2,7 +2,7 @@
 //! are, old. The event log need not know of them: it lies in the folder the service is started in, shared memory is
 //! the user's.
 
-use kort_proto::events::{Event, EventKind, EventLog, latched as latched_in};
+use kort_proto::events::{Event, EventKind, EventLog, Standing};
 use kort_proto::faults::Fault;
 use kort_proto::transport::Stood;
 use tracing::warn;
@@ -21,7 +21,8 @@ pub fn tell<'a>(stood: impl Iterator<Item = (&'a str, &'a Stood)>, log: &EventLo
                 thruster = id,
                 "{words}, before this start\nhint: once its cause is gone, POST /v1/thrusters/{id}/clear-faults, or \"Clear faults\" in the console"
             );
-            if latched_in(known.get_or_insert_with(|| log.read()).iter(), id, fault).is_some() {
+            let known: &Standing = known.get_or_insert_with(|| log.read().iter().collect());
+            if known.of(id, fault).is_some() {
                 continue;
             }
             let words = format!("{words}, before this start: {}", fault.help());
