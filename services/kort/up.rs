@@ -71,7 +71,7 @@ pub fn run(config: &Config, deployment: &Deployment) -> Result<(), UpError> {
         || "as built in; --config FILE takes another, config/kort.toml is found by itself".to_owned(),
         |file| file.display().to_string(),
     );
-    let address = format!("{}://{}", gateway.scheme(), gateway.bind);
+    let address = gateway.address();
     // Not println!: stdout on a full disk is no reason to end.
     let _ = write!(
         std::io::stdout(),

@@ -38,6 +38,12 @@ fn ask(port: u16, method: &str, path: &str, headers: &[(&str, &str)], body: &str
 
 const T1: &str = "/v1/thrusters/t1";
 
+/// Events of a kind.
+fn told(stack: &Stack, kind: &str) -> Vec<Value> {
+    let events = stack.get("/v1/events").unwrap();
+    events.as_array().unwrap().iter().filter(|event| event["kind"] == kind).cloned().collect()
+}
+
 fn take(port: u16, body: &Value) -> (u16, Value) {
     ask(port, "POST", &format!("{T1}/lease"), &[], &body.to_string())
 }
@@ -76,6 +82,16 @@ fn while_somebody_holds_the_lease_every_change_needs_it() {
         let (status, answer) = ask(port, "POST", "/v1/stop", &[], "");
         assert_eq!((status, &answer["stopped"]), (200, &json!(["t1"])));
         assert_eq!(stack.state().unwrap()["armed"], false);
+        // One event for all of it, and one of the disarming before.
+        let told = |kind: &str| told(&stack, kind);
+        assert_eq!((told("stopped").len(), told("disarmed").len()), (1, 1));
+        assert_eq!(told("stopped")[0]["detail"], "local stopped every thruster; confirmed: t1");
+        // What did not come about is not told as done.
+        kill(stack.process_of("servo"), "STOP");
+        let (status, answer) = ask(port, "POST", "/v1/stop", &[], "");
+        assert_eq!((status, &answer["detail"]), (503, &json!("no servo confirmed the stop of t1")));
+        let words = "local asked every thruster to stop; no servo confirmed the stop of t1";
+        assert_eq!(told("stopped")[1]["detail"], words);
     });
 }
 
@@ -176,6 +192,16 @@ fn where_tokens_are_asked_for_each_role_does_its_own() {
     let (_, document) = ask(port, "GET", "/openapi.json", &[], "");
     assert_eq!(document["components"]["securitySchemes"]["token"]["scheme"], "bearer");
     assert!(document["servers"][0]["url"].is_string());
+    for (path, operations) in document["paths"].as_object().unwrap() {
+        for (method, operation) in
+            operations.as_object().unwrap().iter().filter(|(_, o)| o["responses"].is_object())
+        {
+            let open = operation["security"] == json!([{}]);
+            assert!(operation["security"].is_array(), "{method} {path}");
+            assert!(operation["responses"]["421"].is_object(), "{method} {path}");
+            assert!(open || operation["responses"]["401"].is_object(), "{method} {path}");
+        }
+    }
     // A revoked token is refused without a restart.
     std::fs::write(site.folder.path().join("tokens.toml"), kept.replace("[tokens.eye]", "[tokens.gone]"))
         .unwrap();
@@ -204,6 +230,9 @@ fn beyond_loopback_nothing_starts_without_tokens_and_tls() {
     refused("holds no token");
     let pilot = token(&site, "bridge", "pilot");
     let mut supervisor = site.spawn("up");
+    // Nobody can go to 0.0.0.0, and the gateway would not know itself by that name.
+    let console = format!("console  https://localhost:{}/\n", site.port);
+    wait("where the console is", || site.log().contains(&console).then_some(()));
     let certificate = site.folder.path().join("tls/cert.pem");
     wait("the certificate", || certificate.is_file().then_some(()));
     // curl speaks TLS for us; where it is absent the handshake is left out, and said so.

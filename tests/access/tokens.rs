@@ -23,6 +23,28 @@ fn guarded(role: &str) -> (Site, String, std::process::Child) {
     (site, bearer, supervisor)
 }
 
+/// On loopback too, where others come through a proxy or it is said so; and the reason told is the true one.
+#[test]
+fn a_gateway_on_loopback_says_why_it_asks_for_tokens() {
+    for key in ["require_tokens", "behind_tls_proxy"] {
+        let site = Site::new();
+        site.add("[gateway]", &format!("{key} = true"));
+        let out = common::run(&mut site.command("up"));
+        let words = String::from_utf8_lossy(&out.stderr);
+        assert_eq!(out.status.code(), Some(2), "{key}: {words}");
+        for part in [&format!("`gateway.{key}` = true"), "tokens.toml holds no token", "kort token new"] {
+            assert!(words.contains(part), "{key}, {part}: {words}");
+        }
+        assert!(!words.contains("is reached from other machines"), "{key}: {words}");
+        token(&site, "bridge", "pilot");
+        let mut supervisor = site.spawn("up");
+        wait("the gateway", || (ask(site.port, "GET", "/healthz", &[], "").0 == 200).then_some(()));
+        assert_eq!(ask(site.port, "GET", T1, &[], "").0, 401, "{key}");
+        kill(supervisor.id(), "TERM");
+        supervisor.wait().unwrap();
+    }
+}
+
 #[test]
 fn a_stream_ends_with_the_token_that_opened_it_and_commands_nothing_more() {
     common::in_real_time(|| {

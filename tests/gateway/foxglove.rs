@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use tokio_tungstenite::tungstenite::client::IntoClientRequest;
 use tokio_tungstenite::tungstenite::{Message, connect};
 
-use crate::common::{self, KORT, Site, Stack, run};
+use crate::common::{self, KORT, Site, Stack, kill, run, wait};
 
 #[test]
 fn signals_come_live_in_foxgloves_protocol() {
@@ -69,14 +69,41 @@ fn it_is_refused_where_it_would_open_what_is_closed() {
         ("foxglove = \"0.0.0.0:8765\"", "addresses of this machine"),
         ("foxglove = \"127.0.0.1:8765\"\nrequire_tokens = true", "require_tokens"),
         ("foxglove = \"here\"", "IP:PORT"),
+        ("foxglove = \"127.0.0.1:0\"", "1 to 65535"),
+        ("foxglove = \"127.0.0.1:{own}\"", "that of gateway.bind"),
     ] {
         let site = Site::new();
-        site.add("[gateway]", line);
+        site.add("[gateway]", &line.replace("{own}", &site.port.to_string()));
         let checked = run(std::process::Command::new(KORT).arg("check").arg(site.config()));
         let said =
             String::from_utf8_lossy(&checked.stderr).into_owned() + &String::from_utf8_lossy(&checked.stdout);
         assert!(!checked.status.success() && said.contains(words), "{line}: {said}");
     }
+}
+
+/// A port that is taken is told before anything starts; one that is taken later costs nothing but itself.
+#[test]
+fn a_taken_port_is_told_and_keeps_no_gateway_from_running() {
+    let site = Site::new();
+    let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = taken.local_addr().unwrap().port();
+    site.add("[gateway]", &format!("foxglove = \"127.0.0.1:{port}\""));
+    let out = run(&mut site.command("up"));
+    let said = String::from_utf8_lossy(&out.stderr);
+    assert!(
+        !out.status.success() && said.contains(&format!("gateway.foxglove = 127.0.0.1:{port}")),
+        "{said}"
+    );
+    drop(taken);
+    let stack = Stack::start_at(site);
+    let first = stack.process_of("gateway");
+    // Its successor finds the port with somebody else.
+    kill(first, "KILL");
+    let taken = wait("the port", || std::net::TcpListener::bind(("127.0.0.1", port)).ok());
+    wait("a successor", || stack.process("gateway").filter(|pid| *pid != first));
+    wait("its word", || stack.site.log().contains("another port, or leave the key out").then_some(()));
+    stack.wait_until_up();
+    drop(taken);
 }
 
 #[test]

@@ -314,6 +314,11 @@ fn the_end_of_a_lease_ramps_to_zero_within_half_a_second() {
         assert!(took_ms <= 500 + 2 * PERIOD_NS / 1_000_000, "{took_ms} ms");
         assert!(took_ms >= 150, "a ramp, no step: {took_ms} ms");
         assert!(taken.elapsed() >= Duration::from_millis(2900), "the lease ended early");
+        wait("the end of the arming to be told", || {
+            let events = stack.get("/v1/events")?;
+            let last = events.as_array()?.iter().rev().find(|event| event["kind"] == "disarmed")?;
+            last["detail"].as_str()?.contains("nobody commands").then_some(())
+        });
         watch.stays_at_zero(Duration::from_millis(500));
         stack.thrust(60.0, LEASE_MS);
     });

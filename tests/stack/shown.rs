@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 
 use crate::LEASE_MS;
-use crate::common::{self, Stack, kill};
+use crate::common::{self, Stack, kill, wait};
 
 /// Every fault that is ever shown has its time and what was before it, and a gateway that just began does not speak of a
 /// drive that it has not heard.
@@ -39,5 +39,29 @@ fn no_state_is_shown_that_is_not_known_yet() {
                 assert!(thrust.is_some_and(|n| n > 50.0), "{role}: it drove at 80 N: {event}");
             }
         }
+    });
+}
+
+/// What a ramp began with is told of a stop that ended one, not what was left of it when somebody looked again.
+#[test]
+fn a_gateway_that_was_away_tells_what_was_before_the_ramp() {
+    common::in_real_time(|| {
+        let mut stack = Stack::start();
+        stack.thrust(80.0, LEASE_MS);
+        let mut watch = stack.watch();
+        let settled =
+            watch.until("the whole thrust", |t| t.signals.thrust_cmd_n == 80.0).time_ns + 2_000_000_000;
+        let drove = watch.until("two seconds of it", |t| t.time_ns > settled);
+        let gateway = stack.process_of("gateway");
+        kill(gateway, "STOP");
+        watch.until("half the ramp", |t| t.armed == 0 || t.signals.thrust_cmd_n < 50.0);
+        kill(gateway, "CONT");
+        let before = wait("the fault", || {
+            let state = stack.state()?;
+            let fault = state["faults"].as_array()?.iter().find(|f| f["name"] == "gateway_lost")?.clone();
+            fault["before"]["shaft_speed_rad_s"].as_f64()
+        });
+        let speed = drove.signals.shaft_speed_rad_s;
+        assert!((before / speed - 1.0).abs() < 0.05, "{before} rad/s, it ran at {speed}");
     });
 }

@@ -47,6 +47,8 @@ pub struct Stood {
     pub thrust_n: Option<f64>,
     /// Shaft speed, rad/s; absent if not measured.
     pub shaft_speed_rad_s: Option<f64>,
+    /// What it did when it was last heard armed and not ramped down.
+    pub driven: Option<Before>,
     /// How each latched fault came: whoever finds it at a later start tells it as old as it is.
     pub latched: Vec<Latched>,
 }

@@ -7,26 +7,25 @@
 mod held;
 mod pending;
 mod pulse;
+mod told;
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, mpsc};
 use std::time::{Duration, Instant};
 
-use kort_proto::events::{Before, Event, EventKind};
+use kort_proto::events::{Before, EventKind};
 use kort_proto::faults::Fault;
 use kort_proto::limits::Limit;
-use kort_proto::messages::{ControllerState, Setpoint as SetpointMessage, SetpointKind, Telemetry, Trip};
-use kort_proto::transport::{
-    Deployment, GatewayPorts, Latched, Ticker, TransportError, Watched, monotonic_ns, realtime,
-};
+use kort_proto::messages::{RequestKind, Setpoint as SetpointMessage, SetpointKind, Telemetry};
+use kort_proto::transport::{Deployment, GatewayPorts, Ticker, TransportError, monotonic_ns, realtime};
 
 use crate::events::Events;
 use crate::record::Recorder;
 use crate::ring::Feed;
 use crate::tally::Tally;
 use crate::thruster::{Ask, Thruster};
-use crate::view::{MismatchView, Setpoint};
+use crate::view::Setpoint;
 use held::Held;
 use pending::Pending;
 pub use pulse::{Bell, Pulse};
@@ -121,6 +120,9 @@ struct Bridge {
     /// And before it was ramped down: a lost gateway's stop begins there.
     before_ramp: Option<Before>,
     ramping: bool,
+    /// As the servo said last, and whether somebody asked since the arming for its end.
+    armed: bool,
+    disarm_asked: bool,
     /// Until when answers are looked for between two ticks.
     errands_until: Option<Instant>,
     unanswered: bool,
@@ -143,6 +145,8 @@ impl Bridge {
             before: None,
             before_ramp: None,
             ramping: false,
+            armed: false,
+            disarm_asked: false,
             errands_until: None,
             unanswered: false,
         }
@@ -157,6 +161,7 @@ impl Bridge {
             self.keep_open(deployment);
         }
         let Some(mut ports) = self.ports.take() else {
+            self.link.thruster.looked(now, false);
             return self.refuse(now);
         };
         self.receive(&ports, recorder, now);
@@ -220,64 +225,6 @@ impl Bridge {
         }
     }
 
-    /// What the desk noted goes to the event log.
-    fn tell_notes(&self, now: Instant) {
-        let notes = {
-            let mut desk = self.link.thruster.desk();
-            desk.expire(now);
-            desk.notes()
-        };
-        for note in notes {
-            self.link.events.tell(note.kind, Some(&self.link.thruster.id), &note.who, note.detail);
-        }
-    }
-
-    /// Faults that were not latched before go to the event log, with what the thruster did before. Those that this
-    /// gateway finds latched at its start may stand there already.
-    fn tell_tripped(&mut self, who: usize, faults: u64, tripped: Option<&Trip>) {
-        let known = self.latched[who].replace(faults);
-        let id = &self.link.thruster.id;
-        for fault in Fault::in_set(faults & !known.unwrap_or(0)) {
-            if known.is_none() && self.link.events.latched(id, fault).is_some() {
-                continue;
-            }
-            let process = ["servo", "controller"][who];
-            let detail = format!("{} (code {}): {}", fault.name(), fault.code(), fault.help());
-            let event = Event::now(EventKind::Tripped, Some(id), process, detail).fault(fault);
-            let trip = tripped.filter(|trip| trip.at_ns != 0);
-            let driven = self.before_ramp.filter(|_| fault.is_ramped());
-            let before = driven.or(self.before);
-            let before = before.or(trip.map(|trip| Before::of(trip.thrust_n, trip.shaft_speed_rad_s)));
-            // What came while no gateway looked, the supervisor saw come.
-            let seen = known.is_none().then(|| self.seen_by_supervisor(fault)).flatten();
-            let (since, before) = seen.map_or((None, before), |s| (Some(s.since), s.before.or(before)));
-            self.link.events.note(Event { since, before, ..event });
-        }
-        if faults == 0 && known.is_some_and(|known| known != 0) {
-            self.before = None;
-            self.before_ramp = None;
-        }
-    }
-
-    /// How a fault came, by what the supervisor wrote down.
-    fn seen_by_supervisor(&self, fault: Fault) -> Option<Latched> {
-        let stood = Watched::read(&self.watched).thrusters.remove(&self.link.thruster.id)?;
-        stood.latched.into_iter().find(|latched| latched.code == fault.code())
-    }
-
-    /// A path that is off, and that all is well again.
-    fn tell_mismatch(&mut self, state: &ControllerState) {
-        if std::mem::replace(&mut self.mismatch_path, state.mismatch_path) != state.mismatch_path {
-            let id = &self.link.thruster.id;
-            self.link.events.tell(
-                EventKind::Mismatch,
-                Some(id),
-                "controller",
-                MismatchView::of(state).words(),
-            );
-        }
-    }
-
     fn receive(&mut self, ports: &GatewayPorts, recorder: &Recorder, now: Instant) {
         let mut last: Option<Telemetry> = None;
         while let Some(telemetry) = ports.telemetry.next() {
@@ -304,6 +251,7 @@ impl Bridge {
                 self.before_ramp = self.before_ramp.filter(|_| self.ramping).or(self.before);
             }
             self.tell_tripped(0, telemetry.faults, Some(&telemetry.tripped));
+            self.tell_disarmed(&telemetry);
             last = Some(telemetry);
         }
         let state = ports.state.latest();
@@ -314,6 +262,7 @@ impl Bridge {
             self.tell_mismatch(state);
         }
         let thruster = &self.link.thruster;
+        thruster.looked(now, last.is_some());
         if last.is_some() || state.is_some() {
             thruster.hear(|heard| {
                 if let Some(telemetry) = last {
@@ -340,6 +289,7 @@ impl Bridge {
             self.next_ask += 1;
             self.errands_until = Some(now + ask.within.min(ERRANDS_FOR));
             let request = ask.request;
+            self.disarm_asked |= request.kind == RequestKind::Disarm as u32;
             self.pending.push(Pending::new(ask, now));
             ports.request.send(request)?;
         }

@@ -67,14 +67,14 @@ pub enum GatewayError {
         /// The system's words.
         error: std::io::Error,
     },
-    /// Who may command beyond this machine is not said.
+    /// Tokens are asked for, and there is none.
     #[error(
-        "gateway.bind = {bind} is reached from other machines, and {} holds no token\nhint: kort token new NAME --role viewer|pilot|admin makes one",
+        "{why}, and {} holds no token\nhint: kort token new NAME --role viewer|pilot|admin makes one",
         file.display()
     )]
     NoTokens {
-        /// The address.
-        bind: SocketAddr,
+        /// Why they are asked for.
+        why: String,
         /// The file of the tokens.
         file: PathBuf,
     },

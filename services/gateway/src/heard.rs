@@ -13,6 +13,10 @@ pub const AWAY_AFTER: Duration = Duration::from_millis(300);
 pub struct Heard {
     /// Silence of the servo after which nothing is claimed of its drive any more: some of its periods.
     pub servo_silence: Duration,
+    /// How often it is listened for: what a turn takes longer is a hold-up of this process, and no silence of the servo.
+    pub turn: Duration,
+    /// Silence up to the last turn, and when that was.
+    silent: (Duration, Option<Instant>),
     /// Counts up with every sample.
     pub version: u64,
     /// The servo's last telemetry and when it came.
@@ -24,6 +28,22 @@ pub struct Heard {
 }
 
 impl Heard {
+    /// Nothing yet.
+    pub fn new(servo_silence: Duration, turn: Duration) -> Heard {
+        Heard { servo_silence, turn, ..Heard::default() }
+    }
+
+    /// It was listened for the servo; something came, or nothing.
+    pub fn looked(&mut self, now: Instant, came: bool) {
+        self.silent = (if came { Duration::ZERO } else { self.silence(now) }, Some(now));
+    }
+
+    /// How long the servo is silent, of the time that somebody listened.
+    fn silence(&self, now: Instant) -> Duration {
+        let (before, looked) = self.silent;
+        before + looked.map_or(Duration::ZERO, |at| now.saturating_duration_since(at).min(self.turn))
+    }
+
     /// The servo's last word, unless it is away.
     pub fn telemetry(&self, now: Instant) -> Option<&Telemetry> {
         self.servo
@@ -58,7 +78,7 @@ impl Heard {
 
     /// Is the servo silent for longer than its loop takes?
     pub fn servo_silent(&self, now: Instant) -> bool {
-        self.servo.as_ref().is_none_or(|(at, _)| now.saturating_duration_since(*at) > self.servo_silence)
+        self.servo.is_none() || self.silence(now) > self.servo_silence
     }
 
     /// Faults as shown: the gateway's own too, which stop nothing, and a servo that fell silent while armed, before its
@@ -78,5 +98,38 @@ impl Heard {
     /// Is the servo (the controller) heard?
     pub fn alive(&self, now: Instant) -> (bool, bool) {
         (self.telemetry(now).is_some(), self.controller(now).is_some())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TURN: Duration = Duration::from_millis(4);
+    const SILENCE: Duration = Duration::from_millis(8);
+
+    fn heard_armed(at: Instant) -> Heard {
+        let telemetry = Telemetry { armed: 1, ..Telemetry::default() };
+        let mut heard = Heard { servo: Some((at, telemetry)), ..Heard::new(SILENCE, TURN) };
+        heard.looked(at, true);
+        heard
+    }
+
+    #[test]
+    fn a_gateway_that_is_held_up_takes_no_servo_for_lost() {
+        let t0 = Instant::now();
+        let ms = |n| t0 + Duration::from_millis(n);
+        let mut heard = heard_armed(t0);
+        assert!(heard.shown_armed(ms(50)), "nobody listened meanwhile");
+        assert_eq!(heard.shown_faults(ms(50)), 0);
+        heard.looked(ms(50), false);
+        assert!(heard.shown_armed(ms(51)), "a servo that was held up with it comes a moment later");
+        heard.looked(ms(52), true);
+        assert!(heard.shown_armed(ms(59)));
+        for turn in 0..3 {
+            heard.looked(ms(60 + 4 * turn), false);
+        }
+        assert!(!heard.shown_armed(ms(69)), "three turns in time and nothing came");
+        assert_eq!(heard.shown_faults(ms(69)), Fault::ServoLost.bit());
     }
 }

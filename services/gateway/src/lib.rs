@@ -11,6 +11,7 @@
 pub mod bodies;
 mod bus;
 mod calibration;
+mod check;
 mod connections;
 mod desk;
 mod diagnosis;
@@ -58,6 +59,8 @@ use utoipa::openapi::OpenApi;
 
 use bus::{Bell, Pulse};
 use calibration::Calibrations;
+use check::{certificate, tokens};
+pub use check::{check, check_config};
 use connections::Connections;
 use diagnosis::Diagnoses;
 use durations::Durations;
@@ -73,8 +76,6 @@ use settings::Deployed;
 pub use settings::Settings;
 use tally::Tally;
 use thruster::Thruster;
-use tls::Certificate;
-use token::Tokens;
 
 /// Largest request body, bytes.
 const BODY_BYTES_MAX: usize = 16 * 1024;
@@ -272,60 +273,6 @@ impl Drop for StreamGuard {
     }
 }
 
-/// Could a gateway start with this configuration? Says so before anything else is started.
-///
-/// # Errors
-/// If the address is taken or the folder of the recordings cannot be made.
-pub fn check(settings: &Settings) -> Result<(), GatewayError> {
-    let (bind, folder) = (settings.bind, settings.recordings.clone());
-    std::net::TcpListener::bind(bind).map_err(|error| GatewayError::Bind { bind, error })?;
-    std::fs::create_dir_all(&folder).map_err(|error| GatewayError::Recordings { folder, error })?;
-    let events = settings.events.clone();
-    std::fs::create_dir_all(&events).map_err(|error| GatewayError::Events { folder: events, error })?;
-    let rigs = settings.rigs.clone();
-    std::fs::create_dir_all(&rigs).map_err(|error| GatewayError::Rigs { folder: rigs, error })?;
-    tokens(settings)?;
-    certificate(settings)?;
-    Ok(())
-}
-
-/// What is wrong with this configuration for a gateway: reads all that it reads, and touches no address. Each names
-/// file, key, value and what is allowed.
-pub fn check_config(config: &Config) -> Vec<GatewayError> {
-    let mut wrong: Vec<GatewayError> =
-        settings::thrusters(config).err().into_iter().map(Into::into).collect();
-    match Settings::new_unchecked(config) {
-        Err(error) => wrong.push(error.into()),
-        Ok(settings) => {
-            wrong.extend(settings.wrong().into_iter().map(|words| config.error(words).into()));
-            wrong.extend(tokens(&settings).err());
-            let keys = settings.tls.as_ref().filter(|keys| !keys.self_signed);
-            wrong.extend(keys.and_then(|keys| Certificate::open(keys, Vec::new()).err()).map(Into::into));
-        }
-    }
-    wrong
-}
-
-/// The tokens; beyond this machine there must be one.
-fn tokens(settings: &Settings) -> Result<Tokens, GatewayError> {
-    let tokens = Tokens::open(&settings.tokens)?;
-    if settings.asks_for_tokens() && tokens.count() == 0 {
-        return Err(GatewayError::NoTokens { bind: settings.bind, file: settings.tokens.clone() });
-    }
-    Ok(tokens)
-}
-
-/// The certificate, where TLS is asked for.
-fn certificate(settings: &Settings) -> Result<Option<Arc<Certificate>>, GatewayError> {
-    let Some(keys) = &settings.tls else { return Ok(None) };
-    let mut names = vec!["localhost".to_owned(), "127.0.0.1".to_owned(), "::1".to_owned()];
-    if !settings.bind.ip().is_unspecified() {
-        names.push(settings.bind.ip().to_string());
-    }
-    names.extend(settings.hosts.iter().cloned());
-    Ok(Some(Arc::new(Certificate::open(keys, names)?)))
-}
-
 /// Serves until SIGINT or SIGTERM; then disarms every thruster, closes a running recording and returns.
 ///
 /// # Errors
@@ -392,7 +339,7 @@ async fn serve(
         gate,
         connections: Arc::clone(&connections),
         streams: Streams::default(),
-        address: format!("{}://{bind}", settings.scheme()),
+        address: settings.address(),
         disks: [settings.recordings.clone(), settings.events.clone()],
         watched: deployment.watched_file(),
         answers: Default::default(),
@@ -405,8 +352,13 @@ async fn serve(
     let mut links = Vec::new();
     for deployed in thrusters {
         let Deployed { id, range, heartbeat, servo_silence, .. } = &deployed;
-        let (thruster, asks) =
-            Thruster::new(id, *range, *servo_silence, Arc::clone(&bell), Arc::clone(&events));
+        let (thruster, asks) = Thruster::new(
+            id,
+            *range,
+            heard::Heard::new(*servo_silence, *heartbeat),
+            Arc::clone(&bell),
+            Arc::clone(&events),
+        );
         app.controllers.push(deployed.controller);
         let (thruster, tally, heartbeat) = (Arc::new(thruster), Arc::new(Tally::new()), *heartbeat);
         let rig = RigDesk::open(
@@ -433,9 +385,14 @@ async fn serve(
     #[cfg(feature = "foxglove")]
     if let Some(bind) = settings.foxglove {
         let listener = tokio::net::TcpListener::bind(bind);
-        let listener = listener.await.map_err(|error| GatewayError::Foxglove { bind, error })?;
-        tracing::info!("for Foxglove: ws://{bind}");
-        tokio::spawn(foxglove::serve(Arc::clone(&app), listener));
+        // Somebody took the port since the start: thrust is no less safe without it.
+        match listener.await.map_err(|error| GatewayError::Foxglove { bind, error }) {
+            Ok(listener) => {
+                tracing::info!("for Foxglove: ws://{bind}");
+                tokio::spawn(foxglove::serve(Arc::clone(&app), listener));
+            }
+            Err(error) => tracing::warn!("{error}"),
+        }
     }
 
     let stop_bus = Arc::new(AtomicBool::new(false));

@@ -33,11 +33,12 @@ pub struct Settings {
     pub calibrations: PathBuf,
     /// File of the tokens, likewise; `kort token new` writes it.
     pub tokens: PathBuf,
-    /// Ask for a token on loopback too; beyond it one is always asked for.
+    /// Ask for a token on loopback too; beyond it, and behind a proxy, one is always asked for.
     pub require_tokens: bool,
     /// Names and addresses under which this gateway is reached, beside its own: what `Host` and `Origin` may say.
     pub hosts: Vec<String>,
-    /// A proxy in front of this address speaks TLS: the traffic here never leaves trusted wires.
+    /// A proxy in front of this address speaks TLS: the traffic here never leaves trusted wires. Whoever comes through it
+    /// brings a token.
     pub behind_tls_proxy: bool,
     /// TLS of its own.
     pub tls: Option<Tls>,
@@ -180,6 +181,13 @@ impl Settings {
             ));
         }
         if let Some(bind) = self.foxglove {
+            let own = bind.port() == self.bind.port()
+                && (bind.ip() == self.bind.ip() || self.bind.ip().is_unspecified());
+            if bind.port() == 0 || own {
+                wrong.push(format!(
+                    "`gateway.foxglove` = {bind}; allowed are the ports 1 to 65535 but that of gateway.bind\nhint: \"127.0.0.1:8765\""
+                ));
+            }
             if !bind.ip().is_loopback() || self.require_tokens {
                 wrong.push(format!(
                     "`gateway.foxglove` = {bind} asks nobody for a token; allowed are addresses of this machine, without require_tokens\nhint: \"127.0.0.1:8765\", and a tunnel from elsewhere"
@@ -225,7 +233,28 @@ impl Settings {
 
     /// Must every request bring a token?
     pub fn asks_for_tokens(&self) -> bool {
-        self.require_tokens || !self.bind.ip().is_loopback()
+        self.why_tokens().is_some()
+    }
+
+    /// Why every request must bring a token, if it must.
+    pub fn why_tokens(&self) -> Option<String> {
+        if !self.bind.ip().is_loopback() {
+            Some(format!("`gateway.bind` = {} is reached from other machines", self.bind))
+        } else if self.behind_tls_proxy {
+            Some("`gateway.behind_tls_proxy` = true: other machines come through the proxy".into())
+        } else {
+            self.require_tokens.then(|| "`gateway.require_tokens` = true".into())
+        }
+    }
+
+    /// Where a browser finds the console: an address that stands for all of this machine's is none to go to.
+    pub fn address(&self) -> String {
+        let host = match self.hosts.first() {
+            Some(host) if self.bind.ip().is_unspecified() => format!("{host}:{}", self.bind.port()),
+            None if self.bind.ip().is_unspecified() => format!("localhost:{}", self.bind.port()),
+            _ => self.bind.to_string(),
+        };
+        format!("{}://{host}", self.scheme())
     }
 
     /// `http` or `https`, as the console is reached.

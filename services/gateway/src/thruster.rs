@@ -79,7 +79,7 @@ impl Thruster {
     pub fn new(
         id: &str,
         range: SetpointRange,
-        servo_silence: Duration,
+        heard: Heard,
         bell: Arc<Bell>,
         events: Arc<Events>,
     ) -> (Thruster, mpsc::Receiver<Ask>) {
@@ -88,7 +88,7 @@ impl Thruster {
             id: id.to_owned(),
             range: Mutex::new(range),
             desk: Mutex::new(Desk::new(id)),
-            heard: Mutex::new(Heard { servo_silence, ..Heard::default() }),
+            heard: Mutex::new(heard),
             asks,
             bell,
             events,
@@ -135,6 +135,11 @@ impl Thruster {
         let mut heard = lock(&self.heard);
         update(&mut heard);
         heard.version += 1;
+    }
+
+    /// The bus listened for the servo; something came, or nothing.
+    pub fn looked(&self, now: Instant, came: bool) {
+        lock(&self.heard).looked(now, came);
     }
 
     /// Are servo and controller heard?
@@ -189,12 +194,17 @@ impl Thruster {
 
     /// Disarms; the controller need not be there.
     pub async fn disarm(&self, who: &str) -> Result<(), Problem> {
-        let why = format!("{who} disarmed");
-        self.desk().rest(Instant::now(), &why);
+        self.stop(&format!("{who} disarmed")).await?;
+        self.did(who, None, EventKind::Disarmed, "disarmed");
+        Ok(())
+    }
+
+    /// The same; who asked tells the event log.
+    pub async fn stop(&self, why: &str) -> Result<(), Problem> {
+        self.desk().rest(Instant::now(), why);
         self.ask(request(RequestKind::Disarm), &[Process::Servo], Kind::Refused).await?;
         self.settle(|heard, now| !heard.armed(now)).await;
-        self.desk().rest(Instant::now(), &why);
-        self.did(who, None, EventKind::Disarmed, "disarmed");
+        self.desk().rest(Instant::now(), why);
         Ok(())
     }
 

@@ -25,8 +25,6 @@ pub struct Watch {
     /// How it stood when it was last heard.
     pub stood: Stood,
     tripped: Trip,
-    /// What it did when it was last heard armed and not ramped down.
-    driven: Option<Before>,
     ramping: bool,
     thrust_max_n: f64,
     speed_max_rad_s: f64,
@@ -53,7 +51,6 @@ impl Watch {
             tried: None,
             stood,
             tripped: Trip::default(),
-            driven: None,
             ramping: false,
             thrust_max_n: f64::NAN,
             speed_max_rad_s: f64::NAN,
@@ -78,6 +75,14 @@ impl Watch {
         }
         let Some(ports) = &self.ports else { return Beats::default() };
         let mut beats = Beats::default();
+        // First: a ramp is known before the samples of it are looked at.
+        if let Some(state) = ports.state.latest() {
+            beats.controller = true;
+            self.stood.controller_faults = state.faults;
+            self.ramping = state.limits & Limit::LeaseRamp.bit() != 0;
+            self.thrust_max_n = state.thrust_max_n;
+            self.speed_max_rad_s = state.speed_max_rad_s;
+        }
         while let Some(telemetry) = ports.telemetry.next() {
             beats.servo = true;
             self.heard = Some(Instant::now());
@@ -90,15 +95,8 @@ impl Watch {
             self.tripped = telemetry.tripped;
             if self.stood.armed && !self.ramping {
                 let (thrust_n, shaft_speed_rad_s) = (self.stood.thrust_n, self.stood.shaft_speed_rad_s);
-                self.driven = Some(Before { thrust_n, shaft_speed_rad_s });
+                self.stood.driven = Some(Before { thrust_n, shaft_speed_rad_s });
             }
-        }
-        if let Some(state) = ports.state.latest() {
-            beats.controller = true;
-            self.stood.controller_faults = state.faults;
-            self.ramping = state.limits & Limit::LeaseRamp.bit() != 0;
-            self.thrust_max_n = state.thrust_max_n;
-            self.speed_max_rad_s = state.speed_max_rad_s;
         }
         beats.gateway = ports.setpoint.latest().is_some();
         if beats.servo || beats.controller {
@@ -118,7 +116,7 @@ impl Watch {
                 latched.push(Latched {
                     code: fault.code(),
                     since: humantime::format_rfc3339_micros(SystemTime::now()).to_string(),
-                    before: (self.driven.filter(|_| fault.is_ramped()))
+                    before: (self.stood.driven.filter(|_| fault.is_ramped()))
                         .or(stopped.map(|trip| Before::of(trip.thrust_n, trip.shaft_speed_rad_s))),
                 });
             }

@@ -36,15 +36,21 @@ async fn stop(
     stop_all(&app, &who.name).await.map(|stopped| axum::Json(Stopped { stopped }))
 }
 
-/// Disarms all at once; the names of those that confirmed, or who did not.
+/// Disarms all at once; the names of those that confirmed, or who did not. It goes on, and is told, though nobody waits for
+/// the answer any more.
 pub async fn stop_all(app: &Arc<App>, who: &str) -> Result<Vec<String>, Problem> {
-    app.events().tell(EventKind::Stopped, None, who, format!("{who} stopped every thruster"));
+    let stopping = tokio::spawn(stop_and_tell(Arc::clone(app), who.to_owned()));
+    stopping.await.map_err(|error| Problem::new(Kind::Internal, error.to_string()))?
+}
+
+async fn stop_and_tell(app: Arc<App>, who: String) -> Result<Vec<String>, Problem> {
+    let why = format!("{who} stopped every thruster");
     let asked: Vec<_> = app
         .thrusters()
         .iter()
         .map(|thruster| {
-            let (thruster, who) = (Arc::clone(thruster), who.to_owned());
-            (thruster.id.clone(), tokio::spawn(async move { thruster.disarm(&who).await }))
+            let (thruster, why) = (Arc::clone(thruster), why.clone());
+            (thruster.id.clone(), tokio::spawn(async move { thruster.stop(&why).await }))
         })
         .collect();
     let (mut stopped, mut silent) = (Vec::new(), Vec::new());
@@ -54,12 +60,16 @@ pub async fn stop_all(app: &Arc<App>, who: &str) -> Result<Vec<String>, Problem>
             _ => silent.push(id),
         }
     }
+    let confirmed = match stopped.as_slice() {
+        [] => String::new(),
+        ids => format!("; confirmed: {}", ids.join(", ")),
+    };
     if silent.is_empty() {
+        app.events().tell(EventKind::Stopped, None, &who, why + &confirmed);
         return Ok(stopped);
     }
-    Err(Problem::new(
-        Kind::NotReady,
-        format!("no servo confirmed the stop of {}; confirmed: {}", silent.join(", "), stopped.join(", ")),
-    )
-    .hint("its command time-out stops the drive; cut the supply if the shaft still turns"))
+    let words = format!("no servo confirmed the stop of {}{confirmed}", silent.join(", "));
+    app.events().tell(EventKind::Stopped, None, &who, format!("{who} asked every thruster to stop; {words}"));
+    Err(Problem::new(Kind::NotReady, words)
+        .hint("its command time-out stops the drive; cut the supply if the shaft still turns"))
 }
