@@ -2,6 +2,7 @@
 //!
 //! Pure: the caller hands in the time, so expiry is tested without waiting.
 
+use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 use crate::problem::{Kind, Problem};
@@ -10,6 +11,8 @@ use crate::problem::{Kind, Problem};
 pub const TTL_DEFAULT_MS: u64 = 500;
 /// Longest life a lease can be given, ms.
 pub const TTL_MAX_MS: u64 = 60_000;
+/// Leases of which it is remembered who took them over.
+const TOLD_MAX: usize = 16;
 
 /// A lease in force.
 #[derive(Clone, Debug)]
@@ -44,8 +47,8 @@ impl Lease {
 #[derive(Debug, Default)]
 pub struct LeaseDesk {
     lease: Option<Lease>,
-    /// The lease that was taken over last, and by whom: its holder is told.
-    taken_over: Option<(String, String)>,
+    /// The leases that were taken over last, and by whom: each holder is told at its next word or state.
+    taken_over: VecDeque<(String, String)>,
     granted: u64,
     expired: u64,
 }
@@ -89,7 +92,8 @@ impl LeaseDesk {
         let before = match &self.lease {
             Some(lease) if !takeover => return Err(held(thruster, lease, now)),
             Some(lease) => {
-                self.taken_over = Some((lease.id.clone(), holder.to_owned()));
+                self.taken_over.push_front((lease.id.clone(), holder.to_owned()));
+                self.taken_over.truncate(TOLD_MAX);
                 Some(lease.holder.clone())
             }
             None => None,
@@ -118,7 +122,7 @@ impl LeaseDesk {
 
     /// Who took this lease over, if somebody did.
     pub fn taken_over(&self, id: &str) -> Option<&str> {
-        self.taken_over.as_ref().filter(|(lost, _)| lost == id).map(|(_, by)| by.as_str())
+        self.taken_over.iter().find(|(lost, _)| lost == id).map(|(_, by)| by.as_str())
     }
 
     /// Is this the lease in force?
@@ -201,6 +205,25 @@ mod tests {
             told.contains("lease-lost") && told.contains("taken over") && told.contains("bridge"),
             "{told}"
         );
+    }
+
+    #[test]
+    fn of_takeovers_in_a_row_each_holder_is_told() {
+        let (mut desk, t0) = (LeaseDesk::default(), Instant::now());
+        let mut take =
+            |holder| desk.take("t1", &Wanted { takeover: true, ..wants(holder, 500) }, t0).unwrap().0.id;
+        let lost = ["a", "b", "c"].map(&mut take);
+        for _ in 0..TOLD_MAX - 3 {
+            take("d");
+        }
+        assert_eq!(
+            lost.map(|id| desk.taken_over(&id).map(str::to_owned)),
+            ["b", "c", "d"].map(|by| Some(by.into()))
+        );
+        for _ in 0..100 {
+            desk.take("t1", &Wanted { takeover: true, ..wants("e", 500) }, t0).unwrap();
+        }
+        assert_eq!(desk.taken_over.len(), TOLD_MAX);
     }
 
     #[test]
