@@ -1,10 +1,11 @@
 //! The frame of the OpenAPI document; the routes fill it in from their own code.
 
+use utoipa::openapi::path::Operation;
 use utoipa::openapi::schema::{AdditionalProperties, ObjectBuilder, Schema, Type};
 use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityRequirement, SecurityScheme};
 use utoipa::openapi::server::ServerBuilder;
 use utoipa::openapi::{
-    ContentBuilder, Info, OpenApi, OpenApiBuilder, Ref, RefOr, ResponseBuilder, tag::TagBuilder,
+    ContentBuilder, Info, OpenApi, OpenApiBuilder, PathItem, Ref, RefOr, ResponseBuilder, tag::TagBuilder,
 };
 
 use crate::App;
@@ -40,6 +41,12 @@ pub fn opening() -> OpenApi {
         .build()
 }
 
+/// What can be asked of a path.
+fn operations(item: &mut PathItem) -> impl Iterator<Item = &mut Operation> {
+    let PathItem { get, put, post, delete, patch, .. } = item;
+    [get, put, post, delete, patch].into_iter().flatten()
+}
+
 /// Tokens: the scheme, where it is asked for, and what comes without one.
 fn secure(document: &mut OpenApi, app: &App) {
     let scheme = HttpBuilder::new()
@@ -66,8 +73,8 @@ fn secure(document: &mut OpenApi, app: &App) {
     };
     for (path, item) in &mut document.paths.paths {
         let open = crate::gate::is_open(path);
-        let operations = [&mut item.get, &mut item.put, &mut item.post, &mut item.delete];
-        for operation in operations.into_iter().flatten() {
+
+        for operation in operations(item) {
             let answers = &mut operation.responses.responses;
             let mut add = |status: &str, words: &str| {
                 answers.entry(status.into()).or_insert_with(|| refusal(words).into());
@@ -107,10 +114,7 @@ pub fn finish(document: &mut OpenApi, app: &App) {
     };
     let ids: Vec<&str> = app.thrusters().iter().map(|thruster| thruster.id.as_str()).collect();
     for item in document.paths.paths.values_mut() {
-        let operations = [&mut item.get, &mut item.put, &mut item.post, &mut item.delete];
-        for parameter in
-            operations.into_iter().flatten().flat_map(|operation| operation.parameters.iter_mut().flatten())
-        {
+        for parameter in operations(item).flat_map(|operation| operation.parameters.iter_mut().flatten()) {
             if parameter.name == "id" {
                 let known =
                     ObjectBuilder::new().schema_type(Type::String).enum_values(Some(ids.iter().copied()));
