@@ -163,25 +163,26 @@ impl Config {
     /// # Errors
     /// [`ConfigError`] if it cannot be read, holds an unknown key or a value that is not allowed.
     pub fn load(path: Option<&Path>) -> Result<Self, ConfigError> {
-        Self::load_or_all(path).map_err(first)
+        sound(Self::load_with_all(path))
     }
 
-    /// As [`Self::load`], with everything that is wrong.
-    ///
-    /// # Errors
-    /// One or more [`ConfigError`].
-    pub fn load_or_all(path: Option<&Path>) -> Result<Self, Vec<ConfigError>> {
+    /// As [`Self::load`], with everything that is wrong, and what can be read all the same: loops that are not allowed are the
+    /// usual ones there.
+    pub fn load_with_all(path: Option<&Path>) -> (Option<Self>, Vec<ConfigError>) {
         let default = Path::new(DEFAULT_PATH);
         let path = path.or_else(|| default.is_file().then_some(default));
         let Some(path) = path else {
             return Self::read(BUILT_IN, None);
         };
-        let text = std::fs::read_to_string(path).map_err(|e| {
-            let message =
-                format!("cannot be read: {e}\nhint: a working example is {DEFAULT_PATH} of the repository");
-            vec![ConfigError { file: path.display().to_string(), message }]
-        })?;
-        Self::read(&text, Some(path))
+        match std::fs::read_to_string(path) {
+            Ok(text) => Self::read(&text, Some(path)),
+            Err(e) => {
+                let message = format!(
+                    "cannot be read: {e}\nhint: a working example is {DEFAULT_PATH} of the repository"
+                );
+                (None, vec![ConfigError { file: path.display().to_string(), message }])
+            }
+        }
     }
 
     /// Reads a deployment from text.
@@ -189,19 +190,22 @@ impl Config {
     /// # Errors
     /// As [`Self::load`].
     pub fn parse(text: &str, file: Option<&Path>) -> Result<Self, ConfigError> {
-        Self::read(text, file).map_err(first)
+        sound(Self::read(text, file))
     }
 
-    fn read(text: &str, file: Option<&Path>) -> Result<Self, Vec<ConfigError>> {
+    fn read(text: &str, file: Option<&Path>) -> (Option<Self>, Vec<ConfigError>) {
         let name = file.map_or_else(|| "built-in configuration".into(), |f| f.display().to_string());
         let fail = |message: String| ConfigError { file: name.clone(), message: hinted(message) };
-        let mut config: Self = toml::from_str(text).map_err(|e| vec![fail(with_hint(&e.to_string()))])?;
+        let mut config: Self = match toml::from_str(text) {
+            Ok(config) => config,
+            Err(e) => return (None, vec![fail(with_hint(&e.to_string()))]),
+        };
         config.file = file.map(Path::to_path_buf);
-        if config.thrusters.is_empty() {
-            return Err(vec![fail("`thrusters` is empty\nhint: add a section [thrusters.t1]".into())]);
-        }
         let mut wrong = Vec::new();
-        for (id, t) in &config.thrusters {
+        if config.thrusters.is_empty() {
+            wrong.push(fail("`thrusters` is empty\nhint: add a section [thrusters.t1]".into()));
+        }
+        for (id, t) in &mut config.thrusters {
             if !is_thruster_id(id) {
                 wrong.push(fail(format!(
                     "`thrusters.{id}`: an id has 1 to 16 lower-case letters, digits, `_` or `-`\nhint: t1, port, bow-2"
@@ -247,8 +251,15 @@ impl Config {
                     t.servo.rate_hz / ratio.ceil()
                 )));
             }
+            // Who looks at the rest must be able to count with these.
+            let (servo, controller) = (t.servo.rate_hz, t.controller.rate_hz);
+            if !(100.0..=5000.0).contains(&servo) || !(10.0..=servo).contains(&controller) {
+                (t.servo.rate_hz, t.controller.rate_hz) =
+                    (ServoLoop::default().rate_hz, ControllerLoop::default().rate_hz);
+            }
+            t.controller.setpoint_rise_s = t.controller.setpoint_rise_s.filter(|s| (0.0..=60.0).contains(s));
         }
-        if wrong.is_empty() { Ok(config) } else { Err(wrong) }
+        (Some(config), wrong)
     }
 
     /// The thruster of an id.
@@ -323,10 +334,13 @@ impl Config {
     }
 }
 
-/// The one that is told where one is enough.
-fn first(wrong: Vec<ConfigError>) -> ConfigError {
-    let nothing = ConfigError { file: String::new(), message: String::new() };
-    wrong.into_iter().next().unwrap_or(nothing)
+/// A configuration with which nothing is wrong, or the first that is.
+fn sound((config, wrong): (Option<Config>, Vec<ConfigError>)) -> Result<Config, ConfigError> {
+    let nothing = || ConfigError { file: String::new(), message: String::new() };
+    match wrong.into_iter().next() {
+        Some(error) => Err(error),
+        None => config.ok_or_else(nothing),
+    }
 }
 
 /// A message that says no way out points at the file that explains every key.

@@ -26,8 +26,12 @@ struct Problem {
     file: String,
     key: Option<String>,
     found: Option<String>,
+    /// What is allowed; where the words do not set that apart, all they say.
     allowed: String,
     hint: Option<String>,
+    /// All that is said but the hint.
+    #[serde(skip)]
+    words: String,
 }
 
 #[derive(Serialize)]
@@ -99,26 +103,29 @@ fn described(_: &toml::Table, _: &str, _: &Path) -> Result<(), String> {
 /// Everything that servo, controller and gateway would refuse.
 fn deployment(file: Option<&Path>, problems: &mut Vec<Problem>) {
     let name = file.map_or_else(|| "built-in configuration".to_owned(), |file| file.display().to_string());
-    let config = match Config::load_or_all(file) {
-        Ok(config) => config,
-        Err(wrong) => return problems.extend(wrong.iter().map(|error| problem(&name, &error.to_string()))),
-    };
-    let mut said = Vec::new();
-    #[cfg(any(feature = "servo", feature = "controller"))]
-    for id in config.thrusters.keys() {
-        #[cfg(feature = "servo")]
-        said.extend(kort_servo::problems(&config, id).iter().map(ToString::to_string));
-        #[cfg(feature = "controller")]
-        said.extend(kort_controller::check(&config, id).err().map(|e| e.to_string()));
-    }
-    #[cfg(feature = "gateway")]
-    said.extend(kort_gateway::check_config(&config).iter().map(ToString::to_string));
-    for words in said {
+    let (config, wrong) = Config::load_with_all(file);
+    let of_services = config.iter().flat_map(services);
+    for words in wrong.iter().map(ToString::to_string).chain(of_services) {
         let found = problem(&name, &words);
         if !problems.contains(&found) {
             problems.push(found);
         }
     }
+}
+
+/// What each service says.
+fn services(config: &Config) -> Vec<String> {
+    let mut said = Vec::new();
+    #[cfg(any(feature = "servo", feature = "controller"))]
+    for id in config.thrusters.keys() {
+        #[cfg(feature = "servo")]
+        said.extend(kort_servo::problems(config, id).iter().map(ToString::to_string));
+        #[cfg(feature = "controller")]
+        said.extend(kort_controller::check(config, id).err().map(|e| e.to_string()));
+    }
+    #[cfg(feature = "gateway")]
+    said.extend(kort_gateway::check_config(config).iter().map(ToString::to_string));
+    said
 }
 
 /// Takes a message apart: `file: `key` = value is …\nhint: …`.
@@ -132,17 +139,20 @@ fn problem(file: &str, message: &str) -> Problem {
         _ => (file, what),
     };
     let key = what.split('`').nth(1).map(str::to_owned);
-    let found = what.split_once(" = ").and_then(|(_, rest)| {
-        // A colon within a value (an address) is followed by no space.
-        let ends = [" is ", ": ", ";", "\n"];
-        ends.iter().try_fold(rest, |found, end| found.split(end).next()).map(|found| found.trim().to_owned())
-    });
-    Problem { file: file.to_owned(), key, found, allowed: what.to_owned(), hint }
+    let after = |words: &[&str]| words.iter().find_map(|words| Some(what.split_once(words)?.1));
+    // A colon within a value (an address) is followed by no space, a comma within a list by one.
+    let ends = [" is ", " does ", " asks ", ": ", ";", ", and ", ", but ", "\n"];
+    let found = after(&["` = ", "` holds ", "` has "])
+        .and_then(|rest| ends.iter().try_fold(rest, |found, end| found.split(end).next()))
+        .map(|found| found.trim().to_owned());
+    let allowed = after(&[" is outside ", "allowed is ", "allowed are ", "known are "]);
+    let allowed = allowed.unwrap_or(what).trim().to_owned();
+    Problem { file: file.to_owned(), key, found, allowed, hint, words: what.to_owned() }
 }
 
 impl std::fmt::Display for Problem {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}: {}", self.file, self.allowed)?;
+        write!(f, "{}: {}", self.file, self.words)?;
         match &self.hint {
             Some(hint) => write!(f, "\nhint: {hint}"),
             None => Ok(()),
@@ -177,9 +187,23 @@ mod tests {
         assert_eq!(found.file, "my.toml");
         assert_eq!(found.key.as_deref(), Some("thrusters.t1.limits.current_a"));
         assert_eq!(found.found.as_deref(), Some("1000000"));
-        assert!(found.allowed.contains("0.001 to 9"));
+        assert_eq!(found.allowed, "0.001 to 9");
         assert_eq!(found.hint.as_deref(), Some("at most 9"));
         let found = problem("kort.toml", "`gateway.bind` = [::]:8080 is reached from other machines: no tls");
         assert_eq!(found.found.as_deref(), Some("[::]:8080"));
+        assert_eq!(
+            found.allowed, "`gateway.bind` = [::]:8080 is reached from other machines: no tls",
+            "not set apart"
+        );
+        let found = problem(
+            "kort.toml",
+            "`thrusters.t1.controller.rate_hz` = 300 does not divide servo.rate_hz = 500",
+        );
+        assert_eq!(found.found.as_deref(), Some("300"));
+        let found = problem(
+            "kort.toml",
+            "`gateway.hosts` holds \"a:1\"; allowed are names and addresses\nhint: \"a\"",
+        );
+        assert_eq!((found.found.as_deref(), &*found.allowed), (Some("\"a:1\""), "names and addresses"));
     }
 }

@@ -1,6 +1,6 @@
 //! What stands in the way of a start is said once, with a way out, and nothing is left running.
 
-use crate::common::{self, Site, Stack, run};
+use crate::common::{self, Site, Stack, run, wait};
 
 #[test]
 fn too_few_open_files_are_called_that() {
@@ -15,6 +15,27 @@ fn too_few_open_files_are_called_that() {
     assert_eq!(out.status.code(), Some(1), "{words}");
     assert!(words.contains("open files: at most 32") && words.contains("ulimit -n"), "{words}");
     assert!(!words.contains("/dev/shm"), "{words}");
+}
+
+/// One that runs short under way is told so too, not sent to look at the shared memory.
+#[test]
+fn a_gateway_that_runs_out_of_open_files_says_so() {
+    let stack = Stack::start();
+    let other = Site::new();
+    let mut gateway = std::process::Command::new("sh");
+    gateway.arg("-c").arg(format!(
+        "ulimit -n 48; exec {} gateway --config {} --root {} 2>&1",
+        common::KORT,
+        other.config().display(),
+        stack.site.root().display()
+    ));
+    let log = std::fs::File::create(other.folder.path().join("log")).unwrap();
+    let mut gateway = gateway.stdout(log).spawn().unwrap();
+    let words = wait("its word", || Some(other.log()).filter(|log| log.contains("hint:")));
+    gateway.kill().unwrap();
+    gateway.wait().unwrap();
+    assert!(words.contains("open files: at most 48") && words.contains("ulimit -n"), "{words}");
+    assert!(!words.contains("/dev/shm") && !words.contains("nothing runs here"), "{words}");
 }
 
 #[test]
@@ -66,9 +87,16 @@ fn everything_that_is_wrong_is_said_at_once() {
     std::fs::write(site.config(), more).unwrap();
     let out = run(std::process::Command::new(common::KORT).arg("check").arg(site.config()));
     let words = String::from_utf8_lossy(&out.stdout);
-    for wrong in ["servo.rate_hz", "servo.priority"] {
-        assert!(words.contains(&format!("thrusters.t1.{wrong}")), "{wrong} in: {words}");
+    for wrong in
+        ["thrusters.t1.servo.rate_hz", "thrusters.t1.servo.priority", "frozen_s", "known are static_map"]
+    {
+        assert!(words.contains(wrong), "{wrong} in: {words}");
     }
+    let out = run(std::process::Command::new(common::KORT).args(["check", "--json"]).arg(site.config()));
+    let report: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+    let of = |key: &str| report["problems"].as_array().unwrap().iter().find(|p| p["key"] == key).cloned();
+    let found = of("thrusters.t1.servo.priority").expect("the priority");
+    assert_eq!((&found["found"], &found["allowed"]), (&"99".into(), &"0 to 90".into()), "{found}");
 }
 
 #[test]
