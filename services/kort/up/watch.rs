@@ -75,7 +75,8 @@ impl Watch {
         }
         let Some(ports) = &self.ports else { return Beats::default() };
         let mut beats = Beats::default();
-        // First: a ramp is known before the samples of it are looked at.
+        // First: a ramp is known before its samples are looked at, and its last ones come when its end is known already.
+        let was_ramping = self.ramping;
         if let Some(state) = ports.state.latest() {
             beats.controller = true;
             self.stood.controller_faults = state.faults;
@@ -93,7 +94,7 @@ impl Watch {
             self.stood.shaft_speed_rad_s =
                 there(telemetry.signals.shaft_speed_rad_s, self.stood.shaft_speed_rad_s);
             self.tripped = telemetry.tripped;
-            if self.stood.armed && !self.ramping {
+            if self.stood.armed && !was_ramping && !self.ramping {
                 let (thrust_n, shaft_speed_rad_s) = (self.stood.thrust_n, self.stood.shaft_speed_rad_s);
                 self.stood.driven = Some(Before { thrust_n, shaft_speed_rad_s });
             }
