@@ -1,6 +1,7 @@
 //! A moteus controller behind an fdcanusb adapter, or on its UART, which speaks the same lines.
 //!
-//! Read for this: the register, CAN, diagnostic, UART and configuration pages of the moteus documentation (mjbots/moteus).
+//! Read for this: the register, CAN, diagnostic, UART and configuration pages of the moteus documentation (mjbots/moteus), and
+//! `moteus/error.h` there for the faults.
 //!
 //! Units on the wire: torque in N m, speed in turns a second, angle in turns, Q current in A, all as 32-bit floats. Signs are the
 //! drive's; `reversed` turns all of them. A rig of kind `current` is driven in position mode with every gain at zero and the torque

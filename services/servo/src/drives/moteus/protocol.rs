@@ -207,8 +207,9 @@ impl Protocol {
         self.exchanges_on = if self.on { self.exchanges_on.saturating_add(1) } else { 0 };
         heard(Heard::Fault(if mode == IN_FAULT {
             Some(format!(
-                "it reports fault {}\nhint: the moteus register reference, 0x00f, names it",
-                kept[FAULT]
+                "it reports fault {}: {}\nhint: the moteus register reference, 0x00f",
+                kept[FAULT],
+                fault_name(kept[FAULT] as u8)
             ))
         } else if self.on && (mode == TIMED_OUT || self.exchanges_on > ENTERING && mode != IN_POSITION) {
             Some(format!(
@@ -291,5 +292,36 @@ impl link::Protocol for Protocol {
                 _ => (),
             }
         }
+    }
+}
+
+/// A fault in the words of the firmware's list (`error.h`); later firmware may have more.
+fn fault_name(code: u8) -> &'static str {
+    match code {
+        1 => "DMA stream transfer",
+        2 => "DMA stream FIFO",
+        3..=7 => "its UART",
+        32 => "calibration",
+        33 => "motor driver",
+        34 => "over-voltage",
+        35 => "encoder",
+        36 => "motor not configured",
+        37 => "PWM cycle overrun",
+        38 => "over-temperature",
+        39 => "started outside its position limits",
+        _ => "unknown to kort",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn faults_have_the_firmwares_names() {
+        assert_eq!(
+            [33, 34, 38, 99].map(fault_name),
+            ["motor driver", "over-voltage", "over-temperature", "unknown to kort"]
+        );
     }
 }

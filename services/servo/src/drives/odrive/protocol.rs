@@ -162,8 +162,9 @@ impl Protocol {
         self.exchanges_on = if self.on { self.exchanges_on.saturating_add(1) } else { 0 };
         heard(Heard::Fault(if error != 0.0 {
             Some(format!(
-                "it reports axis error {:#x}\nhint: odrivetool: dump_errors(odrv0), then odrv0.clear_errors()",
-                error as u64
+                "it reports axis error {:#x}: {}\nhint: odrivetool: dump_errors(odrv0), then odrv0.clear_errors()",
+                error as u64,
+                error_names(error as u64)
             ))
         } else if self.exchanges_on > ENTERING && state != CLOSED_LOOP {
             Some(format!(
@@ -246,5 +247,38 @@ impl link::Protocol for Protocol {
             // A line whose check sum is wrong counts as one without numbers: there was one.
             self.line(words(&line).unwrap_or_default(), heard);
         }
+    }
+}
+
+/// Bits of an axis error by the firmware's names.
+const ERRORS: [(u32, &str); 12] = [
+    (0, "invalid state"),
+    (6, "motor failed"),
+    (7, "sensorless estimator failed"),
+    (8, "encoder failed"),
+    (9, "controller failed"),
+    (11, "watchdog timer expired"),
+    (12, "min endstop pressed"),
+    (13, "max endstop pressed"),
+    (14, "estop requested"),
+    (17, "homing without endstop"),
+    (18, "over-temperature"),
+    (19, "unknown position"),
+];
+
+fn error_names(bits: u64) -> String {
+    let known = ERRORS.iter().filter(|(bit, _)| bits >> bit & 1 == 1).map(|(_, name)| *name);
+    let rest = ERRORS.iter().fold(bits, |rest, (bit, _)| rest & !(1 << bit));
+    known.chain((rest != 0).then_some("others unknown to kort")).collect::<Vec<_>>().join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_bit_of_an_error_has_its_name() {
+        assert_eq!(error_names(0x840), "motor failed, watchdog timer expired");
+        assert_eq!(error_names(1 << 18 | 1 << 2), "over-temperature, others unknown to kort");
     }
 }
