@@ -184,6 +184,13 @@ fn a_slow_instrument_does_not_cost_the_drive_its_first_ticks() {
     let thruster = config.thruster("t1").unwrap();
     let drive = drives::choose(&config, "t1", thruster, &rig()).unwrap();
     let sensors = sensors::choose(&config, "t1", thruster).unwrap();
+    // A drive that waited would have asked anew every 0.25 s, and be confirmed for the last fifth of that.
+    let speaks = std::thread::spawn(move || {
+        std::thread::sleep(Duration::from_millis(630));
+        instrument.spoil(Mischief::None);
+        instrument
+    });
     let mut devices = Devices::start(drive, sensors, "t1", 0).unwrap();
+    let _instrument = speaks.join();
     assert_eq!(devices.show(At { now_ns: monotonic_ns(), ticks: 1 }).faults, 0);
 }
