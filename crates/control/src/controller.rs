@@ -59,7 +59,12 @@ pub struct Controller {
     mode: Mode,
     thrust_rate: RateLimiter,
     current_rate: RateLimiter,
+    /// Carries the law's current over a switch, ahead of the limits.
     bumpless: Bumpless,
+    /// Carries over what else stands between law and drive: the inverse of what the rig is known to have.
+    drive_bumpless: Bumpless,
+    /// Last command, as the drive takes it: A, V or rad/s.
+    commanded: f64,
     /// Last current in the ideal motor's terms, A.
     current_a: f64,
     /// Last currents asked of the drive, A: a ring, and the place of the newest.
@@ -106,6 +111,8 @@ impl Controller {
             thrust_rate: RateLimiter::default(),
             current_rate: RateLimiter::default(),
             bumpless: Bumpless::default(),
+            drive_bumpless: Bumpless::default(),
+            commanded: 0.0,
             current_a: 0.0,
             sent_a: [0.0; SENT],
             newest: 0,
@@ -139,9 +146,16 @@ impl Controller {
         self.mode = before.mode;
         (self.thrust_rate, self.current_rate) = (before.thrust_rate, before.current_rate);
         (self.current_a, self.drive_a) = (before.current_a, before.drive_a);
+        self.commanded = before.commanded;
         (self.sent_a, self.newest) = (before.sent_a, before.newest);
         (self.last_speed_rad_s, self.gated) = (before.last_speed_rad_s, 0);
+        self.carry_over();
+    }
+
+    /// The next command is the last one, and fades to what law and rig then ask for.
+    fn carry_over(&mut self) {
         self.bumpless.arm();
+        self.drive_bumpless.arm();
     }
 
     /// The configuration in force.
@@ -192,7 +206,7 @@ impl Controller {
         }
         self.law = Law::new(config.law, &self.model, &config.laws);
         self.speed_law = Law::new(LawKind::VelocityServo, &self.model, &config.laws);
-        self.bumpless.arm();
+        self.carry_over();
     }
 
     /// One tick: measurements and reference in, drive command out. `dt_s` is the time since the last
@@ -223,7 +237,7 @@ impl Controller {
         let speed = measured.shaft_speed_rad_s.unwrap_or(estimate.shaft_speed_rad_s.value);
         let (demand, thrust_n) = match reference {
             Reference::Off => {
-                self.current_a = 0.0;
+                (self.current_a, self.commanded) = (0.0, 0.0);
                 self.send(0.0);
                 self.current_rate.reset(0.0);
                 self.limited = false;
@@ -282,8 +296,7 @@ impl Controller {
             || limits.contains(Limit::Voltage)
             || limits.contains(Limit::AntiSpin);
         self.last_speed_rad_s = speed;
-        self.send(actual);
-        let command = self.command(actual, demand.speed_rad_s, &measured, supply_v, &mut limits);
+        let command = self.command(actual, demand.speed_rad_s, &measured, supply_v, dt, &mut limits);
         Output {
             command,
             estimate: self.felt(estimate),
@@ -307,24 +320,29 @@ impl Controller {
         }
     }
 
-    /// A change of mode starts the law afresh and goes on from the present command.
+    /// A change of mode starts the law afresh and goes on from the present command; from rest there is none, and
+    /// nothing is held back.
     fn enter(&mut self, wanted: Mode) {
         if wanted == self.mode {
             return;
         }
+        let at_rest = self.mode == Mode::Off;
         match wanted {
-            Mode::Off => self.bumpless.clear(),
+            Mode::Off => {}
             Mode::Thrust => {
                 self.law = Law::new(self.config.law, &self.model, &self.config.laws);
-                let now =
-                    if self.mode == Mode::Off { 0.0 } else { self.model.map.thrust_n(self.last_speed_rad_s) };
+                let now = if at_rest { 0.0 } else { self.model.map.thrust_n(self.last_speed_rad_s) };
                 self.thrust_rate.reset(now);
-                self.bumpless.arm();
             }
             Mode::Speed => {
                 self.speed_law = Law::new(LawKind::VelocityServo, &self.model, &self.config.laws);
-                self.bumpless.arm();
             }
+        }
+        if at_rest || wanted == Mode::Off {
+            self.bumpless.clear();
+            self.drive_bumpless.clear();
+        } else {
+            self.bumpless.arm();
         }
         self.mode = wanted;
     }

@@ -136,13 +136,19 @@ impl Integrator {
     }
 }
 
-/// Bumpless transfer: at a switch the difference between the old and the new output is kept and
-/// fades away exponentially, so that neither law needs to know the other.
+/// Bumpless transfer: at a switch the last output is held and fades into the new one exponentially, so that neither
+/// law needs to know the other. Not their difference is kept: what a law that starts afresh asks for at its
+/// first tick (a rate from nothing, an inverted lag) says little of what it asks for at the next.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Bumpless {
-    offset: f64,
+    held: f64,
+    /// Share of the held output.
+    share: f64,
     pending: bool,
 }
+
+/// Share of the held output that is none.
+const FADED: f64 = 1e-6;
 
 impl Bumpless {
     /// The next output shall continue from the last one.
@@ -150,21 +156,21 @@ impl Bumpless {
         self.pending = true;
     }
 
-    /// The output with the fading difference added.
+    /// The output with what is left of the held one.
     pub fn step(&mut self, output: f64, last_output: f64, fade_s: f64, dt_s: f64) -> f64 {
-        if self.pending {
-            self.offset = last_output - output;
-            self.pending = false;
+        if std::mem::take(&mut self.pending) {
+            (self.held, self.share) = (last_output, 1.0);
         } else {
-            self.offset *= 1.0 - (dt_s / fade_s.max(dt_s)).min(1.0);
-            if self.offset.abs() < 1e-12 {
-                self.offset = 0.0;
-            }
+            self.share *= 1.0 - (dt_s / fade_s.max(dt_s)).min(1.0);
         }
-        output + self.offset
+        if self.share < FADED || !self.held.is_finite() {
+            self.share = 0.0;
+            return output;
+        }
+        output + self.share * (self.held - output)
     }
 
-    /// Forgets any difference.
+    /// Forgets what was held.
     pub fn clear(&mut self) {
         *self = Self::default();
     }
@@ -184,6 +190,16 @@ mod tests {
             last = b.step(1.0, last, 0.1, 0.001);
         }
         assert!((last - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn what_a_law_asks_for_at_its_first_tick_alone_does_not_show() {
+        let mut b = Bumpless::default();
+        b.arm();
+        assert_eq!(b.step(80.0, 5.0, 0.1, 0.001), 5.0);
+        for _ in 0..300 {
+            assert!((b.step(5.0, 5.0, 0.1, 0.001) - 5.0).abs() < 1e-9);
+        }
     }
 
     #[test]

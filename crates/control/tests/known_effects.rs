@@ -3,7 +3,7 @@
 mod common;
 
 use common::{Loop, rigs};
-use kort_control::{Controller, ControllerConfig, LawKind, Reference};
+use kort_control::{Controller, ControllerConfig, LawKind, Output, Reference};
 use kort_thruster::effects;
 use kort_thruster::rig::{KnownEffect, Quantity, Rig};
 
@@ -140,16 +140,71 @@ fn a_late_drive_and_late_sensors_leave_the_loop_stable() {
     }
 }
 
+/// The command as the drive takes it: A, V or rad/s.
+fn told(output: &Output) -> f64 {
+    let command = output.command;
+    command.voltage_v.or(command.speed_rad_s).unwrap_or(command.current_a)
+}
+
+/// Whatever a revision changes between law and drive, and on the way back: the first command is the last one, and none
+/// after it leaps.
 #[test]
 fn a_rigs_revision_is_taken_over_without_a_jump() {
+    let changes: [(&str, &[(&str, f64)]); 5] = [
+        ("coulomb_friction", &[("coulomb_torque_n_m", 3.0)]),
+        ("torque_constant_saturation", &[("saturation_per_a2", 4.0)]),
+        ("command_dead_band", &[("half_width", 2.0)]),
+        (
+            "command_curve",
+            &[("second_degree_share", 3.0), ("third_degree_share", 2.0), ("full_command", 1.0)],
+        ),
+        ("forward_reverse_asymmetry", &[("forward_lift_error", 3.0), ("reverse_lift_error", 3.0)]),
+    ];
+    for rig in [Rig::from_toml(common::STAND).unwrap(), named("t200"), named("speed")] {
+        for (id, sizes) in changes {
+            let revised = Rig { effects: vec![known(&rig, id, sizes)], ..rig.clone() };
+            for law in [LawKind::Model2Inversion, LawKind::StaticMap] {
+                let mut l = Loop::new(&rig, &ControllerConfig::with_law(law), DT);
+                let full = l.controller.nominal().thrust_max_n;
+                let steady = Reference::Thrust(0.35 * full);
+                // The last command and the largest step on the way to it.
+                let drive = |l: &mut Loop, mut last: f64, ticks: u32| {
+                    let mut step = 0.0_f64;
+                    for _ in 0..ticks {
+                        let now = told(&l.tick(steady));
+                        step = step.max((now - last).abs());
+                        last = now;
+                    }
+                    (last, step)
+                };
+                let settled = told(&l.run(steady, 3.0));
+                let (mut before, usual) = drive(&mut l, settled, 1500);
+                for (to, way) in [(&revised, "there"), (&rig, "back")] {
+                    l.controller = l.controller.revised(to, DT).unwrap();
+                    let (first, at_once) = drive(&mut l, before, 1);
+                    let (after, step) = drive(&mut l, first, 1500);
+                    let case = format!("{} {id} {} {way}: {before} {first} {after}", rig.name, law.name());
+                    assert!(at_once < 2e-3 * before.abs(), "{case}");
+                    // By a fade of 0.1 s no tick of 1 ms moves much more than a hundredth of the whole change.
+                    let most = 1.5 * usual + 0.02 * (after - before).abs() + 2e-3 * before.abs();
+                    assert!(step < most, "{case}: a step of {step}, usual {usual}");
+                    before = after;
+                }
+            }
+        }
+    }
+}
+
+/// What a dead band swallows lies within it: the command that it held back goes on from there.
+#[test]
+fn a_dead_band_adopted_over_a_command_within_it_is_no_step() {
     let rig = Rig::from_toml(common::STAND).unwrap();
-    let effect = known(&rig, "coulomb_friction", &[("coulomb_torque_n_m", 3.0)]);
-    let config = ControllerConfig::with_law(LawKind::Model2Inversion);
-    let mut l = Loop::new(&rig, &config, DT);
-    let before = l.run(Reference::Thrust(60.0), 2.0).command.current_a;
-    let revised = Rig { effects: vec![effect], ..rig };
-    l.controller = l.controller.revised(&revised, DT).unwrap();
-    let after = l.tick(Reference::Thrust(60.0)).command.current_a;
-    assert!((after - before).abs() < 0.02 * 9.0, "{before} {after}");
-    assert!((l.run(Reference::Thrust(60.0), 2.0).estimate.thrust_n.value - 60.0).abs() < 3.0);
+    let band = known(&rig, "command_dead_band", &[("half_width", 4.0)]);
+    let half_width = band.value("half_width");
+    let mut l = Loop::new(&rig, &ControllerConfig::with_law(LawKind::StaticMap), DT);
+    let before = told(&l.run(Reference::Thrust(0.01 * l.controller.nominal().thrust_max_n), 2.0));
+    assert!(before > 0.0 && before < half_width, "{before} in {half_width}");
+    l.controller = l.controller.revised(&Rig { effects: vec![band], ..rig }, DT).unwrap();
+    let after = told(&l.tick(Reference::Thrust(0.01 * l.controller.nominal().thrust_max_n)));
+    assert!((after - before).abs() < 0.02 * half_width, "{before} {after}");
 }

@@ -113,41 +113,55 @@ impl Controller {
         current
     }
 
+    /// What the drive is told: what it turns into this current, voltage or speed, carried over from the last command
+    /// after a switch. Whatever the switch changed between law and drive, the drive sees no step.
     pub(super) fn command(
         &mut self,
         current_a: f64,
         target: f64,
         measured: &Measurement,
         supply_v: Option<f64>,
+        dt: f64,
         limits: &mut LimitSet,
     ) -> DriveCommand {
         let model = &self.model;
+        let resistance = model.winding_resistance_ohm.unwrap_or(0.0);
         // The back-EMF is that of the speed itself, not of what its filter shows later.
         let speed = self.estimate.map_or(0.0, |e| e.shaft_speed_rad_s.value);
         let at = OperatingPoint { supply_v, current_a: self.drive_a, shaft_speed_rad_s: speed };
-        match model.amplifier {
-            AmplifierKind::Current => {
-                let command = self.known.command(current_a, at);
-                DriveCommand { current_a: command, ..DriveCommand::default() }
-            }
+        let (wanted, most) = match model.amplifier {
+            // A limit that came down is met at the rate of the current, which is held already.
+            AmplifierKind::Current => (current_a, model.current_limit_a.max(current_a.abs())),
             AmplifierKind::Voltage => {
-                let wanted = model.winding_resistance_ohm.unwrap_or(0.0) * current_a
-                    + model.torque_constant_nm_a * speed;
+                let wanted = resistance * current_a + model.torque_constant_nm_a * speed;
                 let supply = measured.supply_v.or(model.supply_v).unwrap_or(f64::INFINITY);
                 if wanted.abs() > supply {
                     limits.set(Limit::Voltage);
                 }
                 let voltage =
                     if current_a == 0.0 && target == 0.0 { 0.0 } else { wanted.clamp(-supply, supply) };
-                let told = supply_v.or(self.stated_supply_v).unwrap_or(f64::INFINITY);
-                let command = self.known.command(voltage, at).clamp(-told, told);
-                DriveCommand { current_a, voltage_v: Some(command), speed_rad_s: None }
+                (voltage, supply_v.or(self.stated_supply_v).unwrap_or(f64::INFINITY))
             }
             AmplifierKind::Speed => {
-                let cap = model.speed_max_rad_s;
-                let command = self.known.command(target.clamp(-cap, cap), at);
-                DriveCommand { current_a, voltage_v: None, speed_rad_s: Some(command.clamp(-cap, cap)) }
+                (target.clamp(-model.speed_max_rad_s, model.speed_max_rad_s), model.speed_max_rad_s)
             }
+        };
+        let asked = self.known.command(wanted, at);
+        let carried = self.drive_bumpless.step(asked, self.commanded, self.config.limits.fade_s, dt);
+        let command = carried.clamp(-most, most);
+        self.commanded = command;
+        let amplifier = model.amplifier;
+        // While it fades the drive gives by so much another current than the law's.
+        let beside = if carried == asked { 0.0 } else { self.known.given(command, at) - wanted };
+        self.send(match amplifier {
+            AmplifierKind::Current => current_a + beside,
+            AmplifierKind::Voltage if resistance > 0.0 => current_a + beside / resistance,
+            AmplifierKind::Voltage | AmplifierKind::Speed => current_a,
+        });
+        match amplifier {
+            AmplifierKind::Current => DriveCommand { current_a: command, ..DriveCommand::default() },
+            AmplifierKind::Voltage => DriveCommand { current_a, voltage_v: Some(command), speed_rad_s: None },
+            AmplifierKind::Speed => DriveCommand { current_a, voltage_v: None, speed_rad_s: Some(command) },
         }
     }
 }

@@ -135,4 +135,9 @@ impl Known {
     pub fn command(&mut self, wanted: f64, at: OperatingPoint) -> f64 {
         if self.drive.is_idle() { wanted } else { self.drive.command(wanted, at) }
     }
+
+    /// What the drive turns a command into.
+    pub fn given(&mut self, command: f64, at: OperatingPoint) -> f64 {
+        if self.drive.is_idle() { command } else { self.drive.pass(command, at).command }
+    }
 }

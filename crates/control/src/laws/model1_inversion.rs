@@ -21,14 +21,15 @@ use crate::model::ControlModel;
 #[derive(Clone, Copy, Debug)]
 pub struct Model1Inversion {
     smoothing_s: f64,
-    speed_rad_s: f64,
+    /// From where the shaft is at the first tick.
+    speed_rad_s: Option<f64>,
 }
 
 impl Model1Inversion {
     /// At rest. The reference's derivative is taken over the shaft loop's own time scale.
     pub fn new(model: &ControlModel) -> Self {
         let (crossover, _) = model.speed_loop(56f64.to_radians());
-        Self { smoothing_s: 1.0 / crossover, speed_rad_s: 0.0 }
+        Self { smoothing_s: 1.0 / crossover, speed_rad_s: None }
     }
 
     /// Torque of the inverted model.
@@ -37,14 +38,16 @@ impl Model1Inversion {
         let advance = blade.radius_m * blade.pitch_rad.tan();
         let eta = (input.model.map.thrust_n_s2 / (blade.density_kg_m3 * blade.area_m2())).sqrt() / advance;
         let target = input.model.map.speed_rad_s(input.thrust_n);
-        let rate = (target - self.speed_rad_s) / (self.smoothing_s + input.dt_s);
-        self.speed_rad_s += rate * input.dt_s;
+        let before = self.speed_rad_s.unwrap_or_else(|| input.speed_rad_s());
+        let rate = (target - before) / (self.smoothing_s + input.dt_s);
+        let speed = before + rate * input.dt_s;
+        self.speed_rad_s = Some(speed);
         let inertia = (eta * advance).powi(2) * input.model.duct_water_kg;
         // (1/2) eta r tan(p) with the eta of (20) is the static map's torque per thrust.
         let torque = input.model.map.torque_for_thrust_n_m(input.thrust_n)
             + inertia * rate
-            + input.model.friction_n_m(self.speed_rad_s);
-        Demand { torque_n_m: torque, speed_rad_s: self.speed_rad_s, limits: LimitSet::default() }
+            + input.model.friction_n_m(speed);
+        Demand { torque_n_m: torque, speed_rad_s: speed, limits: LimitSet::default() }
     }
 
     /// Nothing to follow.

@@ -31,7 +31,8 @@ impl LoadTorque {
     pub fn tick(&mut self, model: &ControlModel, torque_n_m: f64, speed_rad_s: f64, dt_s: f64) {
         if !self.started {
             self.started = true;
-            self.speed_rad_s = speed_rad_s;
+            // Taken up under way, the shaft is most likely in balance: no load at all would look like lost water.
+            (self.speed_rad_s, self.torque_n_m) = (speed_rad_s, torque_n_m - model.friction_n_m(speed_rad_s));
         }
         let inertia = model.inertia_kg_m2;
         // An explicit step: the pole stays well inside what the period can carry.
