@@ -219,7 +219,7 @@ message! { "kort.ControllerState",
         law_count: u32,
         /// Path that is off against the rig as stated, from 1 in the order of [`PATHS`]; zero without an alarm.
         mismatch_path: u32,
-        /// How near each path is to an alarm, as [`PATHS`]: 1 and above is one; NaN while what is usual is learnt.
+        /// How near each path is to an alarm, as [`PATHS`]: 1 is one; NaN while what is usual is learnt.
         mismatch_level: [f64; 5],
         /// Time since the mismatch began, s.
         mismatch_since_s: f64,

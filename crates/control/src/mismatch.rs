@@ -13,6 +13,10 @@
 //! less two standard errors of the learnt mean, so that a mean learnt wrong is in the rate. Onset is when the
 //! sum last stood at zero.
 //!
+//! A path whose sum reaches the threshold is off until that sum of its own stands at zero again. What a fault does to
+//! other residuals would raise the other paths' sums too: they begin anew then, over the
+//! residuals that it leaves alone. So a second fault is found beside a first, where it shows in any of those.
+//!
 //! An ambient flow that changes and is not measured is off the model's path too, and shows as `flow`.
 
 mod cusum;
@@ -77,9 +81,9 @@ const FAULTS: usize = 8;
 /// What the monitor says.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mismatch {
-    /// The CUSUM of each path over its threshold, in the order of [`Path::ALL`]: 1 and above is an alarm.
+    /// The CUSUM of each path over its threshold, in the order of [`Path::ALL`]: 1 is an alarm, and no sum goes beyond.
     pub level: [f64; 5],
-    /// The path that is off most, where one is.
+    /// The path that went off last, of those that still are.
     pub alarm: Option<Path>,
     /// Time since its onset, s; zero without an alarm.
     pub since_s: f64,
@@ -112,8 +116,8 @@ pub struct Monitor {
     last_speed_rad_s: Option<f64>,
     filtered_torque: [f64; 2],
     filtered_thrust_n: f64,
-    since_alarm_s: f64,
-    alarm: Option<Path>,
+    /// Which faults are off: how many went off up to each, zero for one that is not.
+    off: [u32; FAULTS],
 }
 
 /// What a run of the monitor is given at a tick.
@@ -172,15 +176,14 @@ impl Monitor {
             last_speed_rad_s: None,
             filtered_torque: [0.0; 2],
             filtered_thrust_n: 0.0,
-            since_alarm_s: 0.0,
-            alarm: None,
+            off: [0; FAULTS],
         }
     }
 
     /// Forgets alarms and sums; what is usual stays.
     pub fn clear(&mut self) {
         self.cusums = [Cusum::default(); FAULTS];
-        self.alarm = None;
+        self.off = [0; FAULTS];
     }
 
     /// One tick.
@@ -234,9 +237,6 @@ impl Monitor {
         }
         if self.sums.time_s >= BLOCK_S {
             self.end_block();
-        }
-        if self.alarm.is_some() {
-            self.since_alarm_s += dt;
         }
     }
 
@@ -303,10 +303,11 @@ impl Monitor {
                 usual.take(x);
             }
         }
-        for ((_, direction), cusum) in self.faults.iter().zip(&mut self.cusums) {
-            // In standard deviations, over what this block says anything of.
+        for fault in 0..FAULTS {
+            let (path, direction) = self.faults[fault];
+            // In standard deviations, over what this block says anything of and no other path that is off touches.
             let (mut along, mut length) = (0.0, 0.0);
-            for i in 0..RESIDUALS {
+            for i in (0..RESIDUALS).filter(|i| !self.touched(*i, path)) {
                 if let Some(z) = z[i] {
                     let d = direction[i] / self.usual[i].spread();
                     along += d * z;
@@ -314,24 +315,34 @@ impl Monitor {
                 }
             }
             if length > 0.0 {
-                cusum.take(along / length.sqrt(), 2.0 * self.threshold, BLOCK_S);
+                self.cusums[fault].take(along / length.sqrt(), self.threshold, BLOCK_S);
             }
         }
         self.judge();
     }
 
+    /// Whether a fault that is off on another path changes a residual.
+    fn touched(&self, residual: usize, path: Path) -> bool {
+        let mut off = self.faults.iter().zip(self.off).filter(|(_, off)| *off > 0);
+        off.any(|((other, direction), _)| *other != path && direction[residual] != 0.0)
+    }
+
     fn judge(&mut self) {
-        let levels = self.cusums.map(|c| c.level());
-        let worst = (0..FAULTS).max_by(|a, b| levels[*a].0.total_cmp(&levels[*b].0)).unwrap_or(0);
-        let (sum, since_s) = levels[worst];
-        match self.alarm {
-            None if sum >= self.threshold => {
-                self.alarm = Some(self.faults[worst].0);
-                self.since_alarm_s = since_s;
+        let sums = self.cusums.map(|c| c.level().0);
+        for (off, sum) in self.off.iter_mut().zip(sums) {
+            if sum == 0.0 {
+                *off = 0;
             }
-            // The path that was first stays named: later all that it touches stands at the top.
-            Some(_) if sum == 0.0 => self.alarm = None,
-            _ => {}
+        }
+        let fresh = (0..FAULTS).filter(|k| self.off[*k] == 0 && sums[*k] >= self.threshold);
+        // Of several in one block the one that rose fastest: the others may be what it does to them.
+        let since = |k: &usize| self.cusums[*k].level().1;
+        let Some(worst) = fresh.min_by(|a, b| since(a).total_cmp(&since(b))) else { return };
+        self.off[worst] = 1 + self.off.iter().max().copied().unwrap_or(0);
+        for k in 0..FAULTS {
+            if self.off[k] == 0 && self.faults[k].0 != self.faults[worst].0 {
+                self.cusums[k] = Cusum::default();
+            }
         }
     }
 
@@ -348,8 +359,10 @@ impl Monitor {
             let own = &mut level[*path as usize];
             *own = f64::max(*own, cusum.level().0 / self.threshold);
         }
-        let since_s = if self.alarm.is_some() { self.since_alarm_s } else { 0.0 };
-        Mismatch { level, alarm: self.alarm, since_s, learning: self.learning() }
+        let last = (0..FAULTS).filter(|k| self.off[*k] > 0).max_by_key(|k| self.off[*k]);
+        let alarm = last.map(|k| self.faults[k].0);
+        let since_s = last.map_or(0.0, |k| self.cusums[k].level().1 + self.sums.time_s);
+        Mismatch { level, alarm, since_s, learning: self.learning() }
     }
 }
 
