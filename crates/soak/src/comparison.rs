@@ -43,11 +43,12 @@ impl LawResult {
         Self { name: name.into(), scores, by_seed, worst }
     }
 
-    /// A score as a multiple of another law's, seed by seed: both met the same sea.
+    /// A score as a multiple of another law's, seed by seed: both met the same sea. None where either is not known.
     pub fn ratio(&self, to: &Self, score: &str) -> Option<Score> {
         let values: Option<Vec<f64>> =
             self.by_seed.iter().zip(&to.by_seed).map(|(a, b)| Some(a.get(score)? / b.get(score)?)).collect();
-        values.filter(|v| !v.is_empty()).map(|v| summarise_ratios(&v))
+        let ratio = summarise_ratios(&values.filter(|v| !v.is_empty())?);
+        [ratio.mean, ratio.ci95[0], ratio.ci95[1]].iter().all(|x| x.is_finite()).then_some(ratio)
     }
 
     /// A score by name.

@@ -30,15 +30,21 @@ pub(crate) fn verdict(laws: &[LawResult]) -> String {
     );
     let plain = laws.iter().find(|l| l.name == PLAIN);
     if let Some(plain) = plain.filter(|p| p.name != best.name) {
-        let of = |score| best.ratio(plain, score).map_or_else(|| "an unknown share".into(), interval);
-        let _ = write!(
-            words,
-            ", {} of {PLAIN}'s, for {} of its energy, {} of its energy per useful newton-second and {} of its energy over the ideal",
-            of("thrust_rms_n"),
-            of("energy_j"),
-            of("energy_per_impulse_j_n_s"),
-            of("energy_over_ideal")
-        );
+        let of = |score: &str, what: &str| Some(format!("{} of {what}", interval(best.ratio(plain, score)?)));
+        let thrust = of("thrust_rms_n", PLAIN).unwrap_or_else(|| format!("an unknown share of {PLAIN}"));
+        let energy: Vec<String> = [
+            ("energy_j", "its energy"),
+            ("energy_per_impulse_j_n_s", "its energy per useful newton-second"),
+            ("energy_over_ideal", "its energy over the ideal"),
+        ]
+        .into_iter()
+        .filter_map(|(score, what)| of(score, what))
+        .collect();
+        let _ = write!(words, ", {thrust}'s");
+        // A speed drive shows no current, and its energy is not known.
+        if !energy.is_empty() {
+            let _ = write!(words, ", for {}", energy.join(", "));
+        }
         words += &why_more_energy(best, plain);
     } else if plain.is_some() && order.len() > 1 {
         words += "; the plain law wins here";
@@ -140,4 +146,32 @@ fn recovered(laws: &[LawResult]) -> String {
         }
     }
     words
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::score::Outcome;
+
+    #[test]
+    fn energy_that_is_not_known_is_not_spoken_of() {
+        let law = |name: &str, rms: f64, energy: f64| {
+            let mut outcome = Outcome::default();
+            for (score, value) in [
+                ("thrust_rms_n", rms),
+                ("energy_j", energy),
+                ("energy_per_impulse_j_n_s", energy),
+                ("energy_over_ideal", energy),
+                ("limits_broken", 0.0),
+            ] {
+                outcome.scores.insert(score, value);
+            }
+            LawResult::new(name, vec![outcome])
+        };
+        let of = |energy: f64| verdict(&[law(PLAIN, 2.0, energy), law("better", 1.0, energy)]);
+        let words = of(f64::NAN);
+        assert!(!words.contains("NaN") && !words.contains("energy"), "{words}");
+        assert!(words.contains("0.500 of velocity_servo's."), "{words}");
+        assert!(of(3.0).contains("0.500 of velocity_servo's, for 1.000 of its energy, "), "{}", of(3.0));
+    }
 }
