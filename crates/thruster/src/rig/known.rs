@@ -91,7 +91,7 @@ fn read_one(at: &str, entry: &toml::Table) -> Result<KnownEffect, RigError> {
         return Err(RigError::UnknownKey { key: format!("{at}.{odd}"), hint });
     }
     let stated: Vec<usize> = (0..specs.len()).filter(|k| entry.contains_key(specs[*k].name)).collect();
-    let mut parameters = Vec::new();
+    let (mut parameters, mut missing) = (Vec::new(), Vec::new());
     for (k, spec) in specs.iter().enumerate() {
         let value = match entry.get(spec.name) {
             Some(found) => {
@@ -100,15 +100,21 @@ fn read_one(at: &str, entry: &toml::Table) -> Result<KnownEffect, RigError> {
             }
             None if !spec.shape => Quantity::exact(if spec.held { spec.mean } else { 0.0 }),
             None if needed(descriptor, &specs, &stated, k) => {
-                let (key, name, unit) = (format!("{at}.{}", spec.name), spec.name, spec.unit);
-                return Err(RigError::Missing {
-                    key,
-                    hint: format!("add {name} = … [{unit}] to the effect"),
-                });
+                missing.push(spec);
+                continue;
             }
             None => Quantity::exact(spec.mean),
         };
         parameters.push((spec.name, value));
+    }
+    if !missing.is_empty() {
+        let keys: Vec<_> = missing.iter().map(|s| format!("{at}.{}", s.name)).collect();
+        let unit = |spec: &Spec| if spec.unit == "1" { String::new() } else { format!(" [{}]", spec.unit) };
+        let add: Vec<_> = missing.iter().map(|s| format!("{} = …{}", s.name, unit(s))).collect();
+        return Err(RigError::Missing {
+            key: keys.join("`, `"),
+            hint: format!("add {} to the effect", add.join(", ")),
+        });
     }
     if stated.iter().all(|k| specs[*k].shape) && specs.iter().any(|s| !s.shape && !s.held) {
         let names: Vec<_> = specs.iter().filter(|s| !s.shape).map(|s| s.name).collect();
@@ -151,4 +157,31 @@ fn needed(effect: &Descriptor, specs: &[Spec], stated: &[usize], place: usize) -
     let forms = effect.forms(specs);
     let fitting: Vec<_> = forms.iter().filter(|form| fits(form)).collect();
     fitting.iter().all(|form| form.contains(&place))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn all_that_an_effect_lacks_is_said_at_once() {
+        let lacks = |effect: &Descriptor| {
+            let table: toml::Table = format!("effect = \"{}\"", effect.id).parse().unwrap();
+            read_one("effects[0]", &table).err().map(|e| e.to_string())
+        };
+        let mut several = 0;
+        for effect in effects::ALL {
+            let specs = (effect.parameters)(&Scale::ANY);
+            let needed = (0..specs.len()).filter(|k| specs[*k].shape && needed(effect, &specs, &[], *k));
+            let names: Vec<_> = needed.map(|k| specs[k].name).collect();
+            if names.len() < 2 || effect.nonparametric {
+                continue;
+            }
+            several += 1;
+            let said = lacks(effect).unwrap();
+            assert!(names.iter().all(|name| said.contains(&format!("`effects[0].{name}`"))), "{said}");
+            assert!(!said.contains("[1]"), "{said}");
+        }
+        assert!(several > 0, "no effect needs two shapes");
+    }
 }
