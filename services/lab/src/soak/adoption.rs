@@ -120,20 +120,62 @@ fn summaries(all: &[Adoption]) -> Vec<Summary> {
     laws.into_iter().map(of).collect()
 }
 
-/// By hidden effect: cases it was in, how often it was adopted, and the median ratio of those cases.
-fn by_effect(all: &[Adoption]) -> Vec<(&'static str, usize, usize, f64)> {
-    let mut effects: Vec<&'static str> = all.iter().flat_map(|a| a.hidden.iter().map(|h| h.effect)).collect();
-    effects.sort_unstable();
-    effects.dedup();
-    effects
-        .into_iter()
-        .map(|effect| {
-            let with: Vec<&Adoption> =
-                all.iter().filter(|a| a.hidden.iter().any(|h| h.effect == effect)).collect();
-            let found = with.iter().filter(|a| a.adopted.iter().any(|f| f.effect == effect)).count();
-            (effect, with.len(), found, median(with.iter().map(|a| a.ratio).collect()))
-        })
-        .collect()
+/// An effect under a law: medians over the cases that hid it.
+struct Hidden {
+    effect: &'static str,
+    law: String,
+    cases: usize,
+    /// How often it was adopted.
+    found: usize,
+    /// Thrust RMS error, N: with the stated rig, with the adopted one, told the truth.
+    rms_n: [f64; 3],
+    /// The latter two over the first, case by case.
+    over_before: [f64; 2],
+}
+
+/// What is said of a hidden effect, over its columns.
+const HIDDEN: [&str; 9] = [
+    "hidden",
+    "law",
+    "cases",
+    "adopted",
+    "before [N]",
+    "after [N]",
+    "told the truth [N]",
+    "after/before",
+    "told/before",
+];
+
+impl Hidden {
+    fn row(&self, number: fn(f64) -> String) -> [String; 9] {
+        let ([before, after, told], [ratio, told_ratio]) = (self.rms_n, self.over_before);
+        let (cases, found) = (self.cases.to_string(), self.found.to_string());
+        let [before, after, told] = [before, after, told].map(number);
+        let [ratio, told_ratio] = [ratio, told_ratio].map(|x| format!("{x:.2}"));
+        [self.effect.into(), self.law.clone(), cases, found, before, after, told, ratio, told_ratio]
+    }
+}
+
+/// By hidden effect and law.
+fn by_effect(all: &[Adoption]) -> Vec<Hidden> {
+    let mut of: BTreeMap<(&'static str, &str), Vec<&Adoption>> = BTreeMap::new();
+    for a in all {
+        for hidden in &a.hidden {
+            of.entry((hidden.effect, &a.law)).or_default().push(a);
+        }
+    }
+    let hidden = |((effect, law), with): ((&'static str, &str), Vec<&Adoption>)| {
+        let each = |figure: fn(&Adoption) -> f64| median(with.iter().map(|a| figure(a)).collect());
+        Hidden {
+            effect,
+            law: law.into(),
+            cases: with.len(),
+            found: with.iter().filter(|a| a.adopted.iter().any(|f| f.effect == effect)).count(),
+            rms_n: [each(|a| a.before), each(|a| a.after), each(|a| a.truth_told)],
+            over_before: [each(|a| a.ratio), each(|a| a.truth_told / a.before)],
+        }
+    };
+    of.into_iter().map(hidden).collect()
 }
 
 fn names(effects: &[Found]) -> String {
@@ -166,6 +208,14 @@ pub fn text(all: &[Adoption]) -> String {
             s.law, s.ratio, s.worst, s.cases, s.told, s.over_told, s.failed
         );
     }
+    for h in by_effect(all) {
+        let ([before, after, told], [ratio, told_ratio]) = (h.rms_n, h.over_before);
+        let _ = writeln!(
+            out,
+            "  {:28} {:24} {before:9.3} {after:9.3} {told:9.3}  ratio {ratio:.3}, told the truth {told_ratio:.3}; adopted in {} of {} cases",
+            h.effect, h.law, h.found, h.cases
+        );
+    }
     out
 }
 
@@ -188,9 +238,9 @@ pub fn markdown(all: &[Adoption], seed: u64) -> String {
             s.law, s.cases, s.ratio, s.worst, s.told, s.over_told, s.failed
         );
     }
-    out += "\n| hidden | cases | adopted | median ratio |\n| --- | --- | --- | --- |\n";
-    for (effect, cases, found, ratio) in by_effect(all) {
-        let _ = writeln!(out, "| `{effect}` | {cases} | {found} | {ratio:.2} |");
+    let _ = write!(out, "\n| {} |\n|{}\n", HIDDEN.join(" | "), " --- |".repeat(HIDDEN.len()));
+    for hidden in by_effect(all) {
+        let _ = writeln!(out, "| {} |", hidden.row(number).join(" | "));
     }
     out + "\n"
 }
@@ -205,12 +255,7 @@ pub fn section(all: &[Adoption]) -> Markup {
             std::iter::once(s.law).chain(figures).chain([s.failed.to_string()]).collect()
         })
         .collect();
-    let effects: Vec<Vec<String>> = by_effect(all)
-        .into_iter()
-        .map(|(effect, cases, found, ratio)| {
-            vec![effect.to_owned(), cases.to_string(), found.to_string(), number(ratio)]
-        })
-        .collect();
+    let effects: Vec<Vec<String>> = by_effect(all).iter().map(|h| h.row(number).to_vec()).collect();
     let cases: Vec<Vec<String>> = all
         .iter()
         .map(|a| {
@@ -230,7 +275,42 @@ pub fn section(all: &[Adoption]) -> Markup {
     html! {
         p { "Unknown effects were hidden in the plant, the first run was diagnosed, and what was believed was adopted." }
         (table(&["law", "median after/before", "worst", "told the truth", "adopted over told", "adapting alone", "failed"], &laws))
-        (table(&["hidden", "cases", "adopted", "median ratio"], &effects))
+        (table(&HIDDEN, &effects))
         (table(&["case", "law", "hidden", "adopted", "before [N]", "after [N]", "told the truth [N]", "ratio", "why it failed"], &cases))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_effect_is_told_under_each_law_beside_the_truth() {
+        let found = |effect| Found { effect, parameters: BTreeMap::new(), size: None, probability: None };
+        let case = |law: &str, seed, before, after, truth_told| Adoption {
+            scenario: "s".into(),
+            rig: "r".into(),
+            seed,
+            law: law.into(),
+            hidden: vec![found("supply_sag")],
+            adopted: if seed == 1 { vec![found("supply_sag")] } else { Vec::new() },
+            before,
+            after,
+            truth_told,
+            adaptive: None,
+            ratio: after / before,
+            cause: None,
+        };
+        let all = [
+            case("torque_control", 1, 10.0, 4.0, 2.0),
+            case("torque_control", 2, 10.0, 10.0, 4.0),
+            case("velocity_servo", 1, 5.0, 5.0, 6.0),
+        ];
+        let page = markdown(&all, 1);
+        let row = |law: &str, rms_n: [f64; 3], over: &str| {
+            format!("| supply_sag | {law} | 1 | {} | {over} |", rms_n.map(number).join(" | "))
+        };
+        assert!(page.contains(&row("torque_control | 2", [10.0, 7.0, 3.0], "0.70 | 0.30")), "{page}");
+        assert!(page.contains(&row("velocity_servo | 1", [5.0, 5.0, 6.0], "1.00 | 1.20")), "{page}");
     }
 }
