@@ -251,7 +251,6 @@ impl Bridge {
                 self.before_ramp = self.before_ramp.filter(|_| self.ramping).or(self.before);
             }
             self.tell_tripped(0, telemetry.faults, Some(&telemetry.tripped));
-            self.tell_disarmed(&telemetry);
             last = Some(telemetry);
         }
         let state = ports.state.latest();
@@ -260,6 +259,10 @@ impl Bridge {
             self.ramping = state.limits & Limit::LeaseRamp.bit() != 0;
             self.tell_tripped(1, state.faults, None);
             self.tell_mismatch(state);
+        }
+        // Once the faults of both are known.
+        if let Some(telemetry) = &last {
+            self.tell_disarmed(telemetry);
         }
         let thruster = &self.link.thruster;
         thruster.looked(now, last.is_some());

@@ -125,7 +125,7 @@ pub struct Estimated {
 /// Mismatch between the thruster and its rig description while it runs.
 #[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
 pub struct MismatchView {
-    /// How near each path is to an alarm: 1 and above is one; null while it is learnt what is usual.
+    /// How near each path is to an alarm: 1 is one; null while it is learnt what is usual.
     pub paths: Vec<PathView>,
     /// The path that is off: drive, shaft, blade, flow or sensor; null without an alarm.
     #[schema(example = "shaft")]

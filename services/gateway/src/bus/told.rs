@@ -66,7 +66,8 @@ impl Bridge {
         if armed && !was {
             self.disarm_asked = false;
         }
-        if was && !armed && !self.disarm_asked && telemetry.faults == 0 {
+        let faultless = telemetry.faults == 0 && self.latched.iter().all(|faults| faults.unwrap_or(0) == 0);
+        if was && !armed && !self.disarm_asked && faultless {
             let id = &self.link.thruster.id;
             self.link.events.tell(
                 EventKind::Disarmed,

@@ -279,7 +279,7 @@ fn state(families: &mut Families, thruster: &Thruster, tally: &Tally) {
             let alarm = f64::from(u8::from(state.mismatch_path as usize == k + 1));
             families.gauge("mismatch_alarm", "Is this path off against the rig as stated?", &labels, alarm);
             if level.is_finite() {
-                let words = "How near a path is to an alarm of mismatch: 1 and above is one.";
+                let words = "How near a path is to an alarm of mismatch: 1 is one.";
                 families.gauge("mismatch_level_ratio", words, &labels, level);
             }
         }

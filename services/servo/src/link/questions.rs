@@ -3,7 +3,8 @@
 //! One question is asked at a time, so that answers do not pile up in a device that is slower than it is asked. One
 //! that stays without an answer was lost, or its answer is late, and nothing in an answer tells which: it is asked again after
 //! twice the way that a lone answer took last, answers are taken for those to the oldest questions, and what is left over
-//! then is waited for twice as long before it counts as lost. Ages are so never told too small.
+//! then is waited for twice as long before it counts as lost. So a lost answer makes no reading young; a device that becomes slower
+//! by more than the patience between two answers may be taken for younger by about one way.
 
 use std::collections::VecDeque;
 
