@@ -14,6 +14,11 @@ const NOT_RUN: &[(&str, &str, &str)] = &[
         "minutes of work: tests/soak.rs runs shorter scenarios",
     ),
     (
+        "docs/control.md",
+        "kort soak soak-recovery-drag",
+        "minutes of work: tests/soak.rs runs shorter scenarios",
+    ),
+    (
         "docs/hardware.md",
         "kort calibrate --config",
         "minutes of a drive in real time: tests/drives/calibrate.rs does it",

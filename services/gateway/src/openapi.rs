@@ -73,7 +73,6 @@ fn secure(document: &mut OpenApi, app: &App) {
     };
     for (path, item) in &mut document.paths.paths {
         let open = crate::gate::is_open(path);
-
         for operation in operations(item) {
             let answers = &mut operation.responses.responses;
             let mut add = |status: &str, words: &str| {
