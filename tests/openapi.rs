@@ -51,11 +51,13 @@ fn schemathesis_finds_no_answer_that_the_document_does_not_promise() {
     assert!(passed, "{words}{}", String::from_utf8_lossy(&talk));
     let paths = stack.get("/openapi.json").expect("the document")["paths"].as_object().unwrap().clone();
     let methods = ["get", "put", "post", "delete", "patch"];
+    let others = paths.iter().filter(|(path, _)| *path != "/openapi.json").map(|(_, operations)| operations);
+    // Schemathesis does not ask for the document that it has read.
     let operations =
-        paths.values().flat_map(|path| methods.iter().filter(|method| path.get(method).is_some())).count();
+        others.flat_map(|path| methods.iter().filter(|method| path.get(method).is_some())).count();
     assert!(operations > 40, "the document holds the interface: {operations} operations");
-    // By method it selects them all, and says one less in the sum of some runs (4.32.5).
-    let selected =
-        (operations - 1..=operations).any(|n| words.contains(&format!("{n} selected / {n} total")));
-    assert!(selected, "every one of {operations} operations is tried: {words}");
+    assert!(
+        words.contains(&format!("{operations} selected / {operations} total")),
+        "every operation is tried: {words}"
+    );
 }
