@@ -62,8 +62,9 @@ impl Deployment {
     /// The present generation, where its owner speaks as this program does.
     ///
     /// # Errors
-    /// [`TransportError::NoGeneration`] if there is none, [`TransportError::Version`] if its messages are others.
-    pub(super) fn generation_of_our_version(&self) -> Result<u64, TransportError> {
+    /// [`TransportError::NoGeneration`] if there is none, [`TransportError::Version`] if its messages are others,
+    /// [`TransportError::OpenFiles`] if no file can be opened to read it.
+    pub fn generation_of_our_version(&self) -> Result<u64, TransportError> {
         // Whoever else could write these could have us take part in a deployment of theirs.
         ours_alone(&self.root)?;
         ours_alone(&self.generation_file())?;

@@ -10,6 +10,7 @@ use iceoryx2::service::port_factory::{event, publish_subscribe};
 use super::clock::monotonic_ns;
 use super::deployment::Deployment;
 use super::error::TransportError;
+use super::files::allow_files;
 use super::room;
 use crate::messages::{Command, ControllerState, Message, Reply, Request, Setpoint, Telemetry};
 use crate::names::Stream;
@@ -263,6 +264,7 @@ macro_rules! ports {
             /// [`TransportError::Layout`] if it speaks otherwise,
             /// [`TransportError::Room`] if `/dev/shm` is full, [`TransportError::Iceoryx`] if a service is not there or full.
             pub fn open(deployment: &Deployment, thruster: &str) -> Result<Self, TransportError> {
+                allow_files(1)?;
                 let generation = deployment.generation_of_our_version()?;
                 let node = deployment.node($node, generation)?;
                 let opener = Opener { deployment, node: &node, thruster, generation, session: monotonic_ns() };

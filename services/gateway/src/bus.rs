@@ -197,9 +197,12 @@ impl Bridge {
 
     /// Opens the ports of the deployment's present generation.
     fn keep_open(&mut self, deployment: &Deployment) {
-        let generation = deployment.generation();
-        if generation.is_some() && self.ports.as_ref().map(|ports| ports.generation) == generation {
-            return;
+        let present = deployment.generation_of_our_version();
+        match (&self.ports, present) {
+            (Some(ports), Ok(generation)) if ports.generation == generation => return,
+            // What is open works on; only what comes next cannot be read.
+            (Some(_), Err(error @ TransportError::OpenFiles { .. })) => return self.complain(error),
+            _ => {}
         }
         self.ports = None;
         match GatewayPorts::open(deployment, &self.link.thruster.id) {
