@@ -16,6 +16,8 @@ use crate::data::{Prepared, Response};
 /// Relative uncertainty (two sigma) of a coefficient in a rig that states no tolerance at all.
 pub const UNSTATED_TOL: f64 = 0.5;
 
+/// Standard deviation over value beyond which a number is stated roughly: a straight line from it leads astray.
+const ROUGH: f64 = 0.2;
 /// How far a coefficient may move, in stated tolerances (two sigma each).
 const REACH: f64 = 1.5;
 
@@ -262,6 +264,23 @@ impl Hypothesis {
             start.push(quantity.value);
         }
         Self { effects: Vec::new(), free, start, inputs }
+    }
+
+    /// The same, begun where what is stated roughly is stated, and a standard deviation off, one number after the other;
+    /// nothing where nothing is stated roughly.
+    pub fn begun_afar(&self) -> Vec<Self> {
+        let rough =
+            |free: &Free| matches!(free.target, Target::Base(_)) && free.sigma > ROUGH * free.mean.abs();
+        let places: Vec<usize> = (0..self.free.len()).filter(|k| rough(&self.free[*k])).collect();
+        let mut stated = self.clone();
+        places.iter().for_each(|k| stated.start[*k] = self.free[*k].mean);
+        let off = |k: usize, by: f64| {
+            let (free, mut one) = (&self.free[k], stated.clone());
+            one.start[k] = (free.mean + by * free.sigma).clamp(free.low, free.high);
+            one
+        };
+        let as_stated = (!places.is_empty()).then(|| stated.clone());
+        as_stated.into_iter().chain(places.iter().flat_map(|k| [off(*k, -1.0), off(*k, 1.0)])).collect()
     }
 
     /// With the instants free at which these recordings' channels were sampled.

@@ -56,7 +56,7 @@ impl Search<'_, '_> {
 
     /// Fits what a screen promises comes near a cost. A promise counts until its fit has shown what it is worth: one
     /// that is not kept bars no other, and what promised less from another start is tried.
-    fn fit_those_that_may(&mut self, set: &Set, mut untried: Vec<Screened>, bar: f64) -> Vec<Set> {
+    pub(super) fn fit_those_that_may(&mut self, set: &Set, mut untried: Vec<Screened>, bar: f64) -> Vec<Set> {
         let parent = self.fits[set].clone();
         let larger = |screened: &Screened| with(set, screened.effect.id);
         let mut sets: Vec<Set> = Vec::new();

@@ -1,6 +1,7 @@
 //! Which sets of effects do the recordings speak for? Forward, swap and backward steps through sets of
 //! effects, to convergence. Every set that was fitted is kept, with its cost: the posterior is over them.
 
+mod afar;
 mod expand;
 mod forms;
 mod relatives;
@@ -154,6 +155,8 @@ impl<'a, 'p> Search<'a, 'p> {
         self.probes.insert(best.clone(), probes);
         self.hold(&best, "");
         self.fit_what_has_no_size();
+        self.expand(&best, self.cost(&best));
+        self.look_from_afar();
         self.climb(best, progress)
     }
 
