@@ -259,3 +259,24 @@ fn only_an_admin_changes_the_rig() {
         asked.unwrap();
     });
 }
+
+/// An effect of a rig that no law and no observer reckons with is named, with why, in the answer that puts the rig in
+/// force: the law then goes on as if it were not there.
+#[test]
+fn what_no_law_uses_is_named_when_a_revision_is_put_in_force() {
+    common::in_real_time(|| {
+        let stack = Stack::start();
+        let text = format!("{}{}", rubbing(), common::VENTILATION);
+        let (status, dry) = ask(&stack, "POST", "/rig?dry_run=true", &[TEXT], &text);
+        assert_eq!(status, 200, "{dry}");
+        let taken = stack.expect("POST", "/rig", Some(json!({ "toml": text })));
+        for answer in [parsed(&dry), taken] {
+            let unused = answer["unused_effects"].as_array().expect("a list");
+            assert_eq!(unused.len(), 1, "friction is used: {answer}");
+            assert_eq!(unused[0]["effect"], "ventilation", "{answer}");
+            assert!(unused[0]["why"].as_str().is_some_and(|why| why.contains("observer")), "{answer}");
+        }
+        let back = stack.expect("POST", "/rig/rollback", None);
+        assert_eq!(back["unused_effects"], json!([]), "{back}");
+    });
+}

@@ -1,5 +1,7 @@
 //! `kort soak`, black box: short scenarios, the same bytes each time, errors that help.
 
+mod common;
+
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -328,4 +330,24 @@ fn what_cannot_be_a_share_is_named() {
     );
     let wrong = kort(&["soak", "soak-towd"]);
     assert!(text(&wrong.stderr).contains("did you mean `soak-towed`?"), "{}", text(&wrong.stderr));
+}
+
+/// What of a rig's effects no law reckons with is said once, however many scenarios and laws run on it.
+#[test]
+fn an_effect_that_no_law_uses_is_named_once() {
+    let folder = tempfile::tempdir().expect("folder");
+    let shipped = include_str!("../config/thrusters/whitcomb-yoerger-1999.toml");
+    let rig = folder.path().join("airy.toml");
+    let friction = "\n[[effects]]\neffect = \"coulomb_friction\"\ncoulomb_torque_n_m = 0.3\n";
+    std::fs::write(&rig, format!("{shipped}{friction}{}", common::VENTILATION)).expect("rig written");
+    let file = scenario(folder.path(), "");
+    let (file, rig) = (file.to_str().expect("utf-8"), rig.to_str().expect("utf-8"));
+    let out = kort(&["soak", file, file, "--rig", rig, "--seeds", "1", "--json"]);
+    let words = text(&out.stderr);
+    assert!(out.status.success(), "{words}");
+    assert_eq!(words.matches("known ventilation: NOT USED: ").count(), 1, "{words}");
+    assert!(words.contains("hint:"), "{words}");
+    assert!(!words.contains("coulomb_friction"), "what is used needs no word: {words}");
+    let plain = kort(&["soak", file, "--seeds", "1"]);
+    assert!(!text(&plain.stderr).contains("NOT USED"), "{}", text(&plain.stderr));
 }

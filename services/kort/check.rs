@@ -34,10 +34,39 @@ struct Problem {
     words: String,
 }
 
+/// An effect that a rig states and no control law or observer uses: no mistake, and never passed over in silence.
+#[derive(Debug, PartialEq, Serialize)]
+struct Unused {
+    /// The rig's.
+    file: String,
+    effect: &'static str,
+    why: &'static str,
+}
+
 #[derive(Serialize)]
 struct Report<'a> {
     schema: &'static str,
     problems: &'a [Problem],
+    unused_effects: &'a [Unused],
+}
+
+/// What is found in the files.
+#[derive(Default)]
+struct Found {
+    problems: Vec<Problem>,
+    unused: Vec<Unused>,
+}
+
+impl Found {
+    /// Takes over what is left out of a rig, once.
+    fn unused(&mut self, file: &str, effects: impl IntoIterator<Item = (&'static str, &'static str)>) {
+        for (effect, why) in effects {
+            let unused = Unused { file: file.to_owned(), effect, why };
+            if !self.unused.contains(&unused) {
+                self.unused.push(unused);
+            }
+        }
+    }
 }
 
 /// Said of a file without a single key: every service would take it for something else, or refuse it.
@@ -45,25 +74,30 @@ const HOLDS_NOTHING: &str = "holds no key at all\nhint: a deployment needs [thru
 
 /// Checks and prints; exit code 2 if anything is wrong.
 pub fn run(args: &Check) -> ExitCode {
-    let mut problems = Vec::new();
+    let mut found = Found::default();
     if args.files.is_empty() {
         let default = Path::new(DEFAULT_PATH);
-        deployment(default.is_file().then_some(default), &mut problems);
+        deployment(default.is_file().then_some(default), &mut found);
     }
     for file in &args.files {
         match std::fs::read_to_string(file) {
-            Ok(text) => one(file, &text, &mut problems),
+            Ok(text) => one(file, &text, &mut found),
             Err(error) => {
-                problems.push(problem(&file.display().to_string(), &format!("cannot be read: {error}")))
+                let words = format!("cannot be read: {error}");
+                found.problems.push(problem(&file.display().to_string(), &words));
             }
         }
     }
+    let Found { problems, unused } = found;
     if args.json {
-        let report = Report { schema: "kort.check/1", problems: &problems };
+        let report = Report { schema: "kort.check/1", problems: &problems, unused_effects: &unused };
         println!("{}", serde_json::to_string_pretty(&report).unwrap_or_default());
     } else {
         for problem in &problems {
             println!("{problem}");
+        }
+        for Unused { file, effect, why } in &unused {
+            println!("{file}: known {effect}: NOT USED: {why}");
         }
         if problems.is_empty() {
             println!("nothing is wrong");
@@ -72,44 +106,55 @@ pub fn run(args: &Check) -> ExitCode {
     ExitCode::from(if problems.is_empty() { DONE } else { USAGE })
 }
 
-fn one(file: &Path, text: &str, problems: &mut Vec<Problem>) {
+fn one(file: &Path, text: &str, found: &mut Found) {
     let name = file.display().to_string();
     let table: toml::Table = match text.parse() {
         Ok(table) => table,
-        Err(error) => return problems.push(problem(&name, &error.to_string())),
+        Err(error) => return found.problems.push(problem(&name, &error.to_string())),
     };
     if table.is_empty() {
-        return problems.push(problem(&name, HOLDS_NOTHING));
+        return found.problems.push(problem(&name, HOLDS_NOTHING));
     }
     if ["thrusters", "gateway", "transport"].iter().any(|key| table.contains_key(*key)) {
-        deployment(Some(file), problems);
-    } else if let Err(words) = described(&table, text, file) {
-        problems.push(problem(&name, &words));
+        return deployment(Some(file), found);
+    }
+    match described(&table, text, file) {
+        Ok(left_out) => found.unused(&name, left_out),
+        Err(words) => found.problems.push(problem(&name, &words)),
     }
 }
 
-/// A rig, a scenario, a column map or a controller.
+/// A rig, a scenario, a column map or a controller; effects of a rig that nothing uses.
 #[cfg(feature = "lab")]
-fn described(table: &toml::Table, text: &str, file: &Path) -> Result<(), String> {
-    kort_lab::check::Kind::of(table).check(text, file)
+fn described(
+    table: &toml::Table,
+    text: &str,
+    file: &Path,
+) -> Result<Vec<(&'static str, &'static str)>, String> {
+    let kind = kort_lab::check::Kind::of(table);
+    kind.check(text, file).map(|()| kind.left_out(text))
 }
 
 /// Rigs are read with the deployment that names them.
 #[cfg(not(feature = "lab"))]
-fn described(_: &toml::Table, _: &str, _: &Path) -> Result<(), String> {
+fn described(_: &toml::Table, _: &str, _: &Path) -> Result<Vec<(&'static str, &'static str)>, String> {
     Err("this kort was built without its laboratory, and reads deployments only\nhint: check it with a whole one".into())
 }
 
 /// Everything that servo, controller and gateway would refuse.
-fn deployment(file: Option<&Path>, problems: &mut Vec<Problem>) {
+fn deployment(file: Option<&Path>, into: &mut Found) {
     let name = file.map_or_else(|| "built-in configuration".to_owned(), |file| file.display().to_string());
     let (config, wrong) = Config::load_with_all(file);
     let of_services = config.iter().flat_map(services);
     for words in wrong.iter().map(ToString::to_string).chain(of_services) {
         let found = problem(&name, &words);
-        if !problems.contains(&found) {
-            problems.push(found);
+        if !into.problems.contains(&found) {
+            into.problems.push(found);
         }
+    }
+    #[cfg(feature = "gateway")]
+    for (file, effect, why) in config.iter().flat_map(kort_gateway::unused_effects) {
+        into.unused(&file, [(effect, why)]);
     }
 }
 
@@ -167,8 +212,9 @@ mod tests {
     #[test]
     fn a_file_that_holds_nothing_is_a_problem() {
         for text in ["", "# only a word\n"] {
-            let mut problems = Vec::new();
-            one(Path::new("kort.toml"), text, &mut problems);
+            let mut found = Found::default();
+            one(Path::new("kort.toml"), text, &mut found);
+            let problems = found.problems;
             assert_eq!(problems.len(), 1, "{problems:?}");
             assert!(problems[0].allowed.contains("no key at all"), "{problems:?}");
             assert!(

@@ -27,6 +27,18 @@ pub const PATIENCE: Duration = Duration::from_secs(30);
 
 pub const KORT: &str = env!("CARGO_BIN_EXE_kort");
 
+/// An effect that no control law and no observer uses, as a rig states it.
+pub const VENTILATION: &str = r#"
+[[effects]]
+effect = "ventilation"
+thrust_loss = 0.2
+onset_speed_rad_s = 60
+lag_s = 0.1
+recovery_lag_s = 0.3
+hysteresis = 0.2
+drag_loss_over_lift_loss = 0.9
+"#;
+
 /// A folder with a configuration, not yet started.
 pub struct Site {
     pub folder: tempfile::TempDir,

@@ -214,3 +214,35 @@ fn a_wrong_configuration_is_refused_with_the_nearest_key() {
     let error = String::from_utf8_lossy(&out.stderr);
     assert!(out.status.code() == Some(2) && error.contains("port 0"), "{error}");
 }
+
+/// An effect of a rig that no law and no observer reckons with is no mistake, and is named all the same: of the rig
+/// itself, and of a deployment that runs on it.
+#[test]
+fn an_effect_that_no_law_uses_is_named_by_the_check() {
+    let site = Site::new();
+    let rig = site.folder.path().join("airy.toml");
+    let shipped = include_str!("../../config/thrusters/whitcomb-yoerger-1999.toml");
+    let friction = "\n[[effects]]\neffect = \"coulomb_friction\"\ncoulomb_torque_n_m = 0.3\n";
+    std::fs::write(&rig, format!("{shipped}{friction}{}", common::VENTILATION)).unwrap();
+    let text = std::fs::read_to_string(site.config()).unwrap();
+    let stated = concat!(env!("CARGO_MANIFEST_DIR"), "/config/thrusters/whitcomb-yoerger-1999.toml");
+    std::fs::write(site.config(), text.replace(stated, rig.to_str().unwrap())).unwrap();
+    let check = |more: &[&str], file: &std::path::Path| {
+        let out = run(std::process::Command::new(common::KORT).arg("check").args(more).arg(file));
+        let words = String::from_utf8_lossy(&out.stdout).into_owned();
+        assert_eq!(out.status.code(), Some(0), "{words}");
+        words
+    };
+    for file in [&rig, &site.config()] {
+        let words = check(&[], file);
+        assert_eq!(words.matches("ventilation").count(), 1, "{words}");
+        assert!(words.contains("airy.toml") && words.contains("NOT USED: "), "{words}");
+        assert!(words.contains("nothing is wrong") && !words.contains("coulomb_friction"), "{words}");
+        let report: serde_json::Value = serde_json::from_str(&check(&["--json"], file)).unwrap();
+        assert_eq!(report["problems"], serde_json::json!([]), "{report}");
+        let unused = report["unused_effects"].as_array().expect("a list");
+        assert_eq!((unused.len(), &unused[0]["effect"]), (1, &"ventilation".into()), "{report}");
+        assert!(unused[0]["file"].as_str().is_some_and(|file| file.ends_with("airy.toml")), "{report}");
+        assert!(unused[0]["why"].as_str().is_some_and(|why| why.contains("observer")), "{report}");
+    }
+}

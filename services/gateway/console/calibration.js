@@ -47,7 +47,7 @@ click("calibration-use", async () => {
   if (!answer.ok) { log(`rig of ${calibrated.id}: ${answer.status}`, true); return; }
   const wanted = { toml: await answer.text(), note: `calibration ${calibrated.id}` };
   const would = await call("POST", `${base()}/rig?dry_run=true`, wanted);
-  if (!confirm(`Put this in force on ${thruster}, also while it drives?\n\n${lines(would.difference).join("\n")}`)) return;
+  if (!confirm(toAgree(would))) return;
   came(await call("POST", `${base()}/rig`, wanted));
 });
 $("thruster").addEventListener("change", () => {

@@ -93,10 +93,12 @@ click("diagnosis-cancel", async () => {
 
 const value = (v) => (v === null ? "nothing" : typeof v === "object" && "value" in v ? `${v.value} (± ${percent(v.tol)})` : v === true ? "there" : String(v));
 const lines = (difference) => difference.map((change) => `${change.key}: ${value(change.before)} → ${value(change.after)}`);
+const unused = (answer) => answer.unused_effects.map(({ effect, why }) => `${effect} is used by no law and no observer: ${why}`);
+const toAgree = (would) => `Put this in force on ${thruster}, also while it drives?\n\n${[...lines(would.difference), ...unused(would)].join("\n")}`;
 click("use", async () => {
   const wanted = { diagnosis: found.id };
   const would = await call("POST", `${base()}/rig?dry_run=true`, wanted);
-  if (!confirm(`Put this in force on ${thruster}, also while it drives?\n\n${lines(would.difference).join("\n")}`)) return;
+  if (!confirm(toAgree(would))) return;
   came(await call("POST", `${base()}/rig`, wanted));
 });
 const goBack = async () => came(await call("POST", `${base()}/rig/rollback`));
@@ -104,7 +106,7 @@ click("back", goBack);
 click("worse-back", goBack);
 function came(answer) {
   revised = { time_s: state.time_s, number: answer.in_force.number };
-  log(`revision ${answer.in_force.number} of the rig is in force: ${lines(answer.difference).join(", ")}`);
+  log(`revision ${answer.in_force.number} of the rig is in force: ${[...lines(answer.difference), ...unused(answer)].join(", ")}`);
   loadDiagnosis().catch(() => {});
 }
 

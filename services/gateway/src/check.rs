@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
+use kort_control::known::uses;
 use kort_proto::config::Config;
+use kort_thruster::rig::Rig;
 
 use crate::error::GatewayError;
 use crate::settings::{self, Settings};
@@ -45,6 +47,19 @@ pub fn check_config(config: &Config) -> Vec<GatewayError> {
         }
     }
     wrong
+}
+
+/// Effects of the deployment's rigs that no control law and no observer uses: file of the rig, effect, and why.
+pub fn unused_effects(config: &Config) -> Vec<(String, &'static str, &'static str)> {
+    let mut unused = Vec::new();
+    for deployed in settings::thrusters(config).unwrap_or_default() {
+        let (file, text) = deployed.rig;
+        let Ok(rig) = Rig::from_toml(&text) else { continue };
+        for (effect, why) in uses::left_out(&rig, deployed.heartbeat.as_secs_f64()) {
+            unused.push((file.clone(), effect, why));
+        }
+    }
+    unused
 }
 
 /// The tokens; where they are asked for there must be one.

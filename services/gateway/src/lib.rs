@@ -60,7 +60,7 @@ use utoipa::openapi::OpenApi;
 use bus::{Bell, Pulse};
 use calibration::Calibrations;
 use check::{certificate, tokens};
-pub use check::{check, check_config};
+pub use check::{check, check_config, unused_effects};
 use connections::Connections;
 use diagnosis::Diagnoses;
 use durations::Durations;

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use kort_control::ControllerConfig;
+use kort_control::known::uses;
 use kort_recording::ColumnMap;
 use kort_thruster::rig::Rig;
 
@@ -48,6 +49,14 @@ impl Kind {
                 ColumnMap::from_toml(&name, text).map(drop).map_err(|e| e.to_string())
             }
             Kind::Controller => ControllerConfig::from_toml(text).map(drop).map_err(|e| e.to_string()),
+        }
+    }
+
+    /// Effects that the text states and no control law or observer uses, each with why. A rig states such.
+    pub fn left_out(self, text: &str) -> Vec<(&'static str, &'static str)> {
+        match (self, Rig::from_toml(text)) {
+            (Kind::Rig, Ok(rig)) => uses::left_out(&rig, uses::period_s(&rig)),
+            _ => Vec::new(),
         }
     }
 }

@@ -106,6 +106,28 @@ pub struct Usage {
     pub left: Option<&'static str>,
 }
 
+impl Usage {
+    /// What it is used for, or why not, in words.
+    pub fn words(&self) -> String {
+        match self.left {
+            Some(why) => format!("NOT USED: {why}"),
+            None => self.uses.iter().map(|u| u.words()).collect::<Vec<_>>().join("; "),
+        }
+    }
+}
+
+/// Those of a rig's known effects that no law and no observer uses, with why: whoever puts a rig to use names them.
+/// Empty where no controller can be designed for the rig at all, which is refused in other words.
+pub fn left_out(rig: &Rig, period_s: f64) -> Vec<(&'static str, &'static str)> {
+    let known = of_rig(rig, period_s).unwrap_or_default();
+    known.into_iter().filter_map(|usage| Some((usage.effect, usage.left?))).collect()
+}
+
+/// Control period that a rig is looked at for where nothing else says one, s.
+pub fn period_s(rig: &Rig) -> f64 {
+    rig.sensors.control_rate_hz.map_or(1e-3, |rate| 1.0 / rate)
+}
+
 /// What a rig's known effects are used for, one by one.
 ///
 /// # Errors

@@ -10,6 +10,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use kort_control::known::uses;
 use kort_control::model::ControlModel;
 use kort_proto::events::EventKind;
 use kort_proto::messages::{Process, Request, RequestKind};
@@ -57,6 +58,17 @@ pub struct Revised {
     pub in_force: Entry,
     /// What differs from what was in force before.
     pub difference: Vec<Change>,
+    /// Effects of the text that no control law and no observer uses: thrust is controlled as if they were not there.
+    pub unused_effects: Vec<UnusedEffect>,
+}
+
+/// An effect that a rig description states and that nothing uses.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct UnusedEffect {
+    /// Its name in the catalogue.
+    pub effect: &'static str,
+    /// Why, and where its doing then goes.
+    pub why: &'static str,
 }
 
 /// Who wants a revision in force.
@@ -73,6 +85,15 @@ struct Checked {
     rig: Rig,
     /// How far setpoints may go with it.
     range: SetpointRange,
+    /// Control period, s.
+    period_s: f64,
+}
+
+impl Checked {
+    fn unused(&self) -> Vec<UnusedEffect> {
+        let left_out = uses::left_out(&self.rig, self.period_s);
+        left_out.into_iter().map(|(effect, why)| UnusedEffect { effect, why }).collect()
+    }
 }
 
 /// How a revision comes into force.
@@ -134,7 +155,8 @@ impl RigDesk {
         let checked = self.check(text)?;
         if dry_run || *text_before == *text {
             let difference = difference::between(&text_before, text);
-            return Ok(Revised { applied: false, in_force: before, difference });
+            let unused_effects = checked.unused();
+            return Ok(Revised { applied: false, in_force: before, difference, unused_effects });
         }
         self.put_in_force(asker, text, checked, How::Made(making)).await
     }
@@ -194,7 +216,7 @@ impl RigDesk {
             (EventKind::RigChanged, words)
         };
         self.thruster.did(&asker.who, asker.lease.as_deref(), kind, &format!("{words}: {differs}"));
-        Ok(Revised { applied: true, in_force, difference })
+        Ok(Revised { applied: true, in_force, difference, unused_effects: checked.unused() })
     }
 
     /// What this gateway itself knows of the rig: how far setpoints go, and what its motor takes.
@@ -238,8 +260,8 @@ impl RigDesk {
     /// Checks a text as `kort check` and the controller do.
     fn check(&self, text: &str) -> Result<Checked, Problem> {
         let rig = Rig::from_toml(text).map_err(|error| invalid(&error.to_string()))?;
-        let model = ControlModel::from_rig(&rig, self.deployed.heartbeat.as_secs_f64())
-            .map_err(|error| invalid(&error.to_string()))?;
+        let period_s = self.deployed.heartbeat.as_secs_f64();
+        let model = ControlModel::from_rig(&rig, period_s).map_err(|error| invalid(&error.to_string()))?;
         let drive = self.deployed.drive;
         if rig.amplifier.kind != drive {
             return Err(Problem::new(
@@ -253,7 +275,7 @@ impl RigDesk {
             )
             .hint("a drive of another kind is deployed with the configuration, and needs a restart"));
         }
-        Ok(Checked { range: self.deployed.range_of(&model), rig })
+        Ok(Checked { range: self.deployed.range_of(&model), rig, period_s })
     }
 
     /// Hands a text to the controller and waits until it runs on it.

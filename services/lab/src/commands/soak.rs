@@ -4,6 +4,7 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use clap::Args as ClapArgs;
+use kort_control::known::uses;
 
 use crate::failure::{Failure, Outcome, check_writable, print, print_json, write_text};
 use crate::files;
@@ -80,6 +81,9 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     for file in args.html.iter().chain(&args.markdown) {
         check_writable(file)?;
     }
+    for words in left_out(&loaded) {
+        eprintln!("{words}");
+    }
     let metrics = args.metrics_addr.map(Metrics::serve).transpose().map_err(Failure::input)?;
     if let Some(metrics) = &metrics {
         eprintln!("metrics on http://{}/metrics", metrics.address);
@@ -102,6 +106,23 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         print(&report.text());
     }
     Ok(Outcome::Done)
+}
+
+/// What of the rigs' effects no law reckons with, in words: once a rig, however many scenarios and laws run on it.
+fn left_out(loaded: &[Loaded]) -> Vec<String> {
+    let mut said = Vec::new();
+    for l in loaded {
+        for (effect, why) in uses::left_out(&l.rig, 1.0 / l.scenario.control_rate_hz) {
+            let words = format!(
+                "rig {:?}: known {effect}: NOT USED: {why}\nhint: every law that is compared goes on without it; `kort explain {effect}` tells what it does",
+                l.rig.name
+            );
+            if !said.contains(&words) {
+                said.push(words);
+            }
+        }
+    }
+    said
 }
 
 /// What a comparison is made of.

@@ -11,16 +11,13 @@ use super::WIDTH;
 use crate::failure::{Failure, Outcome, print, print_json};
 use crate::files;
 
-/// Control period that the advice is for where the rig states no control rate, s.
-const PERIOD_S: f64 = 1e-3;
-
 /// Does it.
 ///
 /// # Errors
 /// Names the rig, the key and what is allowed; a dry rig has no thrust to control.
 pub fn run(wanted: &Path, json: bool) -> Result<Outcome, Failure> {
     let rig = files::read_rig(wanted)?;
-    let period_s = rig.sensors.control_rate_hz.map_or(PERIOD_S, |rate| 1.0 / rate);
+    let period_s = uses::period_s(&rig);
     let advice = advise(&rig, period_s).map_err(|e| Failure::in_file(wanted, e))?;
     let known = uses::of_rig(&rig, period_s).map_err(|e| Failure::in_file(wanted, e))?;
     if json {
@@ -29,14 +26,6 @@ pub fn run(wanted: &Path, json: bool) -> Result<Outcome, Failure> {
         print(&text(&rig.name, period_s, &advice, &known));
     }
     Ok(Outcome::Done)
-}
-
-/// What a known effect of the rig is used for, in words.
-fn words(usage: &Usage) -> String {
-    match usage.left {
-        Some(why) => format!("NOT USED: {why}"),
-        None => usage.uses.iter().map(|u| u.words()).collect::<Vec<_>>().join("; "),
-    }
 }
 
 /// The time scales in words, with their values in s.
@@ -65,7 +54,7 @@ fn text(rig: &str, period_s: f64, advice: &Advice, known: &[Usage]) -> String {
         out.push('\n');
     }
     for usage in known {
-        let line = format!("known {}: {}.", usage.effect, words(usage));
+        let line = format!("known {}: {}.", usage.effect, usage.words());
         out += &textwrap::fill(&line, textwrap::Options::new(WIDTH).subsequent_indent("  "));
         out.push('\n');
     }
@@ -85,7 +74,7 @@ fn document(rig: &str, period_s: f64, advice: &Advice, known: &[Usage]) -> Value
         "reasons": { "law": law, "observer": observer, "estimator": estimator },
         "known_effects": known
             .iter()
-            .map(|u| json!({ "effect": u.effect, "used": u.left.is_none(), "how": words(u) }))
+            .map(|u| json!({ "effect": u.effect, "used": u.left.is_none(), "how": u.words() }))
             .collect::<Vec<_>>(),
     })
 }
