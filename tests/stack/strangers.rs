@@ -87,3 +87,40 @@ fn a_link_that_somebody_laid_is_never_written_through() {
         assert_eq!(fs::read_to_string(&victim).unwrap(), "whole");
     });
 }
+
+/// iceoryx2 gives one of its objects to everybody (the segment that counts its participants); whoever writes there
+/// keeps a gateway's successor from starting. Nothing of ours in `/dev/shm` is anybody else's, successors' included.
+#[test]
+fn nothing_in_shared_memory_can_be_opened_by_others() {
+    common::in_real_time(|| {
+        let stack = Stack::start();
+        let nodes = fs::read_dir(stack.site.root()).unwrap().flatten().next().unwrap().path().join("nodes");
+        let entry = fs::read_dir(nodes).unwrap().flatten().find(|e| e.path().is_file()).unwrap();
+        let name = entry.file_name().into_string().unwrap();
+        let prefix: String = name.split_inclusive('_').take(2).collect();
+        let are_ours = || {
+            let objects: Vec<_> = fs::read_dir("/dev/shm")
+                .unwrap()
+                .flatten()
+                .filter(|object| object.file_name().to_string_lossy().starts_with(&prefix))
+                .collect();
+            assert!(
+                objects.iter().any(|object| object.file_name().to_string_lossy().ends_with("global_mgmt"))
+            );
+            for object in objects {
+                // One that is being removed this moment is nobody's.
+                let Ok(about) = object.metadata() else { continue };
+                let mode = about.permissions().mode() & 0o777;
+                assert_eq!(mode & 0o077, 0, "{}: mode {mode:o}", object.path().display());
+            }
+        };
+        are_ours();
+        for role in ["gateway", "controller", "servo"] {
+            let first = stack.process_of(role);
+            kill(first, "KILL");
+            common::wait("a successor", || stack.process(role).filter(|process| *process != first));
+            stack.wait_until_up();
+            are_ours();
+        }
+    });
+}

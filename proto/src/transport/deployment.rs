@@ -18,7 +18,7 @@ use rustix::fs::{FlockOperation, flock};
 use super::clock::monotonic_ns;
 use super::error::TransportError;
 use super::files::{allow_files, none_left};
-use super::ours::{nobody_else_may_replace, ours_alone, write_whole};
+use super::ours::{nobody_else_may_replace, ours_alone, owner_only, owner_only_from_the_start, write_whole};
 use super::ports::{Services, create_services};
 use super::room;
 use crate::names::MESSAGES_VERSION;
@@ -148,6 +148,12 @@ impl Deployment {
 
     /// A node (iceoryx2's word for a participant) of one generation of this deployment.
     pub(super) fn node(&self, name: &str, generation: u64) -> Result<Node<ipc::Service>, TransportError> {
+        let node = self.new_node(name, generation)?;
+        owner_only(Path::new(room::SHM), &self.prefix_of(generation))?;
+        Ok(node)
+    }
+
+    fn new_node(&self, name: &str, generation: u64) -> Result<Node<ipc::Service>, TransportError> {
         // iceoryx2 talks about every dead peer; what matters is in our own errors.
         set_log_level(LogLevel::Fatal);
         let name = NodeName::new(name).map_err(|e| TransportError::iceoryx("node name", e))?;
@@ -157,6 +163,12 @@ impl Deployment {
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create::<ipc::Service>()
             .map_err(|e| TransportError::iceoryx("creating a node", e))
+    }
+
+    /// Makes what the nodes of a new generation share, and sees to it that nobody else has it open.
+    fn first_node(&self, generation: u64) -> Result<(), TransportError> {
+        drop(self.new_node("first", generation)?);
+        owner_only_from_the_start(Path::new(room::SHM), &self.prefix_of(generation))
     }
 
     /// What iceoryx2 must know to find one generation of this deployment, for those who listen without our ports.
@@ -202,9 +214,11 @@ impl Deployment {
         format!("{}{}_", self.prefix(), tag(generation))
     }
 
-    /// Takes every page of one generation's shared memory, see [`room::reserve`].
+    /// Takes every page of one generation's shared memory, see [`room::reserve`], and keeps others out of it.
     pub(super) fn reserve(&self, generation: u64) -> Result<(), TransportError> {
-        room::reserve(&self.prefix_of(generation))
+        let prefix = self.prefix_of(generation);
+        owner_only(Path::new(room::SHM), &prefix)?;
+        room::reserve(&prefix)
     }
 
     /// The file in which the supervisor notes what it watches, see [`super::Watched`].
@@ -247,6 +261,8 @@ impl Owner {
         room::room_for_thrusters(thrusters.len() as u64)?;
         allow_files(thrusters.len() as u64)?;
         let generation = monotonic_ns();
+        // The first node makes the objects that all share, open to everybody; they are ours alone before anybody is told of them.
+        self.deployment.first_node(generation)?;
         let node = self.deployment.node("owner", generation)?;
         self.services = thrusters
             .iter()

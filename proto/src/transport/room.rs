@@ -13,7 +13,7 @@ use rustix::io::Errno;
 use super::error::TransportError;
 
 /// Where shared memory lies.
-const SHM: &str = "/dev/shm";
+pub const SHM: &str = "/dev/shm";
 /// What the services of one thruster and its peers take (7.5 MB), with as much again for the successors of killed
 /// processes, KiB.
 const THRUSTER_KIB: u64 = 16_384;
