@@ -53,7 +53,7 @@ pub fn slow_reader(table: &mut Table) {
     table.row(
         "stream's reader paused for 8 s",
         "span of states it still finds, then closed",
-        Duration::from_secs(2),
+        Duration::from_millis(250),
         &[Duration::from_secs_f64(old)],
     );
 }

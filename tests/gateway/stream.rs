@@ -1,6 +1,6 @@
 //! The WebSocket stream.
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 use tokio_tungstenite::tungstenite::{self, Message};
@@ -106,5 +106,45 @@ fn who_breaks_the_protocol_is_closed_with_a_reason_and_who_loses_the_lease_is_to
             (&told["type"], &told["holder"]),
             (&json!("urn:kort:problem:lease-lost"), &json!("bridge"))
         );
+    });
+}
+
+/// A reader that paused goes on with what is, not with what was: what lay on the way to it when it paused is a quarter of
+/// a second of states and no more, whatever the rate and wherever between two pings it stopped.
+#[test]
+fn a_reader_that_paused_goes_on_with_the_newest_state() {
+    common::in_real_time(|| {
+        let stack = Stack::start();
+        for hz in [50, 500] {
+            let url = format!("ws://127.0.0.1:{}/v1/thrusters/t1/stream?hz={hz}", stack.site.port);
+            let (mut socket, _) = tungstenite::connect(&url).unwrap();
+            let begun = Instant::now();
+            // It stops right behind a ping that it has answered: the next one comes latest.
+            while !matches!(socket.read().unwrap(), Message::Ping(_))
+                || begun.elapsed() < Duration::from_millis(1500)
+            {}
+            socket.flush().unwrap();
+            std::thread::sleep(Duration::from_millis(2500));
+            let mut times = Vec::new();
+            let gap = wait("the first new state", || {
+                if let Message::Text(text) = socket.read().unwrap() {
+                    let state: Value = serde_json::from_str(&text).unwrap();
+                    times.push(state["time_s"].as_f64().unwrap());
+                }
+                let [.., old, new] = times[..] else { return None };
+                (new - old > 1.0).then_some((old - times[0], new - old))
+            });
+            assert!(gap.0 < 0.25, "{hz} Hz: {:.3} s of old states, then a gap of {:.3} s", gap.0, gap.1);
+            // From there on every state comes again.
+            let before = times.len();
+            let again = Instant::now();
+            while again.elapsed() < Duration::from_secs(1) {
+                if let Message::Text(_) = socket.read().unwrap() {
+                    times.push(0.0);
+                }
+            }
+            let came = times.len() - before;
+            assert!(came as u32 > hz / 2, "{came} states in a second at {hz} Hz");
+        }
     });
 }

@@ -28,12 +28,17 @@ const MESSAGE_BYTES_READ: usize = 1 << 20;
 
 /// What the console offers beside its token.
 const PROTOCOL: &str = "kort";
-/// The client is asked whether it keeps up.
-const PING_EVERY: Duration = Duration::from_secs(1);
-/// Pings without an answer that end the stream.
-const MISSED_MAX: u32 = 3;
-/// A ping older than this, unanswered: the client is behind, and is sent no more states.
-const BEHIND_AFTER: Duration = Duration::from_millis(300);
+/// The client is asked whether it keeps up as often as it is sent states, within these bounds: what it has read, it alone
+/// can say, for what lies in its own kernel's buffer counts as taken.
+const PING_EVERY: [Duration; 2] = [Duration::from_millis(100), Duration::from_secs(1)];
+/// A ping that stays unanswered for so long ends the stream.
+const CLOSE_AFTER: Duration = Duration::from_secs(3);
+/// A ping that is answered so much later than this client's quickest was: the client is behind, and is sent no more
+/// states. With the ping's period it bounds what a reader that pauses finds when it goes on.
+const BEHIND_AFTER: Duration = Duration::from_millis(100);
+/// What counts as its quickest at most: a far client is no slow one, but one that paused before its first answer is not
+/// far.
+const AWAY_MAX: Duration = Duration::from_millis(800);
 /// A message must leave within this time.
 const SEND_WITHIN: Duration = Duration::from_secs(5);
 
@@ -70,8 +75,10 @@ pub struct Incoming {
 ///
 /// The client may send `{"setpoint": {"thrust_n": 25.0}, "lease_id": "…"}`; what is refused is answered by one
 /// problem document. `{"stop": true}` stops every thruster and is answered by `{"stopped": [ids]}`. The gateway pings
-/// each second; states that the client does not keep up with are left out, and a client that misses three pings, or
-/// whose token was revoked, is closed. A plain GET, without the WebSocket handshake, is answered by one state.
+/// with the states, ten times a second at most and once at least. A client that does not answer is sent no more states, so that
+/// one that paused goes on with the newest behind a quarter of a second of old ones at most (more over a connection whose round
+/// trip is long); one that answers none for three seconds, or whose token was revoked, is closed. A plain GET, without
+/// the WebSocket handshake, is answered by one state.
 #[utoipa::path(get, path = "/v1/thrusters/{id}/stream", tag = "thrusters",
     params(("id" = String, Path, description = "Name of the thruster", example = "t1"), Rate),
     responses(
@@ -101,7 +108,7 @@ async fn stream(
             .protocols([PROTOCOL])
             .on_upgrade(move |socket| {
                 let period = Duration::from_secs_f64(1.0 / hz);
-                Session { app, thruster, who, lease: None, asked_at: None, missed: 0 }.serve(socket, period)
+                Session { app, thruster, who, lease: None, asked_at: None, away: None }.serve(socket, period)
             })
             .into_response()),
         Err(Rejection::InvalidConnectionHeader(_) | Rejection::InvalidUpgradeHeader(_)) => {
@@ -124,13 +131,15 @@ struct Session {
     lease: Option<String>,
     /// When the ping went out that is not answered yet.
     asked_at: Option<Instant>,
-    missed: u32,
+    /// How quick its quickest answer to a ping was.
+    away: Option<Duration>,
 }
 
 impl Session {
     async fn serve(mut self, mut socket: WebSocket, period: Duration) {
         let mut tick = interval(period);
-        let mut ping = interval(PING_EVERY);
+        let [often, seldom] = PING_EVERY;
+        let mut ping = interval(period.clamp(often, seldom));
         let mut stop = self.app.stopping();
         let _open = self.app.streams().open();
         loop {
@@ -163,23 +172,22 @@ impl Session {
         }
     }
 
-    /// The next ping, or the end of a client that missed too many, or whose token is no more.
+    /// The next ping, or the end of a client that answers none, or whose token is no more.
     fn ask(&mut self) -> Option<Message> {
         if !self.app.gate().stands(&self.who) {
             return Some(revoked());
         }
-        if self.asked_at.is_some() {
-            self.missed += 1;
-            return (self.missed >= MISSED_MAX).then(|| close(1008, "three pings were not answered"));
+        if let Some(at) = self.asked_at {
+            return (at.elapsed() >= CLOSE_AFTER)
+                .then(|| close(1008, "three seconds of pings were not answered"));
         }
         self.asked_at = Some(Instant::now());
-        self.missed = 0;
         Some(Message::Ping(Vec::new().into()))
     }
 
     /// The newest state. None for a client that is behind: what it would read later is old by then.
     fn state(&mut self) -> Option<Message> {
-        if self.asked_at.is_some_and(|at| at.elapsed() > BEHIND_AFTER) {
+        if self.asked_at.is_some_and(|at| at.elapsed() > self.away.unwrap_or_default() + BEHIND_AFTER) {
             return None;
         }
         if let Some(lost) = &self.lease {
@@ -201,8 +209,9 @@ impl Session {
                 Err(problem) => Some(problem_text(&problem)),
             },
             Message::Pong(_) => {
-                self.asked_at = None;
-                self.missed = 0;
+                if let Some(at) = self.asked_at.take() {
+                    self.away = Some(self.away.unwrap_or(AWAY_MAX).min(at.elapsed()));
+                }
                 None
             }
             Message::Ping(_) => None,
