@@ -97,6 +97,17 @@ fn everything_that_is_wrong_is_said_at_once() {
     let of = |key: &str| report["problems"].as_array().unwrap().iter().find(|p| p["key"] == key).cloned();
     let found = of("thrusters.t1.servo.priority").expect("the priority");
     assert_eq!((&found["found"], &found["allowed"]), (&"99".into(), &"0 to 90".into()), "{found}");
+    let found = of("thrusters.t1.amplifier").expect("the drive");
+    assert_eq!(found["found"], "\"simulatd\"", "{found}");
+    assert!(
+        found["allowed"].as_str().is_some_and(|allowed| allowed.starts_with("\"simulated\", ")),
+        "{found}"
+    );
+    // All that is said of it stands beside the values, never in their place.
+    for problem in report["problems"].as_array().unwrap() {
+        let (message, allowed) = (problem["message"].as_str().unwrap(), problem["allowed"].as_str());
+        assert!(allowed.is_none_or(|allowed| allowed != message && !allowed.contains('`')), "{problem}");
+    }
 }
 
 #[test]
