@@ -8,6 +8,7 @@ mod errors;
 mod followed;
 mod foxglove;
 mod kept;
+mod limits;
 mod pages;
 mod parts;
 mod recordings;

@@ -22,6 +22,8 @@ use crate::thruster::lock;
 
 /// What a kill may cost.
 const FLUSH_EVERY: Duration = Duration::from_millis(500);
+/// So much longer than its time a recording waits for the sample that ends it, s.
+const SILENCE_S: f64 = 1.0;
 /// States beside the rows: the signals are in the rows, here is what changes slowly.
 const STATE_EVERY_S: f64 = 0.1;
 /// The law's parameters beside the states.
@@ -68,6 +70,9 @@ pub struct Job {
     base: String,
     number: u32,
     first_ns: Option<u64>,
+    /// When the whole recording began, however many files it goes on in, and how long the files before this one are, s.
+    since: Instant,
+    past_s: f64,
     /// Rows and duration that were given to the file; the list tells what the disk has of them.
     given: (u64, f64),
     thin: Thin,
@@ -117,6 +122,8 @@ impl Job {
             part: 1,
             number: 1,
             first_ns,
+            since: Instant::now(),
+            past_s: 0.0,
             given: (0, 0.0),
             thin: Thin::new(now.rate_hz),
             state_s: f64::NEG_INFINITY,
@@ -176,6 +183,10 @@ impl Job {
                 };
                 recorder.note_info(&info);
                 guard_space(&self.folder, &self.limits)?;
+                // A servo that says nothing more gives no sample that would end it.
+                if self.since.elapsed().as_secs_f64() > self.limits.time_max_s + SILENCE_S {
+                    return Err(self.time_is_over());
+                }
                 self.rotate(recorder)?;
             }
         }
@@ -193,11 +204,14 @@ impl Job {
         self.file.row(time_s, &values)?;
         self.beside(time_s)?;
         self.given = (self.given.0 + 1, time_s);
-        if time_s > self.limits.time_max_s {
-            let most = self.limits.time_max_s;
-            return Err(End::Limit(format!("gateway.recording.time_max_s = {most} is reached")));
+        if self.past_s + time_s > self.limits.time_max_s {
+            return Err(self.time_is_over());
         }
         Ok(())
+    }
+
+    fn time_is_over(&self) -> End {
+        End::Limit(format!("gateway.recording.time_max_s = {} is reached", self.limits.time_max_s))
     }
 
     /// Setpoint, estimates with their doubt, law, limits, faults: what the state shows.
@@ -254,6 +268,7 @@ impl Job {
         ended.state = RecordingState::Complete;
         recorder.count_rows(&mut ended, self.given.0, self.given.1);
         recorder.note_info(&ended);
+        self.past_s += self.given.1;
         (self.first_ns, self.given) = (None, (0, 0.0));
         (self.state_s, self.law_s) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
         Ok(())
