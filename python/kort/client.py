@@ -300,7 +300,14 @@ class Stream:
         headers = None if client._token is None else {"Authorization": f"Bearer {client._token}"}
         self._open = ExitStack()
         self._socket = self._open.enter_context(
-            connect(address, additional_headers=headers, ssl=client._context if scheme == "wss" else None, open_timeout=client._timeout_s)
+            # What the library has read counts as read: a longer queue keeps old states for an iteration that paused.
+            connect(
+                address,
+                additional_headers=headers,
+                ssl=client._context if scheme == "wss" else None,
+                open_timeout=client._timeout_s,
+                max_queue=1,
+            )
         )
 
     def __enter__(self) -> Stream:

@@ -114,6 +114,17 @@ def test_the_stream_gives_states(client: kort.Client) -> None:
     assert len(states) == 3 and states[0].time_s < states[2].time_s and states[0].id == "t1"
 
 
+def test_an_iteration_that_paused_goes_on_with_what_is(client: kort.Client) -> None:
+    with client.stream("t1", hz=10) as stream:
+        states = iter(stream)
+        next(states)
+        time.sleep(2.5)
+        times = [next(states).time_s]
+        while len(times) < 2 or times[-1] - times[-2] < 0.3:
+            times.append(next(states).time_s)
+    assert times[-2] - times[0] < 0.6, times
+
+
 def test_a_refusal_is_the_problem_document(client: kort.Client) -> None:
     with pytest.raises(kort.Answer) as refused:
         client.state("t9")

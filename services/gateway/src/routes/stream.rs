@@ -75,10 +75,11 @@ pub struct Incoming {
 ///
 /// The client may send `{"setpoint": {"thrust_n": 25.0}, "lease_id": "…"}`; what is refused is answered by one
 /// problem document. `{"stop": true}` stops every thruster and is answered by `{"stopped": [ids]}`. The gateway pings
-/// with the states, ten times a second at most and once at least. A client that does not answer is sent no more states, so that
-/// one that paused goes on with the newest behind a quarter of a second of old ones at most (more over a connection whose round
-/// trip is long); one that answers none for three seconds, or whose token was revoked, is closed. A plain GET, without
-/// the WebSocket handshake, is answered by one state.
+/// with the states, ten times a second at most and once at least. A client that does not answer is sent no more states, so
+/// that one that paused goes on with the newest behind a quarter of a second of old ones at most (more over a connection
+/// whose round trip is long, or where its library reads ahead: `max_queue=1` of Python's websockets); one that answers none
+/// for three seconds, or whose token was revoked, is closed. A plain GET, without the WebSocket handshake, is answered by
+/// one state.
 #[utoipa::path(get, path = "/v1/thrusters/{id}/stream", tag = "thrusters",
     params(("id" = String, Path, description = "Name of the thruster", example = "t1"), Rate),
     responses(
