@@ -72,13 +72,25 @@ fn recording() -> Series {
     Series { name: "motor".into(), time_s: (0..ROWS).map(|k| k as f64 * ROW_S).collect(), columns }
 }
 
-#[test]
-fn what_a_bent_winding_hides_is_named() {
-    let rig = Rig::from_toml(RIG).unwrap();
+/// That friction is named, and nothing beside it.
+fn names_the_friction(rig: &str) {
+    let rig = Rig::from_toml(rig).unwrap();
     let options = Options { model: ModelName::Model2, seed: 1, with: Vec::new() };
     let report = diagnose(&[recording()], &rig, &options, &|_| ()).unwrap().report;
     let named = report.findings.iter().find(|f| f.effect == "viscous_friction");
     let named = named.unwrap_or_else(|| panic!("{}", report.summary));
     assert!(named.probability > 0.8, "{}: {}", named.probability, report.summary);
     assert_eq!(report.findings.len(), 1, "{}", report.summary);
+}
+
+#[test]
+fn what_a_bent_winding_hides_is_named() {
+    names_the_friction(RIG);
+}
+
+/// A rig that states its encoder does not say how its drive makes a speed of it: of an instant here, where the model's is
+/// the mean over a tick. At every step of the command the two differ, which passed for play in a gear.
+#[test]
+fn a_speed_of_an_instant_is_no_play_in_a_gear() {
+    names_the_friction(&format!("{RIG}encoder_counts_per_rev = 12800\n"));
 }

@@ -23,11 +23,22 @@ pub struct Instant<'a, T> {
     pub last_row: &'a Sensed<T>,
     /// Time since then, s.
     pub row_s: f64,
+    /// Whether every control tick is logged.
+    pub every_tick: bool,
 }
 
 impl<T: Real> Instant<'_, T> {
-    /// Rate of change of a response, over the last row for a slow sensor, else over the step.
+    /// Rate of change of a response, over the last row for a slow sensor, else over the step; for a speed that is a bare
+    /// difference of counts, from its mean over the tick to its end. A rig that states the counts does not say whether
+    /// its drive shows that mean or the speed of an instant: half a tick earlier it is exactly that, steps of the command
+    /// included, across which the rate over a step would not tell. Where not every tick is logged it is the lesser part of
+    /// what is not known of the instant.
     pub fn rate(&self, response: Response, slow: bool) -> T {
+        if let (Response::ShaftSpeed, false, true, Some(rate)) =
+            (response, slow, self.every_tick, self.now.since_mean_rad_s2)
+        {
+            return rate;
+        }
         let (from, to, span) = if slow {
             (self.last_row, self.now, self.row_s)
         } else {
@@ -156,8 +167,14 @@ mod tests {
     fn a_late_sample_lies_behind_by_its_delay_times_the_rate() {
         let at = |speed| Sensed { shaft_speed_rad_s: speed, ..Sensed::default() };
         let (now, before, last_row) = (at(5.0), at(4.0), at(1.0));
-        let instant =
-            Instant { now: &now, step: (&before, &now), step_s: 0.002, last_row: &last_row, row_s: 0.01 };
+        let instant = Instant {
+            now: &now,
+            step: (&before, &now),
+            step_s: 0.002,
+            last_row: &last_row,
+            row_s: 0.01,
+            every_tick: true,
+        };
         let of = |slow| {
             let target = Target::Sampling { response: Response::ShaftSpeed, slow };
             let late = vec![Free { target, ..numbers()[0].clone() }];
@@ -166,5 +183,14 @@ mod tests {
         assert!((of(false) - 4.5_f64).abs() < 1e-12);
         assert!((of(true) - 4.6_f64).abs() < 1e-12);
         assert_eq!(Delays::<f64>::of(&[], &[]).sampled(Response::ShaftSpeed, &instant), 5.0);
+        // A bare difference of counts: half a tick on it is the speed at the tick's end, however it came there.
+        let now = Sensed { true_speed_rad_s: 5.3, since_mean_rad_s2: Some(300.0), ..now };
+        let free = vec![Free {
+            target: Target::Sampling { response: Response::ShaftSpeed, slow: false },
+            ..numbers()[0].clone()
+        }];
+        let shown =
+            Delays::of(&free, &[-0.001]).sampled(Response::ShaftSpeed, &Instant { now: &now, ..instant });
+        assert!((shown - now.true_speed_rad_s).abs() < 1e-12, "{shown}");
     }
 }

@@ -308,7 +308,17 @@ fn run<T: Real>(
     let mut last_row = before;
     let mut log = |row: usize, now: &Sensed<T>, step: (&Sensed<T>, &Sensed<T>), step_s: f64| {
         let row_s = if row == 0 { tick_s } else { time_s[row] - time_s[row - 1] };
-        show(row, &Instant { now, step, step_s, last_row: &last_row, row_s });
+        show(
+            row,
+            &Instant {
+                now,
+                step,
+                step_s,
+                last_row: &last_row,
+                row_s,
+                every_tick: recording.ticks_per_row == 1,
+            },
+        );
         last_row = *now;
     };
     // An instant on the grid shows the state before that tick's command acts.

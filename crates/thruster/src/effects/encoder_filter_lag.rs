@@ -81,5 +81,7 @@ impl<T: Real> Effect<T> for EncoderFilterLag<T> {
         let slow = self.slower * last + (T::ONE - self.slower) * raw;
         self.memory = Some((seen, slow));
         sensed.shaft_speed_rad_s = self.delay.step(slow);
+        // What comes out of a filter is no bare difference of counts.
+        sensed.since_mean_rad_s2 = None;
     }
 }

@@ -172,7 +172,15 @@ impl<T: Real> Plant<T> {
             true_speed_rad_s: self.at.shaft_speed_rad_s,
             true_thrust_n: self.true_thrust_n,
             supply_v: T::from(self.supply_v),
+            since_mean_rad_s2: self
+                .shows_a_bare_difference()
+                .then(|| (self.at.shaft_speed_rad_s - f.speed_rad_s) / (0.5 * self.tick_s)),
         }
+    }
+
+    /// Whether the shown speed is the encoder's angle differenced over a tick, with no filter behind.
+    fn shows_a_bare_difference(&self) -> bool {
+        self.decays.speed.is_none() && self.sensors.encoder_counts_per_rev.is_some()
     }
 }
 

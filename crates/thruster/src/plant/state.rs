@@ -215,6 +215,9 @@ pub struct Sensed<T = f64> {
     pub true_thrust_n: T,
     /// Supply, V.
     pub supply_v: T,
+    /// Where the shown speed is a bare difference of the encoder's angle over a tick, so the speed's mean over it: how fast
+    /// the speed itself left that mean since the middle of the tick, rad/s^2.
+    pub since_mean_rad_s2: Option<T>,
 }
 
 impl<T: Real> Sensed<T> {
@@ -231,6 +234,7 @@ impl<T: Real> Sensed<T> {
             true_speed_rad_s: mix(self.true_speed_rad_s, later.true_speed_rad_s),
             true_thrust_n: mix(self.true_thrust_n, later.true_thrust_n),
             supply_v: mix(self.supply_v, later.supply_v),
+            since_mean_rad_s2: self.since_mean_rad_s2.zip(later.since_mean_rad_s2).map(|(a, b)| mix(a, b)),
         }
     }
 }
@@ -260,6 +264,7 @@ at_rest! {
     }
     Sensed {
         current_a shaft_angle_rad shaft_speed_rad_s thrust_n torque_n_m flow_m_s true_speed_rad_s true_thrust_n
-        supply_v
+        supply_v,
+        since_mean_rad_s2
     }
 }
