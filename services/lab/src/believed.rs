@@ -6,6 +6,9 @@ use kort_thruster::rig::{FoundEffect, Quantity};
 /// Least probability with which a name belongs to the rig from now on.
 const BELIEVED: f64 = 0.7;
 
+/// What stands behind each value that is taken over into a rig description.
+pub const DIAGNOSED: &str = "found by kort diagnose";
+
 /// Findings that a rig can take over, with twice the standard error as tolerance.
 pub fn believed(report: &Report) -> Vec<FoundEffect<'_>> {
     let of = |p: &'_ ParameterReport| Quantity {

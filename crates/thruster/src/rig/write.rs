@@ -1,4 +1,5 @@
-//! Writes what was found into a rig description's text; comments, order and all else stay as they are.
+//! Writes what was found into a rig description's text; order, all else, and its comments stay as they are, but for the one
+//! behind a value that was replaced: it told where that one came from, and now tells who found the new one.
 
 use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value};
 
@@ -19,11 +20,12 @@ pub struct FoundEffect<'a> {
 
 impl Rig {
     /// The text of a rig description with these effects among its `[[effects]]`: one that stands there already
-    /// gets the new values, others are added at the end. Six digits are kept.
+    /// gets the new values, others are added at the end. Six digits are kept. `by` stands behind each value,
+    /// for example "found by kort diagnose".
     ///
     /// # Errors
     /// [`RigError`] if the text is no rig description, or what would be written is none.
-    pub fn with_effects_toml(text: &str, found: &[FoundEffect]) -> Result<String, RigError> {
+    pub fn with_effects_toml(text: &str, found: &[FoundEffect], by: &str) -> Result<String, RigError> {
         Self::from_toml(text)?;
         let mut document: DocumentMut = text.parse().map_err(|e: toml_edit::TomlError| RigError::Syntax {
             message: e.to_string().trim_end().into(),
@@ -45,10 +47,10 @@ impl Rig {
             let stands =
                 list.iter().position(|t| t.get("effect").and_then(Item::as_str) == Some(effect.effect));
             match stands.and_then(|k| list.get_mut(k)) {
-                Some(table) => fill(table, effect),
+                Some(table) => fill(table, effect, by),
                 None => {
                     let mut table = Table::new();
-                    fill(&mut table, effect);
+                    fill(&mut table, effect, by);
                     list.push(table);
                 }
             }
@@ -60,7 +62,7 @@ impl Rig {
 }
 
 /// Puts an effect's values into its table; those that stand there and are not among them go.
-fn fill(table: &mut Table, effect: &FoundEffect) {
+fn fill(table: &mut Table, effect: &FoundEffect, by: &str) {
     let keep = |key: &str| key == "effect" || effect.parameters.iter().any(|(name, _)| *name == key);
     let stale: Vec<String> = table.iter().map(|(k, _)| k.to_owned()).filter(|k| !keep(k)).collect();
     stale.iter().for_each(|key| {
@@ -77,10 +79,7 @@ fn fill(table: &mut Table, effect: &FoundEffect) {
                 Value::InlineTable(both)
             }
         };
-        // A comment behind the old value stays.
-        if let Some(old) = table.get(name).and_then(Item::as_value) {
-            *value.decor_mut() = old.decor().clone();
-        }
+        value.decor_mut().set_suffix(format!(" # {by}"));
         table.insert(name, Item::Value(value));
     }
 }

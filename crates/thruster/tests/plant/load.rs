@@ -174,17 +174,23 @@ fn what_was_found_is_written_and_read_back() {
             parameters: vec![("shaft_torque_bias_n_m", Quantity { value: -0.01, tol: Some(0.5) })],
         },
     ];
-    let written = Rig::with_effects_toml(&text, &found).unwrap();
-    assert!(written.starts_with("# the bench") && written.contains("# coast-down"), "{written}");
+    let written = Rig::with_effects_toml(&text, &found, "found by kort diagnose").unwrap();
+    assert!(
+        written.starts_with("# the bench") && written.contains("effect = \"coulomb_friction\""),
+        "{written}"
+    );
+    // Where a replaced value came from is said of it no more.
+    assert!(!written.contains("# coast-down"), "{written}");
+    assert_eq!(written.matches(" # found by kort diagnose\n").count(), 4, "{written}");
     assert_eq!(written.matches("[[effects]]").count(), 2, "{written}");
     let read = Rig::from_toml(&written).unwrap();
     assert_eq!(read.effects[0].parameters[0].1, Quantity { value: 0.0612346, tol: Some(0.03) });
     assert_eq!(read.effects[0].value("stribeck_speed_rad_s"), 1.5);
     assert_eq!(read.effects[1].values().collect::<Vec<_>>(), [-0.01, 0.0, 0.0, 0.0]);
     // Written again, it stays.
-    assert_eq!(Rig::with_effects_toml(&written, &found).unwrap(), written);
+    assert_eq!(Rig::with_effects_toml(&written, &found, "found by kort diagnose").unwrap(), written);
     let unknown = [FoundEffect { effect: "gremlins", parameters: Vec::new() }];
-    assert!(Rig::with_effects_toml(&text, &unknown).unwrap_err().to_string().contains("gremlins"));
+    assert!(Rig::with_effects_toml(&text, &unknown, "found").unwrap_err().to_string().contains("gremlins"));
 }
 
 /// Every effect of the catalogue that has lasting sizes can be stated, and does what it does when given.
@@ -197,7 +203,7 @@ fn every_lasting_effect_can_be_stated() {
         let specs = (effect.parameters)(&kort_thruster::effects::Scale::ANY);
         let parameters: Vec<_> = specs.iter().map(|s| (s.name, Quantity::exact(s.start))).collect();
         let found = [FoundEffect { effect: effect.id, parameters }];
-        let written = Rig::with_effects_toml(wet, &found).unwrap();
+        let written = Rig::with_effects_toml(wet, &found, "found").unwrap();
         let with = Rig::from_toml(&written).unwrap();
         let values: Vec<f64> = with.effects[0].values().collect();
         let given: [(&Descriptor, &[f64]); 1] = [(find(effect.id).unwrap(), &values)];

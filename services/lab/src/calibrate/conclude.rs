@@ -12,6 +12,9 @@ use kort_thruster::rig::{FoundEffect, Quantity, Rig};
 use crate::failure::Failure;
 use crate::fitted_rig::with_fitted;
 
+/// What stands behind each value in the rig description.
+const MEASURED: &str = "measured by kort calibrate";
+
 /// Estimates from a record.
 ///
 /// # Errors
@@ -34,7 +37,7 @@ pub fn estimated(
 /// The text is no rig description.
 pub fn rig_text(text: &str, estimate: &Estimate) -> Result<(String, Vec<String>), Failure> {
     let fit = &estimate.fit;
-    let (text, mut left_out) = with_fitted(text, &fit.parameters).map_err(Failure::failed)?;
+    let (text, mut left_out) = with_fitted(text, &fit.parameters, MEASURED).map_err(Failure::failed)?;
     let mut found = Vec::new();
     for effect in &fit.effects {
         let stands_out =
@@ -56,7 +59,7 @@ pub fn rig_text(text: &str, estimate: &Estimate) -> Result<(String, Vec<String>)
                 .collect(),
         });
     }
-    let text = Rig::with_effects_toml(&text, &found).map_err(Failure::failed)?;
+    let text = Rig::with_effects_toml(&text, &found, MEASURED).map_err(Failure::failed)?;
     Ok((text, left_out))
 }
 

@@ -7,7 +7,7 @@ use kort_diagnose::diagnose::{Diagnosis, Options, diagnose};
 use kort_diagnose::report::Report;
 use kort_thruster::rig::Rig;
 
-use crate::believed::believed;
+use crate::believed::{DIAGNOSED, believed};
 use crate::failure::{Failure, Outcome, print, print_json, write_text};
 use crate::input::{Input, Loaded};
 use crate::{progress, render};
@@ -59,7 +59,7 @@ pub fn diagnosis(input: &Input, loaded: &Loaded, told: &(dyn Fn(&str) + Sync)) -
 /// The text is no rig description (it was one when it was read).
 pub fn adopted(rig_text: &str, report: &Report) -> Result<(String, Vec<String>), Failure> {
     let found = believed(report);
-    let text = Rig::with_effects_toml(rig_text, &found).map_err(Failure::failed)?;
+    let text = Rig::with_effects_toml(rig_text, &found, DIAGNOSED).map_err(Failure::failed)?;
     Ok((text, found.iter().map(|f| f.effect.to_string()).collect()))
 }
 

@@ -7,7 +7,7 @@ use kort_diagnose::constants::Constants;
 use kort_identify::identify::{FitReport, Options, identify};
 
 use crate::failure::{Failure, Outcome, print, print_json, write_text};
-use crate::fitted_rig::with_fitted;
+use crate::fitted_rig::{FITTED, with_fitted};
 use crate::input::{Input, Loaded};
 use crate::{progress, render};
 
@@ -76,7 +76,7 @@ impl Fit {
         drop(spinner);
         if let Some(path) = &self.output {
             let (text, left_out) =
-                with_fitted(&loaded.rig_text, &report.parameters).map_err(Failure::failed)?;
+                with_fitted(&loaded.rig_text, &report.parameters, FITTED).map_err(Failure::failed)?;
             write_text(path, &text)?;
             for why in left_out {
                 eprintln!("note: {}: {why}", path.display());

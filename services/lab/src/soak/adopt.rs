@@ -18,7 +18,7 @@ use super::adoption::{Adoption, Found};
 use super::chain::ProductionChain;
 use super::load::{Contestant, Loaded, SoakError};
 use super::report::Report;
-use crate::believed::believed;
+use crate::believed::{DIAGNOSED, believed};
 
 /// An adoption that makes thrust error larger by more than this factor has failed.
 pub const WORSE: f64 = 1.05;
@@ -188,7 +188,8 @@ impl Case<'_> {
             .map_err(|e| SoakError::Diagnosis { scenario: scenario.name.clone(), message: e.to_string() })?;
         let found = believed(&diagnosis.report);
         // Through the same writer as a rig that is adopted by hand.
-        let text = Rig::with_effects_toml(&loaded.rig_text, &found).map_err(|e| self.unwritten(&e))?;
+        let text =
+            Rig::with_effects_toml(&loaded.rig_text, &found, DIAGNOSED).map_err(|e| self.unwritten(&e))?;
         let rig = Rig::from_toml(&text).map_err(|e| self.unwritten(&e))?;
         let sure =
             |id: &str| diagnosis.report.findings.iter().find(|f| f.effect == id).map(|f| f.probability);
