@@ -31,6 +31,7 @@ const OUTPUTS: usize = 16;
 const HEARTBEAT: u32 = 0;
 const SYS_STATUS: u32 = 1;
 const SERVO_OUTPUT_RAW: u32 = 36;
+const TIMESYNC: u32 = 111;
 const ESC_INFO: u32 = 290;
 const ESC_STATUS: u32 = 291;
 const ESC_TELEMETRY_1_TO_4: u32 = 11030;
@@ -247,6 +248,12 @@ impl ArduSub {
                 payload.resize(24, 0);
                 payload.push(4);
                 vec![self.say(22, &payload)]
+            }
+            // What is its clock, ns? The asker's own comes back with it.
+            TIMESYNC if said.payload.iter().take(8).all(|byte| *byte == 0) => {
+                let mut payload = (((now_s - self.booted_s) * 1e9) as i64).to_le_bytes().to_vec();
+                payload.extend((8..16).map(|at| said.u8(at)));
+                vec![self.say(TIMESYNC, &payload)]
             }
             76 if said.u8(30) == 1 => {
                 let command = said.u16(28);

@@ -2,7 +2,7 @@
 //! its last zeros, check sum over all but the start, seeded behind with a byte that stands for the message's fields.
 
 /// The seeds of the messages spoken here, as the generated headers of MAVLink print them (`…_CRC`).
-const SEEDS: [(u32, u8); 12] = [
+const SEEDS: [(u32, u8); 13] = [
     (0, 50),
     (1, 124),
     (20, 214),
@@ -10,6 +10,7 @@ const SEEDS: [(u32, u8); 12] = [
     (36, 222),
     (76, 152),
     (77, 143),
+    (111, 34),
     (148, 178),
     (253, 83),
     (290, 251),

@@ -124,8 +124,9 @@ impl Guard {
 
         // A shaft that shows no motion while the motor pulls.
         let pulls = drive.abs() > l.drive_max / 3.0;
-        let still_s = self.still.while_pulled(measured, pulls, l.frozen_s, dt);
-        trip(Fault::SensorFrozen, still_s > l.frozen_s);
+        let still_s = self.still.while_pulled(measured, pulls, l.frozen_s, l.speed_rad_s, dt);
+        // One that is told to turn, while its angle stands, is no shaft under any drive: old values, or a dead sensor.
+        trip(Fault::SensorFrozen, still_s > l.frozen_s || self.still.denied_s() > l.frozen_s);
         // A jump that is left out above says nothing of the direction either.
         let shown = if jump { f64::NAN } else { speed };
         let current = if self.current_told { self.held_current_a } else { f64::NAN };
@@ -261,7 +262,7 @@ pub(crate) mod tests {
     fn a_healthy_thruster_trips_nothing() {
         assert_eq!(after(|_, _| {}, 2000, 5.0), 0);
         // A shaft at rest without drive, and one bad sample of each kind, are no faults.
-        assert_eq!(after(|_, s| s.shaft_angle_rad = 1.0, 2000, 0.0), 0);
+        assert_eq!(after(|_, s| (s.shaft_angle_rad, s.shaft_speed_rad_s) = (1.0, 0.0), 2000, 0.0), 0);
         let once = |change: fn(&mut Signals)| {
             let change = move |i, s: &mut Signals| {
                 if i == 7 {
@@ -291,6 +292,7 @@ pub(crate) mod tests {
         };
         assert_eq!(after(blocked, 300, 5.0), Fault::SensorFrozen.bit());
         assert_eq!(after(blocked, 300, 2.0), 0, "against friction it may stand");
+        assert_eq!(after(|_, s| s.shaft_angle_rad = 1.0, 2000, 0.2), Fault::SensorFrozen.bit(), "old values");
         assert_eq!(after(|_, s| s.supply_v = 50.0, 20, 0.0), Fault::SupplyOutOfRange.bit());
         assert_eq!(after(|_, s| s.temperature_c = 150.0, 3, 0.0), Fault::OverTemperature.bit());
         assert_eq!(after(|_, s| s.current_a = 9.0, 5000, 5.0), Fault::ThermalOverload.bit());

@@ -3,7 +3,7 @@
 
 use std::collections::VecDeque;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use kort_emulators::{
@@ -165,6 +165,105 @@ fn late_answers_do_not_pile_up_and_are_told_by_their_age() {
         assert_eq!(readings, 40, "{kind}");
         let most = most.load(Ordering::Relaxed);
         assert!(most <= 2 * lines, "{kind}: {most} lines piled up");
+    }
+}
+
+/// A wire that holds up all that a drive says, one thing behind the other; more and more, if it is too narrow.
+struct Held<D> {
+    device: D,
+    /// Held up for so long, s, and so much more a second from when it says so.
+    for_s: f64,
+    grows: Arc<AtomicBool>,
+    grew_s: f64,
+    before_s: f64,
+    waiting: VecDeque<(f64, Vec<u8>)>,
+}
+
+impl<D: Device> Held<D> {
+    fn hold(&mut self, now_s: f64, said: Vec<Vec<u8>>) {
+        let at_s = now_s + self.for_s + self.grew_s;
+        self.waiting.extend(said.into_iter().map(|one| (at_s, one)));
+    }
+}
+
+impl<D: Device> Device for Held<D> {
+    fn hear(&mut self, now_s: f64, bytes: &[u8]) -> Vec<Vec<u8>> {
+        let said = self.device.hear(now_s, bytes);
+        self.hold(now_s, said);
+        Vec::new()
+    }
+    fn live(&mut self, now_s: f64) -> Vec<Vec<u8>> {
+        let passed_s = now_s - std::mem::replace(&mut self.before_s, now_s);
+        self.grew_s += if self.grows.load(Ordering::Relaxed) { 0.5 * passed_s } else { 0.0 };
+        let said = self.device.live(now_s);
+        self.hold(now_s, said);
+        let due = self.waiting.iter().take_while(|(at_s, _)| *at_s <= now_s).count();
+        self.waiting.drain(..due).map(|(_, one)| one).collect()
+    }
+    fn restart(&mut self, now_s: f64) {
+        self.device.restart(now_s);
+    }
+    fn report(&mut self, code: u32) {
+        self.device.report(code);
+    }
+    fn truth(&self) -> Truth {
+        self.device.truth()
+    }
+}
+
+/// Drives that go on talking whether they are understood or not: what comes later than the next exchange is as old as it is,
+/// and a wire that falls ever further behind ends in `drive_lost` once the readings' life is over.
+#[test]
+fn what_comes_late_from_a_drive_that_talks_on_is_told_by_its_age_too() {
+    const FOR: Duration = Duration::from_millis(23);
+    let life = Duration::from_millis(300);
+    fn bench<D: Device + 'static>(device: D, grows: &Arc<AtomicBool>) -> Bench {
+        let (for_s, grows) = (FOR.as_secs_f64(), Arc::clone(grows));
+        Bench::start(Held { device, for_s, grows, grew_s: 0.0, before_s: 0.0, waiting: VecDeque::new() })
+            .unwrap()
+    }
+    let vehicle = Rig::from_toml(include_str!("../../../config/thrusters/t200-vehicle.toml")).unwrap();
+    let signed = ardusub::Make { telemetry: ardusub::Telemetry::Signed, ..Default::default() };
+    for (kind, keys, rig) in [
+        ("cia402", "units_per_turn = 4096", &rig()),
+        ("mavlink", "motor = 3", &vehicle),
+        ("mavlink signed", "motor = 3", &vehicle),
+    ] {
+        let grows = Arc::new(AtomicBool::new(false));
+        let emulator = match kind {
+            "cia402" => bench(Adapter::new(Cia402::new(cia402::Make::default(), rig)), &grows),
+            "mavlink" => bench(ArduSub::new(ardusub::Make::default(), rig), &grows),
+            _ => bench(ArduSub::new(signed.clone(), rig), &grows),
+        };
+        let mut servo = Loop::new(kind.split(' ').next().unwrap(), keys, emulator, rig);
+        servo.until(&format!("{kind} to be ready"), |now, _| now == 0);
+        let (mut readings, mut ages) = (0, Vec::new());
+        let end = Instant::now() + PATIENCE;
+        while ages.len() < 100 && Instant::now() < end {
+            let now_ns = monotonic_ns();
+            let shown = servo.devices.show(At { now_ns, ticks: 1 });
+            servo.devices.drive(now_ns, None);
+            if shown.signals.shaft_speed_rad_s.is_finite() {
+                readings += 1;
+                // The first come before any answer has told what the clocks are apart.
+                ages.extend((readings > 50).then_some(Duration::from_nanos(shown.shaft_age_ns)));
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        ages.sort();
+        assert_eq!(ages.len(), 100, "{kind}");
+        assert!(
+            ages[0] >= FOR - Duration::from_millis(1),
+            "{kind}: {FOR:?} on the way, told as {:?}",
+            ages[0]
+        );
+        assert!(ages[50] < FOR * 3, "{kind}: {FOR:?} on the way, told as {:?}", ages[50]);
+        // Half a second a second: the life is over after 0.6 s of that.
+        grows.store(true, Ordering::Relaxed);
+        let began = Instant::now();
+        servo.until(&format!("{kind} to be lost"), |_, seen| seen & Fault::DriveLost.bit() != 0);
+        let within = life * 2 + Duration::from_millis(500);
+        assert!(began.elapsed() < within, "{kind}: {:?} until it was lost", began.elapsed());
     }
 }
 

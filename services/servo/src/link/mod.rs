@@ -12,6 +12,8 @@ mod lines;
 mod port;
 #[cfg(any(feature = "process", test))]
 mod questions;
+#[cfg(any(feature = "process", test))]
+mod stamps;
 #[cfg(feature = "process")]
 mod thread;
 #[cfg(feature = "process")]
@@ -81,6 +83,11 @@ pub enum Heard {
     Known(String),
     /// A whole answer with its measurements.
     Reading(Signals),
+    /// The same, with the device's clock at them, us; it may begin anywhere, and does not go back in a conversation.
+    ReadAt(Signals, u64),
+    /// The answer to a question that is no reading: what comes behind it was sent after that was asked. With the
+    /// device's clock then, us, if it tells one.
+    Marked(Option<u64>),
     /// What the device says of itself, with each reading: its fault in words, or none.
     Fault(Option<String>),
     /// The device was reset.
@@ -89,6 +96,20 @@ pub enum Heard {
     Guarded(String),
     /// It is not, and why.
     Unguarded(String),
+}
+
+/// What tells the age of a device's readings.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ages {
+    /// Each answers a question, and one is asked at a time.
+    Questions,
+    /// Each answers an exchange, and exchanges go on whether answered or not. The answer to a question among them, a mark,
+    /// parts what was sent before the mark from what was sent after it.
+    Exchanges,
+    /// Each carries the device's clock, and answers to questions tell how that one stands to ours.
+    Clock,
+    /// Nothing: the device speaks by itself, and is as late as its wire.
+    Unknown,
 }
 
 /// What is said on a wire. Pure: no clock, no port, no panic on any bytes.
@@ -103,12 +124,13 @@ pub trait Protocol: Send {
     /// What is to be said at once after what was just heard: the next step of a conversation in many.
     fn reply(&mut self, _out: &mut Vec<u8>) {}
 
-    /// One exchange: the command (`None`: output off) and, where `question` says so, the question for the measurements.
+    /// One exchange: the command (`None`: output off) and, where `question` says so, the question for the measurements, or
+    /// for the mark that tells their age.
     fn tell(&mut self, drive: Option<f64>, question: bool, out: &mut Vec<u8>);
 
-    /// Whether each of its readings answers a question; a device that speaks by itself is as late as its wire.
-    fn answers(&self) -> bool {
-        true
+    /// What tells the age of its readings.
+    fn ages(&self) -> Ages {
+        Ages::Questions
     }
 
     /// Takes bytes as they come, split and joined at will.

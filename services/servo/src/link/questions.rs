@@ -31,11 +31,6 @@ impl Questions {
         Self { life_ns, patience_ns: life_ns / LONGEST, asked_ns, answered_ns: 0 }
     }
 
-    /// A new conversation: nothing is due.
-    pub fn forget(&mut self) {
-        *self = Self::new(self.life_ns);
-    }
-
     /// May something be asked now?
     pub fn may_ask(&mut self, now_ns: u64) -> bool {
         let Some(newest_ns) = self.asked_ns.back().copied() else { return true };
@@ -128,7 +123,7 @@ mod tests {
         let mut questions = Questions::new(50 * MS);
         assert_eq!(questions.answered(MS), None);
         questions.ask(2 * MS);
-        questions.forget();
-        assert_eq!(questions.answered(3 * MS), None);
+        assert_eq!(questions.answered(3 * MS), Some(2 * MS));
+        assert_eq!(questions.answered(4 * MS), None);
     }
 }

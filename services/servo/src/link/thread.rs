@@ -13,7 +13,7 @@ use tracing::{info, warn};
 use triple_buffer::{Input, Output};
 
 use super::port::Port;
-use super::questions::Questions;
+use super::stamps::Stamps;
 use super::wire::{Command, Told, Wire};
 use super::{Heard, Protocol};
 
@@ -41,7 +41,7 @@ pub(super) struct Serving {
     driving: bool,
     /// When its time-out was confirmed, on CLOCK_MONOTONIC, ns.
     guarded_ns: u64,
-    questions: Questions,
+    stamps: Stamps,
 }
 
 impl Serving {
@@ -53,7 +53,7 @@ impl Serving {
         waker: Arc<OwnedFd>,
         ending: Arc<AtomicBool>,
     ) -> Self {
-        let questions = Questions::new(wire.reading_life_ns);
+        let stamps = Stamps::new(protocol.ages(), wire.reading_life_ns);
         Self {
             wire,
             protocol,
@@ -67,7 +67,7 @@ impl Serving {
             answered: false,
             driving: false,
             guarded_ns: 0,
-            questions,
+            stamps,
         }
     }
 
@@ -159,11 +159,7 @@ impl Serving {
                     next = (next + period).max(now);
                     self.driving = command.drive.is_some();
                     // Late answers would pile up, and old ones pass for new, if it were asked on.
-                    let now_ns = monotonic_ns();
-                    let question = !self.protocol.answers() || self.questions.may_ask(now_ns);
-                    if question && self.protocol.answers() {
-                        self.questions.ask(now_ns);
-                    }
+                    let question = self.stamps.exchange(monotonic_ns());
                     self.protocol.tell(command.drive, question, &mut out);
                 }
             }
@@ -174,7 +170,7 @@ impl Serving {
     /// A new conversation: what was known of the device is known no more, its fault neither.
     fn begin(&mut self) {
         self.protocol.begin();
-        self.questions.forget();
+        self.stamps.forget(self.wire.reading_life_ns);
         self.answered = false;
         self.fault = None;
         self.told.guarded = false;
@@ -208,24 +204,19 @@ impl Serving {
     }
 
     fn converse(&mut self, talk: impl FnOnce(&mut dyn Protocol, &mut dyn FnMut(Heard))) {
-        let Self { protocol, wire, told, answered, complaint, fault, guarded_ns, questions, .. } = self;
+        let Self { protocol, wire, told, answered, complaint, fault, guarded_ns, stamps, .. } = self;
         let mut restarted = false;
-        let answers = protocol.answers();
         talk(protocol.as_mut(), &mut |heard| match heard {
             Heard::Known(words) => {
                 info!("{}: {}", wire.name, printable(&words));
                 *answered = true;
             }
-            Heard::Reading(signals) => {
-                let now_ns = monotonic_ns();
-                // One that nobody asked for is an answer of before.
-                let stamp_ns = if answers { questions.answered(now_ns) } else { Some(now_ns) };
-                if let Some(stamp_ns) = stamp_ns {
-                    told.readings = told.readings.wrapping_add(1);
-                    told.stamp_ns = stamp_ns;
-                    told.signals = signals;
-                }
+            // One that nobody asked for is an answer of before.
+            Heard::Reading(signals) => told.take(signals, stamps.reading(monotonic_ns(), None)),
+            Heard::ReadAt(signals, clock_us) => {
+                told.take(signals, stamps.reading(monotonic_ns(), Some(clock_us)));
             }
+            Heard::Marked(clock_us) => stamps.marked(monotonic_ns(), clock_us),
             Heard::Fault(reported) => {
                 if let Some(words) = reported.as_ref().filter(|_| *fault != reported) {
                     warn!("{}: {}", wire.name, printable(words));

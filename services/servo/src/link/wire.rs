@@ -57,6 +57,14 @@ pub(super) struct Told {
 impl Told {
     pub(super) const NOTHING: Self =
         Self { readings: 0, stamp_ns: 0, signals: Signals::UNKNOWN, faults: 0, restarts: 0, guarded: false };
+
+    /// Takes a reading, if it is known when it was taken.
+    pub(super) fn take(&mut self, signals: Signals, stamp_ns: Option<u64>) {
+        if let Some(stamp_ns) = stamp_ns {
+            self.readings = self.readings.wrapping_add(1);
+            (self.stamp_ns, self.signals) = (stamp_ns, signals);
+        }
+    }
 }
 
 /// The tick's end of a wire.

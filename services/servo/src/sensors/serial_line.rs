@@ -10,7 +10,7 @@ use kort_proto::signals::{SIGNALS, Signals};
 use regex::Regex;
 
 use super::Channel;
-use crate::link::{Heard, Lines, Protocol};
+use crate::link::{Ages, Heard, Lines, Protocol};
 
 /// Lines without a reading before the reason is said: the first one after opening is often torn.
 const BAD_LINES: u32 = 3;
@@ -86,8 +86,8 @@ impl Protocol for Listening {
         out.extend(self.instrument.ask.as_bytes());
     }
 
-    fn answers(&self) -> bool {
-        false
+    fn ages(&self) -> Ages {
+        Ages::Unknown
     }
 
     fn hear(&mut self, bytes: &[u8], heard: &mut dyn FnMut(Heard)) {

@@ -11,7 +11,7 @@ use super::setup::{Learned, Step, steps};
 use super::state::{State, meaning};
 use super::told::Told;
 use crate::link::can::{Carrier, Frame, Frames};
-use crate::link::{self, Heard};
+use crate::link::{self, Ages, Heard};
 
 // Identifiers of CANopen; the drive's own carry its node.
 const NMT: u16 = 0x000;
@@ -36,11 +36,12 @@ const ASKED_IN_VAIN: u32 = 10;
 const REFUSED_FOR: u32 = 20;
 /// Time that the drive may take to `operation enabled`, s.
 const ENTERING_S: f64 = 2.0;
-/// Exchanges between two SDO questions while it is driven, and between the edges of a fault reset.
-const POLL_EVERY: u32 = 4;
+/// Exchanges between the edges of a fault reset.
 const EDGE_EVERY: u32 = 32;
-/// Asked in turn while it is driven: the watchdog as it was confirmed, and the supply, mV.
+/// Asked in turn while it is driven: the watchdog as it was confirmed, and the supply, mV. Their answers are the marks.
 const POLLS: [(u16, u8, u8); 3] = [(0x1016, 1, 4), (0x6007, 0, 2), (0x6079, 0, 4)];
+/// What may have changed a setting.
+const DISTURBED: &str = "a reset, or another master?";
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Stage {
@@ -68,6 +69,7 @@ pub struct Protocol {
     told: Told,
     supply_v: f64,
     exchanges: u32,
+    polls: usize,
     exchanges_on: u32,
     /// It was in operation since the output was switched on.
     entered: bool,
@@ -88,6 +90,7 @@ impl Protocol {
             told: Told::default(),
             supply_v: f64::NAN,
             exchanges: 0,
+            polls: 0,
             exchanges_on: 0,
             entered: false,
             on: false,
@@ -183,22 +186,19 @@ impl Protocol {
 
     /// The answer to one of [`POLLS`].
     fn polled(&mut self, index: u16, sub: u8, said: Answer, heard: &mut dyn FnMut(Heard)) {
+        if POLLS.iter().any(|poll| (poll.0, poll.1) == (index, sub)) {
+            // A half that came before it belongs to none that comes after it.
+            self.told.forget();
+            heard(Heard::Marked(None));
+        }
         match ((index, sub), said) {
             ((0x1016, 1), Answer::Value(value)) if value != self.learned.heartbeat => {
-                self.unguard(
-                    format!(
-                        "its consumer heartbeat time became {value:#x}\nhint: a reset, or another master?"
-                    ),
-                    heard,
-                );
+                let words = format!("its consumer heartbeat time became {value:#x}\nhint: {DISTURBED}");
+                self.unguard(words, heard);
             }
             ((0x6007, 0), Answer::Value(value)) if value != self.learned.option => {
-                self.unguard(
-                    format!(
-                        "its abort connection option code became {value}\nhint: a reset, or another master?"
-                    ),
-                    heard,
-                );
+                let words = format!("its abort connection option code became {value}\nhint: {DISTURBED}");
+                self.unguard(words, heard);
             }
             ((0x6079, 0), Answer::Value(value)) => self.supply_v = f64::from(value) * 1e-3,
             _ => (),
@@ -355,8 +355,13 @@ impl link::Protocol for Protocol {
         }
     }
 
-    // The command acts at the SYNC, which is the question too: it is never left out.
-    fn tell(&mut self, drive: Option<f64>, _: bool, out: &mut Vec<u8>) {
+    // The command acts at the SYNC, which asks for the reading too and is never left out. Nothing in an answer tells its SYNC:
+    // both answers and that to a poll go the same way, one behind the other, and a poll's is its own.
+    fn ages(&self) -> Ages {
+        Ages::Exchanges
+    }
+
+    fn tell(&mut self, drive: Option<f64>, question: bool, out: &mut Vec<u8>) {
         // Four heartbeats in the time-out, and only with a command: a servo that stands still feeds nothing.
         let every = (self.drive.wired.timeout_s * self.drive.wired.rate_hz / 4.0) as u32;
         if self.exchanges.is_multiple_of(every.max(1)) {
@@ -376,9 +381,9 @@ impl link::Protocol for Protocol {
             }
         }
         self.send(SYNC, &[], out);
-        if self.stage == Stage::Guarded && self.exchanges.is_multiple_of(POLL_EVERY) {
-            let turn = (self.exchanges / POLL_EVERY) as usize % POLLS.len();
-            if let Some((index, sub, bytes)) = POLLS.get(turn) {
+        if self.stage == Stage::Guarded && question {
+            self.polls = (self.polls + 1) % POLLS.len();
+            if let Some((index, sub, bytes)) = POLLS.get(self.polls) {
                 self.to_drive(SDO_QUESTION, &request(*index, *sub, Job::Read(*bytes)), out);
             }
         }

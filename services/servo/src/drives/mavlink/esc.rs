@@ -27,6 +27,8 @@ pub struct Reading {
     pub supply_v: f64,
     /// Temperature of the ESC, deg C.
     pub temperature_c: f64,
+    /// The vehicle's clock then at the latest that is sure, us.
+    pub clock_us: u64,
 }
 
 /// The ESC of one output.
@@ -42,12 +44,23 @@ pub struct Esc {
     way: f64,
     rpm: f64,
     fresh: Option<Reading>,
+    /// The vehicle's clock when it was told last, us.
+    clock_us: u64,
 }
 
 impl Esc {
     /// Nothing heard yet.
     pub fn new(place: usize) -> Self {
-        Self { place, count: None, stamp: None, temperature_c: f64::NAN, way: 1.0, rpm: 0.0, fresh: None }
+        Self {
+            place,
+            count: None,
+            stamp: None,
+            temperature_c: f64::NAN,
+            way: 1.0,
+            rpm: 0.0,
+            fresh: None,
+            clock_us: 0,
+        }
     }
 
     /// The messages in which it stands.
@@ -64,8 +77,10 @@ impl Esc {
         self.fresh.take()
     }
 
-    /// Takes a message, under the share of the supply that the output gives, -1 to 1. Others are passed over.
-    pub fn hear(&mut self, id: u32, payload: &[u8], share: f64) {
+    /// Takes a message, under the share of the supply that the output gives, -1 to 1, and behind the vehicle's clock as it
+    /// was told last: it was sent after that. Others are passed over.
+    pub fn hear(&mut self, id: u32, payload: &[u8], share: f64, clock_us: u64) {
+        self.clock_us = clock_us;
         let column = self.place % IN_ONE;
         let first = self.place - column;
         match id {
@@ -117,8 +132,8 @@ impl Esc {
     fn tell(&mut self, shaft_speed_rad_s: f64, supply_v: f64, supply_a: f64, share: f64) {
         let current_a =
             if share == 0.0 { 0.0 } else { supply_a / share.abs().max(SHARE_MIN) * share.signum() };
-        let temperature_c = self.temperature_c;
-        self.fresh = Some(Reading { shaft_speed_rad_s, current_a, supply_v, temperature_c });
+        let (temperature_c, clock_us) = (self.temperature_c, self.clock_us);
+        self.fresh = Some(Reading { shaft_speed_rad_s, current_a, supply_v, temperature_c, clock_us });
     }
 
     /// A speed that was told without sign, with the one it has: after the output has changed sides the shaft first slows down the
@@ -158,7 +173,7 @@ mod tests {
     fn the_sign_turns_with_the_shaft_and_not_with_the_command() {
         let mut esc = Esc::new(6);
         let mut told = |count, rpm, share| {
-            esc.hear(11031, &said(count, rpm, 200), share);
+            esc.hear(11031, &said(count, rpm, 200), share, 0);
             esc.take().map(|r| ((r.shaft_speed_rad_s * 60.0 / TAU).round(), r.current_a))
         };
         assert_eq!(told(1, 1000, 0.5), Some((1000.0, 4.0)));
@@ -169,7 +184,7 @@ mod tests {
         assert_eq!(told(5, 900, 0.0), Some((-900.0, 0.0)), "coasting");
         assert_eq!(told(6, 50, 0.5), Some((50.0, 4.0)), "as good as standing");
         let mut other = Esc::new(6);
-        other.hear(11030, &said(1, 1000, 200), 0.5);
+        other.hear(11030, &said(1, 1000, 200), 0.5, 0);
         assert_eq!(other.take(), None, "another four");
     }
 
@@ -185,11 +200,11 @@ mod tests {
         let mut bytes = vec![0; 255];
         all.ser(MavlinkVersion::V2, &mut bytes);
         let mut esc = Esc::new(5);
-        esc.hear(ESC_STATUS_DATA::ID, &bytes, 0.5);
+        esc.hear(ESC_STATUS_DATA::ID, &bytes, 0.5, 7);
         let told = esc.take().unwrap();
         assert!((told.shaft_speed_rad_s + 10.0 * TAU).abs() < 1e-9 && told.current_a == 3.0, "{told:?}");
-        assert_eq!(told.supply_v, 15.5);
-        esc.hear(ESC_STATUS_DATA::ID, &bytes, 0.5);
+        assert_eq!((told.supply_v, told.clock_us), (15.5, 7));
+        esc.hear(ESC_STATUS_DATA::ID, &bytes, 0.5, 7);
         assert_eq!(esc.take(), None, "an old one");
     }
 
@@ -204,7 +219,7 @@ mod tests {
         ) {
             let mut esc = Esc::new(place);
             for payload in payloads {
-                esc.hear(id, &payload, share);
+                esc.hear(id, &payload, share, 0);
                 if let Some(told) = esc.take().filter(|_| id != ESC_STATUS_DATA::ID) {
                     prop_assert!(told.shaft_speed_rad_s.is_finite() && told.current_a.is_finite());
                 }

@@ -74,6 +74,11 @@ impl Mouth {
         self.say(&ours, out);
     }
 
+    /// What is its clock? The answer holds `known_by`.
+    pub fn time(&mut self, known_by: i64, out: &mut Vec<u8>) {
+        self.say(&msg::TIMESYNC_DATA { tc1: 0, ts1: known_by, ..Default::default() }, out);
+    }
+
     /// A parameter, please.
     pub fn parameter(&mut self, name: &str, out: &mut Vec<u8>) {
         let wanted = msg::PARAM_REQUEST_READ_DATA {

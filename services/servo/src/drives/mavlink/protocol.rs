@@ -10,7 +10,7 @@ use super::esc::Esc;
 use super::frame::Deframer;
 use super::mouth::{AUTOPILOT, FORCE, Mouth, OURS};
 use super::vehicle::{Clock, Hold, SPAN_US, Vehicle, ZERO_US};
-use crate::link::{self, Heard};
+use crate::link::{self, Ages, Heard};
 
 /// Versions of ArduSub whose source was read, major and minor.
 const FIRMWARE: std::ops::RangeInclusive<(u32, u32)> = (4, 0)..=(4, 8);
@@ -19,6 +19,8 @@ const ASKED_IN_VAIN: u32 = 30;
 /// Exchanges, or questions, to the next heartbeat of kort's, and to the next wish for what was not answered.
 const HEARTBEAT_EVERY: u32 = 10;
 const AGAIN: u32 = 20;
+/// What kort's questions for the vehicle's clock are known by in its answers.
+const ASKED: i64 = 0x6b6f_7274;
 /// The vehicle's messages of its supply, and its heartbeat, which tells mode and arming, a second.
 const STATE_HZ: f64 = 10.0;
 
@@ -116,7 +118,18 @@ impl Protocol {
                 }
             }
             msg::SERVO_OUTPUT_RAW_DATA::ID => read(raw).into_iter().for_each(|m| self.outputs(&m, heard)),
-            id => self.esc.hear(id, raw.payload(), self.vehicle.share(self.output)),
+            msg::TIMESYNC_DATA::ID => {
+                // Its own question, and its answer to another program, are none to kort.
+                let answer = read::<msg::TIMESYNC_DATA>(raw).filter(|m| m.tc1 > 0 && m.ts1 == ASKED);
+                let clock_us = answer.and_then(|m| u64::try_from(m.tc1).ok()).map(|ns| ns / 1000);
+                if let Some(clock_us) = clock_us.and_then(|us| self.vehicle.clock_at(us)) {
+                    heard(Heard::Marked(Some(clock_us)));
+                }
+            }
+            id => {
+                let share = self.vehicle.share(self.output);
+                self.esc.hear(id, raw.payload(), share, self.vehicle.clock_us());
+            }
         }
     }
 
@@ -245,7 +258,8 @@ impl Protocol {
             (self.supply_v, self.supply_told) = (told.supply_v, true);
         }
         let supply_v = if std::mem::take(&mut self.supply_told) { self.supply_v } else { f64::NAN };
-        heard(Heard::Reading(match told {
+        let clock_us = told.map_or(self.vehicle.clock_us(), |told| told.clock_us);
+        let signals = match told {
             Some(told) => Signals {
                 current_a: sign * told.current_a,
                 shaft_speed_rad_s: sign * told.shaft_speed_rad_s,
@@ -254,7 +268,8 @@ impl Protocol {
                 ..Signals::UNKNOWN
             },
             None => Signals { supply_v, ..Signals::UNKNOWN },
-        }));
+        };
+        heard(Heard::ReadAt(signals, clock_us));
     }
 
     /// What is asked for again and again until it comes.
@@ -331,11 +346,14 @@ impl link::Protocol for Protocol {
         self.question(out);
     }
 
-    fn answers(&self) -> bool {
-        false
+    fn ages(&self) -> Ages {
+        Ages::Clock
     }
 
-    fn tell(&mut self, drive: Option<f64>, _: bool, out: &mut Vec<u8>) {
+    fn tell(&mut self, drive: Option<f64>, question: bool, out: &mut Vec<u8>) {
+        if question {
+            self.mouth.time(ASKED, out);
+        }
         self.vehicle.want(drive.is_some());
         self.exchanges = self.exchanges.wrapping_add(1);
         if self.exchanges.is_multiple_of(HEARTBEAT_EVERY) {

@@ -13,6 +13,8 @@ pub const OUTPUTS: usize = 16;
 const FUNCTIONS: [(u32, u32); 2] = [(1, 33), (9, 82)];
 /// The end of a motor test by its time-out, and the vehicle's cool-down after it, us.
 const COOLING_US: u64 = 500_000 + 10_000_000 + 100_000;
+/// Its clock tells itself many times within this, us.
+const NEAR_US: u32 = 5_000_000;
 /// An output may differ from what was sent for so many messages: what is on its way.
 const LATE: u32 = 25;
 
@@ -84,6 +86,18 @@ impl Vehicle {
     pub fn unknown(&self) -> impl Iterator<Item = usize> {
         let unknown = |(i, motor): (usize, &Option<u32>)| motor.is_none().then_some(i + 1);
         self.motors.iter().enumerate().filter_map(unknown)
+    }
+
+    /// Its clock as told last, us since its first word.
+    pub fn clock_us(&self) -> u64 {
+        self.clock_us
+    }
+
+    /// The same for an instant near it, of its clock since its start, us; none if that is another clock.
+    pub fn clock_at(&self, since_start_us: u64) -> Option<u64> {
+        let from_told = (since_start_us as u32).wrapping_sub(self.told_us?) as i32;
+        let near = from_told.unsigned_abs() <= NEAR_US;
+        near.then(|| self.clock_us.saturating_add_signed(from_told.into()))
     }
 
     /// Place of a motor's output, from zero.
