@@ -89,6 +89,26 @@ fn the_same_seed_gives_the_same_bytes_and_formats_agree() {
     }
 }
 
+/// The layout for Foxglove that is shipped for the service's recordings plots a simulation too.
+#[test]
+fn a_simulation_has_the_channel_of_a_services_recording() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_string();
+    good(&simulate(RIG, "torque-step-9.2", Path::new(&path("run.mcap")), &[]));
+    good(&simulate(RIG, "torque-step-9.2", Path::new(&path("run.csv")), &[]));
+    good(&kort(&["convert", &path("run.csv"), "-o", &path("converted.mcap")]));
+    let layout = std::fs::read_to_string("docs/foxglove/kort.json").unwrap();
+    for name in ["run.mcap", "converted.mcap"] {
+        let found = kort_recording::survey(name, std::fs::File::open(path(name)).unwrap()).unwrap();
+        let topics: Vec<&str> = found.topics.iter().map(|topic| topic.name.as_str()).collect();
+        assert_eq!(topics, ["t1"], "{name}");
+        let signals = ["current_cmd_a", "current_a", "shaft_speed_rad_s", "thrust_n", "flow_m_s"];
+        for signal in signals {
+            assert!(layout.contains(&format!("\"/t1.{signal}\"")), "{signal}");
+        }
+    }
+}
+
 #[test]
 fn json_is_one_document_on_stdout() {
     let folder = tempfile::tempdir().unwrap();

@@ -6,7 +6,7 @@ use std::io::BufWriter;
 use std::path::PathBuf;
 
 use kort_lab::Failure;
-use kort_recording::{Column, ColumnMap, Format, Recording, RecordingError, Writer};
+use kort_recording::{Column, ColumnMap, Format, Recording, RecordingError};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -133,19 +133,7 @@ pub fn decode<'py>(
 pub fn write(py: Python<'_>, path: PathBuf, recording: Given<'_>) -> PyResult<()> {
     let format = Format::of(&path).map_err(unreadable)?;
     let recording = recording.take()?;
-    let names: Vec<&str> = recording.columns.iter().map(|c| c.name.as_str()).collect();
-    let go = || -> std::io::Result<()> {
-        let output = BufWriter::new(File::create(&path)?);
-        let mut writer = Writer::create(format, &recording.name, &names, output)?;
-        let mut row = vec![0.0; names.len()];
-        for (i, time_s) in recording.time_s.iter().enumerate() {
-            for (cell, column) in row.iter_mut().zip(&recording.columns) {
-                *cell = column.values[i];
-            }
-            writer.row(*time_s, &row)?;
-        }
-        writer.finish().map(drop)
-    };
+    let go = || recording.write(format, BufWriter::new(File::create(&path)?));
     py.detach(go).map_err(|e| error(Failure::unwritten(&path, e)))
 }
 

@@ -141,6 +141,10 @@ fn unreadable(error: io::Error) -> Problem {
     Problem::Unreadable { message: error.to_string() }
 }
 
+/// MCAP channel of a recording that says of no thruster that it is its own: that of the first one of a service, so that
+/// what is drawn of a service's recordings is drawn of it too.
+pub const TOPIC: &str = "t1";
+
 /// A format to write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
@@ -250,7 +254,8 @@ impl Recording {
     /// The output cannot be written.
     pub fn write(&self, format: Format, output: impl Write + Seek + Send) -> io::Result<()> {
         let names: Vec<&str> = self.columns.iter().map(|c| c.name.as_str()).collect();
-        let mut writer = Writer::create(format, "kort", &names, output)?;
+        let topic = self.about.get("thruster").map_or(TOPIC, String::as_str);
+        let mut writer = Writer::create(format, topic, &names, output)?;
         let mut row = vec![f64::NAN; names.len()];
         for (i, time_s) in self.time_s.iter().enumerate() {
             for (cell, column) in row.iter_mut().zip(&self.columns) {

@@ -5,9 +5,8 @@ use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
 use clap::Args as ClapArgs;
-use kort_recording::{Column, Format, Recording, Writer};
+use kort_recording::{Column, Format, Recording, TOPIC, Writer};
 use kort_scenario::{Replayed, Replays, Run, Scenario};
-use kort_thruster::rig::Rig;
 use serde::Serialize;
 
 use crate::failure::{Failure, Outcome, print, print_json};
@@ -67,7 +66,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let mut files = Files { beside: args.scenario.parent().map(Path::to_path_buf), lost: false };
     let mut run = Run::new(&scenario, &rig, &mut files).map_err(|e| Failure::in_file(&args.scenario, e))?;
     let columns = run.columns().to_vec();
-    let duration_s = write(&mut run, format, &args.output, &rig)?;
+    let duration_s = write(&mut run, format, &args.output)?;
     let report = Report {
         schema: "kort.simulate/1",
         kort_version: env!("CARGO_PKG_VERSION"),
@@ -125,11 +124,11 @@ pub fn recording(
 }
 
 /// Writes the rows; nothing half-written stays behind when that fails.
-fn write(run: &mut Run, format: Format, path: &Path, rig: &Rig) -> Result<f64, Failure> {
+fn write(run: &mut Run, format: Format, path: &Path) -> Result<f64, Failure> {
     let bar = progress::bar(run.rows(), "simulating");
     let mut go = || -> std::io::Result<f64> {
         let output = BufWriter::new(File::create(path)?);
-        let mut writer = Writer::create(format, &rig.name, run.columns(), output)?;
+        let mut writer = Writer::create(format, TOPIC, run.columns(), output)?;
         let (mut values, mut last_s) = (Vec::new(), 0.0);
         while let Some(time_s) = run.next_row(&mut values) {
             writer.row(time_s, &values)?;

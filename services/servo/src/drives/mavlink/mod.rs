@@ -28,6 +28,10 @@
 //! so its heartbeat does not stand in for a lost ground station's. While the motor test holds the motors no fail-safe can
 //! move them: **a vehicle that is driven so does not come up by itself**.
 //!
+//! Age: a reading is told by the vehicle's own clock, which stands in `SERVO_OUTPUT_RAW`, and `TIMESYNC` tells how that one stands to
+//! ours (`GCS_Common.cpp`: answered with the time since start at which the question came). Telemetry of an ESC carries no
+//! clock, or that of its sending: it is as old as the outputs told before it; how long the autopilot had it is not known.
+//!
 //! Unplugged: `drive_lost`, and its time-out. By UDP a cable's end shows only by silence (`reading_life_ms`). A reset
 //! shows by its clock, which stands in every message of the outputs.
 
