@@ -154,7 +154,7 @@ fn recordings_that_no_model_can_be_compared_with() {
         (keep("no-response.csv", &["time_s", "current_cmd_a"]), &["no measured response", "thrust_n"]),
         (few.save("few.csv"), &["10 rows"]),
         (path("missing.csv"), &["missing.csv"]),
-        (lab::folder().display().to_string(), &["folder"]),
+        (empty_folder(), &["folder"]),
     ];
     for (file, words) in &cases {
         refused(file, file, STAND, &[], words);
@@ -165,6 +165,52 @@ fn recordings_that_no_model_can_be_compared_with() {
     refused("all columns constant", &flat, STAND, &[], &["flat.csv", "no driving column"]);
     refused("unknown map", clean(), STAND, &["--columns", "rosa"], &["rosa-rotor-air"]);
     refused("map without unit", clean(), STAND, &["--columns", &map_without_unit()], &["unit is missing"]);
+}
+
+fn empty_folder() -> String {
+    let folder = path("empty-folder");
+    std::fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
+/// A logger that begins a file at each reset: what holds too little is named, the rest is read, and the exit code says so.
+#[test]
+fn a_folder_of_a_logger_that_was_reset() {
+    let folder = path("resets");
+    std::fs::create_dir_all(&folder).unwrap();
+    let whole = std::fs::read_to_string(clean()).unwrap();
+    let first = |lines: usize| whole.lines().take(lines).map(|line| format!("{line}\n")).collect::<String>();
+    let files = [
+        ("1.csv", first(1)),
+        ("2.csv", whole.clone()),
+        ("3.csv", first(2)),
+        ("4.csv", String::new()),
+        ("5.csv", "time_".into()),
+    ];
+    for (name, text) in &files {
+        std::fs::write(format!("{folder}/{name}"), text).unwrap();
+    }
+    std::fs::write(format!("{folder}/notes.txt"), "pool, 3 m").unwrap();
+    let one = |name: &str| format!("{folder}/{name}");
+    let named = [one("1.csv"), one("2.csv"), one("3.csv"), one("4.csv")];
+    let named: Vec<&str> = named.iter().map(String::as_str).collect();
+    for (given, skipped) in [
+        (&[folder.as_str()][..], &["1.csv", "3.csv", "4.csv", "5.csv"][..]),
+        (&named, &["1.csv", "3.csv", "4.csv"]),
+    ] {
+        let out = kort(&[&["fit"], given, &["--rig", STAND, "--json", "--starts", "1"]].concat());
+        let said = stderr(&out);
+        assert_eq!(out.status.code(), Some(3), "{said}");
+        let report: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+        for name in skipped {
+            let words = report["notes"].as_array().unwrap().iter().filter_map(|note| note.as_str());
+            let mut told = words.filter(|note| note.contains(&one(name)) && note.contains("passed over"));
+            assert!(told.next().is_some() && said.contains(&one(name)), "{name}: {said} {}", report["notes"]);
+        }
+        assert!(!said.contains("notes.txt"), "{said}");
+    }
+    std::fs::remove_file(one("2.csv")).unwrap();
+    refused("none to be read", &folder, STAND, &[], &["none of 4 files", "1.csv", "tail -qn +2"]);
 }
 
 fn map_without_unit() -> String {

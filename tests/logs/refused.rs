@@ -25,7 +25,7 @@ fn what_cannot_be_read_says_what_can() {
 
     let folder = lab::path("bag-folder");
     std::fs::create_dir_all(&folder).unwrap();
-    refused(&["columns", &folder], &["is a folder", "no .db3 or .mcap"]);
+    refused(&["columns", &folder], &["is a folder", "no file in this folder"]);
     for part in ["run_1.db3", "run_0.db3", "metadata.yaml"] {
         std::fs::write(format!("{folder}/{part}"), "").unwrap();
     }

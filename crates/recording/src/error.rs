@@ -18,6 +18,11 @@ impl RecordingError {
     pub(crate) fn new(file: &str, problem: Problem) -> Self {
         Self { file: file.into(), problem }
     }
+
+    /// There is nothing in it to be read, as after a logger that was stopped at once.
+    pub fn has_no_rows(&self) -> bool {
+        matches!(self.problem, Problem::Empty | Problem::TooFewRows { .. })
+    }
 }
 
 /// Where in a file.
@@ -245,8 +250,8 @@ impl Problem {
     pub fn hint(&self) -> String {
         match self {
             Problem::Unreadable { .. } => "check the path and that the file may be read".into(),
-            Problem::Folder { inside: Some(log) } => format!("name {log}; the files of a bag in several parts are read one by one"),
-            Problem::Folder { inside: None } => "name the log itself; no .db3 or .mcap is in this folder".into(),
+            Problem::Folder { inside: Some(log) } => format!("name {log}; the files of a bag in several parts are read one by one, and all recordings of a folder at once by `fit` and `diagnose` only"),
+            Problem::Folder { inside: None } => "name the log itself; no file in this folder is called like a recording or a log (.csv, .mcap, .ulg, .bin, .db3, .bfl, .bbl, .log; plain or .gz)".into(),
             Problem::Packed { hint, .. } => (*hint).into(),
             Problem::UnknownFormat { .. } => "name the file REC.csv, REC.csv.gz or REC.mcap".into(),
             Problem::Empty => "was the logger stopped before its first row?".into(),

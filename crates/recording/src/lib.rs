@@ -20,4 +20,4 @@ pub use error::{Place, Problem, RecordingError};
 pub use formats::{Format, LiveMcap, TOPIC, Writer, message_schema};
 pub use log::{Survey, survey};
 pub use map::{ColumnMap, MapError};
-pub use recording::{Column, Gap, Recording};
+pub use recording::{Column, Gap, Recording, logs_in};

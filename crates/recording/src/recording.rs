@@ -80,7 +80,9 @@ impl Recording {
         let fail = |problem| RecordingError::new(&path.display().to_string(), problem);
         let file = File::open(path).map_err(|e| fail(Problem::Unreadable { message: e.to_string() }))?;
         match file.metadata() {
-            Ok(about) if about.is_dir() => Err(fail(Problem::Folder { inside: log_in(path) })),
+            Ok(about) if about.is_dir() => Err(fail(Problem::Folder {
+                inside: logs_in(path).first().map(|log| log.display().to_string()),
+            })),
             _ => Ok(file),
         }
     }
@@ -137,11 +139,21 @@ impl Recording {
     }
 }
 
-/// The first file of a ROS 2 bag in its folder.
-fn log_in(folder: &Path) -> Option<String> {
-    let files = std::fs::read_dir(folder).ok()?.filter_map(|entry| Some(entry.ok()?.path()));
-    let is_log = |path: &PathBuf| path.extension().is_some_and(|ending| ending == "db3" || ending == "mcap");
-    files.filter(is_log).min().map(|path| path.display().to_string())
+/// Endings of files that are read, plain or with `.gz` behind.
+const ENDINGS: [&str; 9] = ["csv", "mcap", "ulg", "bin", "db3", "bfl", "bbl", "log", "candump"];
+
+/// The files of a folder whose names end as those of recordings and logs do, in order of their names; none of a folder that
+/// cannot be read.
+pub fn logs_in(folder: &Path) -> Vec<PathBuf> {
+    let ends = |path: &Path| path.extension().map(|ending| ending.to_string_lossy().to_lowercase());
+    let is_log = |path: &PathBuf| {
+        let plain = if ends(path).as_deref() == Some("gz") { path.with_extension("") } else { path.clone() };
+        path.is_file() && ends(&plain).is_some_and(|ending| ENDINGS.contains(&ending.as_str()))
+    };
+    let files = std::fs::read_dir(folder).into_iter().flatten().filter_map(|entry| Some(entry.ok()?.path()));
+    let mut logs: Vec<PathBuf> = files.filter(is_log).collect();
+    logs.sort();
+    logs
 }
 
 #[cfg(test)]

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use kort_identify::checks;
-use kort_identify::data::Series;
-use kort_recording::{ColumnMap, Recording};
+use kort_identify::data::{FEWEST_ROWS, Series};
+use kort_recording::{ColumnMap, Recording, logs_in};
 use kort_thruster::effects::{self, Descriptor};
 use kort_thruster::models::ModelName;
 use kort_thruster::rig::Rig;
@@ -16,7 +16,7 @@ use crate::files::rig_text;
 /// Arguments that `fit` and `diagnose` share.
 #[derive(Debug, Args)]
 pub struct Input {
-    /// Recordings of one rig: CSV (plain or gzip) or MCAP; several are used together
+    /// Recordings of one rig: CSV (plain or gzip) or MCAP; several, and all in a folder, are used together
     #[arg(value_name = "REC", required = true)]
     pub recordings: Vec<PathBuf>,
     /// Rig description: what is stated of the thruster, its drive and its sensors [default: the one that a
@@ -79,20 +79,69 @@ impl Input {
     /// # Errors
     /// Names file, field, value found and what is allowed.
     pub fn load(&self) -> Result<Loaded, Failure> {
-        self.take(self.read()?)
+        let (recordings, skipped) = self.read()?;
+        let mut loaded = self.take(recordings)?;
+        for words in skipped {
+            eprintln!("warning: {words}");
+            loaded.notes.push(words);
+            loaded.lossy = true;
+        }
+        Ok(loaded)
     }
 
-    /// The recordings' files.
-    fn read(&self) -> Result<Vec<Recording>, Failure> {
+    /// The recordings, and words on those that were passed over: a logger that begins a file at each reset leaves some
+    /// with a header and no more, which are no reason to refuse the others.
+    fn read(&self) -> Result<(Vec<Recording>, Vec<String>), Failure> {
         let map = self.columns.as_deref().map(ColumnMap::find).transpose().map_err(Failure::input)?;
-        let mut recordings = Vec::new();
-        for (i, path) in self.recordings.iter().enumerate() {
-            if self.recordings[..i].contains(path) {
-                return Err(Failure::in_file(path, "is given twice\nhint: name every recording once"));
+        let files = self.files()?;
+        let (mut recordings, mut skipped) = (Vec::new(), Vec::new());
+        for (path, in_folder) in &files {
+            match Recording::read(path, map.as_ref()) {
+                Ok(short) if files.len() > 1 && short.rows() < FEWEST_ROWS => {
+                    let rows = short.rows();
+                    skipped.push(format!(
+                        "{}: {rows} row(s) of data; at least {FEWEST_ROWS} are needed",
+                        path.display()
+                    ));
+                }
+                Ok(recording) => recordings.push(recording),
+                Err(e) if files.len() > 1 && (*in_folder || e.has_no_rows()) => {
+                    skipped.push(format!("{}: {}", e.file, e.problem));
+                }
+                Err(e) => return Err(Failure::input(e)),
             }
-            recordings.push(Recording::read(path, map.as_ref()).map_err(Failure::input)?);
         }
-        Ok(recordings)
+        match skipped.first().filter(|_| recordings.is_empty()) {
+            Some(first) => Err(Failure::input(format!(
+                "none of {} files is a recording of {FEWEST_ROWS} rows or more; the first: {first}\nhint: is a column map needed (`kort columns FILE`)? files of a row each are joined first: (cat FIRST.csv; tail -qn +2 OTHERS.csv) > all.csv",
+                files.len()
+            ))),
+            None => {
+                let passed = |words: String| format!("{words}; this file is passed over");
+                Ok((recordings, skipped.into_iter().map(passed).collect()))
+            }
+        }
+    }
+
+    /// The files that are named, and those of named folders, which are marked.
+    fn files(&self) -> Result<Vec<(PathBuf, bool)>, Failure> {
+        let mut files: Vec<(PathBuf, bool)> = Vec::new();
+        for path in &self.recordings {
+            let inside = if path.is_dir() { logs_in(path) } else { Vec::new() };
+            // A folder without any is refused as what it is when it is read.
+            let marked = if inside.is_empty() {
+                vec![(path.clone(), false)]
+            } else {
+                inside.into_iter().map(|log| (log, true)).collect()
+            };
+            for (path, in_folder) in marked {
+                if files.iter().any(|(other, _)| *other == path) {
+                    return Err(Failure::in_file(&path, "is given twice\nhint: name every recording once"));
+                }
+                files.push((path, in_folder));
+            }
+        }
+        Ok(files)
     }
 
     /// What was read, or never was in a file, with the rig that it belongs to.

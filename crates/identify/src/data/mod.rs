@@ -206,7 +206,8 @@ fn returns(series: &Series, rig: &Rig, driving: Driving) -> bool {
 
 /// The coarsest step at which the plant is integrated, s.
 const COARSEST_TICK_S: f64 = 0.002;
-const FEWEST_ROWS: usize = 20;
+/// Fewest rows of a recording that can be compared with a model.
+pub const FEWEST_ROWS: usize = 20;
 
 /// Step at which the plant is integrated under a log of this usual interval, s.
 pub fn control_period_s(rig: &Rig, row_s: f64) -> f64 {

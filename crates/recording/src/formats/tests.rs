@@ -151,6 +151,17 @@ fn a_damaged_chunk_of_an_mcap_takes_no_more_with_it() {
     assert!(damaged.losses.len() == 1 && damaged.losses[0].starts_with("1 of "), "{:?}", damaged.losses);
 }
 
+/// As a logger that is stopped at once leaves it: not a file of others.
+#[test]
+fn a_recording_without_a_row_says_so_in_every_format() {
+    for format in [Format::Csv, Format::CsvGz, Format::Mcap] {
+        let mut out = Cursor::new(Vec::new());
+        Writer::create(format, TOPIC, &["thrust_n"], &mut out).unwrap().finish().unwrap();
+        let refused = decode("rec", out.into_inner().as_slice(), None).unwrap_err();
+        assert_eq!(refused, Problem::TooFewRows { found: 0 }, "{format:?}");
+    }
+}
+
 #[test]
 fn a_flushed_mcap_keeps_its_rows_without_an_end() {
     let mut out = Cursor::new(Vec::new());

@@ -113,6 +113,9 @@ impl Table {
         map: Option<&ColumnMap>,
         losses: Vec<String>,
     ) -> Result<Recording, Problem> {
+        if self.messages == 0 && !self.topics.is_empty() {
+            return Err(Problem::TooFewRows { found: 0 });
+        }
         if self.fields.is_empty() {
             let found =
                 if self.other_topics.is_empty() { "none".into() } else { self.other_topics.join(", ") };
