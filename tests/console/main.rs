@@ -8,6 +8,7 @@ mod browser;
 mod common;
 mod desk;
 mod load;
+mod looks;
 mod plots;
 mod told;
 
@@ -79,6 +80,7 @@ fn an_operator_takes_command_thrusts_records_and_stops() {
         );
         page.click("send");
         page.until("state.setpoint.thrust_n === 40");
+        page.until("Math.abs(parseFloat(document.querySelector('#tiles .tile i').textContent) - 40) < 2");
         page.picture(concat!(env!("CARGO_MANIFEST_DIR"), "/target/console.png"));
 
         page.click("stop");

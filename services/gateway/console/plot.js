@@ -177,7 +177,7 @@ class Chart {
       width: Math.max(200, this.figure.clientWidth - 16), height: 210, title: `${this.title} [${this.unit}]`,
       cursor: { sync: { key: "kort" }, drag: { x: true, y: false, setScale: false } },
       scales: { x: { time: false }, y: { range: (u, low, high) => this.range(low, high) } },
-      axes: [{ ...axis, size: 28, values: (_, ticks) => ticks.map((t) => `${+t.toFixed(2)} s`) }, { ...axis, size: 52 }],
+      axes: [{ ...axis, size: 32, gap: 9, values: (_, ticks) => ticks.map((t) => `${+t.toFixed(2)} s`) }, { ...axis, size: 52 }],
       series: [{ label: "time", value: (_, t) => (t === null || t === undefined ? "–" : `${t.toFixed(2)} s`) }, ...series(false), ...series(true)],
       hooks: { setSelect: [(u) => {
         if (u.select.width < 4) return;
