@@ -10,6 +10,7 @@ use kort_thruster::effects::{Descriptor, Scale, Stretch};
 use kort_thruster::models::ModelName;
 use kort_thruster::parameters::{Parameter as P, Parameters};
 use kort_thruster::rig::{Quantity, Rig};
+use nalgebra::DMatrix;
 
 use crate::data::{Prepared, Response};
 
@@ -18,6 +19,8 @@ pub const UNSTATED_TOL: f64 = 0.5;
 
 /// Standard deviation over value beyond which a number is stated roughly: a straight line from it leads astray.
 const ROUGH: f64 = 0.2;
+/// Rough numbers from which a fit is begun afar: a budget.
+const FELT: usize = 3;
 /// How far a coefficient may move, in stated tolerances (two sigma each).
 const REACH: f64 = 1.5;
 
@@ -266,12 +269,18 @@ impl Hypothesis {
         Self { effects: Vec::new(), free, start, inputs }
     }
 
-    /// The same, begun where what is stated roughly is stated, and a standard deviation off, one number after the other;
-    /// nothing where nothing is stated roughly.
-    pub fn begun_afar(&self) -> Vec<Self> {
+    /// The same, which starts where a fit ended, begun where what is stated roughly is stated, and a standard deviation off:
+    /// one number after the other of those that the data tell most of, by their `information`. Nothing where the fit bent
+    /// none of the rough ones by more than that.
+    pub fn begun_afar(&self, information: &DMatrix<f64>) -> Vec<Self> {
         let rough =
             |free: &Free| matches!(free.target, Target::Base(_)) && free.sigma > ROUGH * free.mean.abs();
-        let places: Vec<usize> = (0..self.free.len()).filter(|k| rough(&self.free[*k])).collect();
+        let mut places: Vec<usize> = (0..self.free.len()).filter(|k| rough(&self.free[*k])).collect();
+        let bent = |k: &usize| (self.start[*k] - self.free[*k].mean).abs() > self.free[*k].sigma;
+        if !places.iter().any(bent) {
+            return Vec::new();
+        }
+        places.sort_by(|a, b| information[(*b, *b)].total_cmp(&information[(*a, *a)]));
         let mut stated = self.clone();
         places.iter().for_each(|k| stated.start[*k] = self.free[*k].mean);
         let off = |k: usize, by: f64| {
@@ -279,8 +288,8 @@ impl Hypothesis {
             one.start[k] = (free.mean + by * free.sigma).clamp(free.low, free.high);
             one
         };
-        let as_stated = (!places.is_empty()).then(|| stated.clone());
-        as_stated.into_iter().chain(places.iter().flat_map(|k| [off(*k, -1.0), off(*k, 1.0)])).collect()
+        let off_by_one = places.iter().take(FELT).flat_map(|k| [off(*k, -1.0), off(*k, 1.0)]);
+        std::iter::once(stated.clone()).chain(off_by_one).collect()
     }
 
     /// With the instants free at which these recordings' channels were sampled.
