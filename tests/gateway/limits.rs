@@ -7,16 +7,7 @@ use serde_json::{Value, json};
 
 use crate::asking::{JSON, assert_problem, send};
 use crate::common::{self, Site, Stack, kill, wait};
-
-fn record(port: u16, name: &str) {
-    let body = json!({"name": name, "rate_hz": 200}).to_string();
-    let begun = send(port, "POST", "/v1/recordings", &[JSON], body.as_bytes());
-    assert_eq!(begun.status, 201, "{name}: {}", begun.text());
-}
-
-fn list(port: u16) -> Vec<Value> {
-    send(port, "GET", "/v1/recordings", &[], b"").json().as_array().unwrap().clone()
-}
+use crate::parts::{list, record};
 
 /// The list, once nothing in it is being written.
 fn ended(port: u16) -> Vec<Value> {

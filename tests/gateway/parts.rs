@@ -12,13 +12,13 @@ fn rotating() -> Stack {
     Stack::start_at(site)
 }
 
-fn record(port: u16, name: &str) {
+pub fn record(port: u16, name: &str) {
     let body = json!({"name": name, "rate_hz": 200}).to_string();
     let begun = send(port, "POST", "/v1/recordings", &[JSON], body.as_bytes());
     assert_eq!(begun.status, 201, "{name}: {}", begun.text());
 }
 
-fn list(port: u16) -> Vec<Value> {
+pub fn list(port: u16) -> Vec<Value> {
     send(port, "GET", "/v1/recordings", &[], b"").json().as_array().unwrap().clone()
 }
 

@@ -197,12 +197,17 @@ impl Bridge {
 
     /// Opens the ports of the deployment's present generation.
     fn keep_open(&mut self, deployment: &Deployment) {
-        let present = deployment.generation_of_our_version();
-        match (&self.ports, present) {
-            (Some(ports), Ok(generation)) if ports.generation == generation => return,
-            // What is open works on; only what comes next cannot be read.
-            (Some(_), Err(error @ TransportError::OpenFiles { .. })) => return self.complain(error),
-            _ => {}
+        let generation = deployment.generation();
+        if let Some(ports) = &self.ports {
+            if generation == Some(ports.generation) {
+                return;
+            }
+            if let (None, Err(error @ TransportError::OpenFiles { .. })) =
+                (generation, deployment.generation_of_our_version())
+            {
+                // What is open works on; only what comes next cannot be read.
+                return self.complain(error);
+            }
         }
         self.ports = None;
         match GatewayPorts::open(deployment, &self.link.thruster.id) {

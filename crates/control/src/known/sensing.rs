@@ -55,8 +55,8 @@ impl Sensing {
             thrust_n: self.seen_n,
             torque_n_m: 0.0,
             flow_m_s: last.flow_m_s.value,
-            // Without an angle, what follows it is not known and nothing is taken off for it.
             since_mean_rad_s2: None,
+            // Without an angle, what follows it is not known and nothing is taken off for it.
             true_speed_rad_s: if measured.shaft_angle_rad.is_some() { speed } else { 0.0 },
             true_thrust_n: thrust,
             supply_v: measured.supply_v.unwrap_or(0.0),

@@ -8,9 +8,10 @@ use crate::probe::{Probe, probe};
 use crate::screen::screen;
 
 impl Search<'_, '_> {
-    /// Where the baseline bent what is stated roughly, fits single effects from what is stated, and from a standard deviation
-    /// off, if a screen there promises what comes near the best that is known. Where two such numbers make up for each other, a baseline without the physics ends
-    /// with the wrong one bent, and what is looked for from there is what suits that.
+    /// Where the baseline bent what is stated roughly, fits single effects from what is stated, and from a standard
+    /// deviation off, if a screen there promises what comes near the best that is known. Where two such numbers make up for
+    /// each other, a baseline without the physics ends with the wrong one bent, and what is looked for from there is what
+    /// suits that.
     pub(super) fn look_from_afar(&mut self) {
         let none = Set::new();
         let Some(baseline) = self.fits.get(&none) else { return };

@@ -48,5 +48,27 @@ impl<T: Real> Effect<T> for UnsignedSpeed<T> {
     fn sense(&mut self, _: &Tick, sensed: &mut Sensed<T>) {
         let signed = sensed.shaft_speed_rad_s;
         sensed.shaft_speed_rad_s = signed + self.share * (signed.abs() - signed);
+        if signed < 0.0 {
+            // Astern what is shown goes the other way.
+            sensed.since_mean_rad_s2 = sensed.since_mean_rad_s2.map(|rate| rate - self.share * rate * 2.0);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn astern_speed_and_its_rate_are_shown_the_other_way() {
+        for (speed, shown, rate) in [(3.0, 3.0, 40.0), (-3.0, 3.0, -40.0)] {
+            let mut sensed = Sensed {
+                shaft_speed_rad_s: speed,
+                since_mean_rad_s2: Some(40.0),
+                ..Sensed::<f64>::default()
+            };
+            UnsignedSpeed { share: 1.0 }.sense(&Tick::default(), &mut sensed);
+            assert_eq!((sensed.shaft_speed_rad_s, sensed.since_mean_rad_s2), (shown, Some(rate)));
+        }
     }
 }
