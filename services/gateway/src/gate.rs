@@ -1,8 +1,8 @@
 //! The gate in front of every route: is it meant for us, who asks, and may they?
 
-use std::hash::BuildHasher;
+use std::collections::HashMap;
 use std::net::{IpAddr, SocketAddr};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, Weak};
 
 use axum::extract::{Request, State};
 use axum::http::{HeaderMap, Method, header};
@@ -14,13 +14,34 @@ use crate::App;
 use crate::hosts::Hosts;
 use crate::problem::{Kind, Problem};
 use crate::serve::{Peer, Reserved};
+use crate::thruster::lock;
 use crate::token::{Identity, Role, Tokens};
 
 /// A browser cannot send `Authorization` with a WebSocket: it offers its token as a subprotocol.
 const TOKEN_PROTOCOL: &str = "bearer.";
 
-/// Lanes before argon2: peers of one lane wait for each other.
-const LANES: usize = 64;
+/// One of each peer waits for argon2: a flood of wrong tokens holds up its own peer, and no stop of another's. No two
+/// peers share a lane, and there are no more of them than connections.
+#[derive(Debug, Default)]
+struct Lanes(Mutex<HashMap<Option<u128>, Weak<Semaphore>>>);
+
+impl Lanes {
+    /// The lane of a peer; of IPv6 a whole subnet, for a host has as many addresses there as it likes.
+    fn of(&self, peer: Option<IpAddr>) -> Arc<Semaphore> {
+        let subnet = peer.map(|peer| match peer.to_canonical() {
+            IpAddr::V4(address) => address.to_ipv6_mapped().into(),
+            IpAddr::V6(address) => u128::from(address) >> 64,
+        });
+        let mut lanes = lock(&self.0);
+        if let Some(lane) = lanes.get(&subnet).and_then(Weak::upgrade) {
+            return lane;
+        }
+        lanes.retain(|_, lane| lane.strong_count() > 0);
+        let lane = Arc::new(Semaphore::new(1));
+        lanes.insert(subnet, Arc::downgrade(&lane));
+        lane
+    }
+}
 
 /// What the gate knows.
 #[derive(Debug)]
@@ -30,10 +51,7 @@ pub struct Gate {
     required: bool,
     /// Argon2 is heavy on purpose: one at a time, so that wrong tokens cannot take the machine.
     work: Semaphore,
-    /// One of each lane waits for it: a flood of wrong tokens holds up its own peer, and no stop of another's.
-    lanes: [Semaphore; LANES],
-    /// Says which lane; nobody outside knows who shares one.
-    lots: std::hash::RandomState,
+    lanes: Lanes,
 }
 
 impl Gate {
@@ -44,23 +62,13 @@ impl Gate {
             tokens,
             required,
             work: Semaphore::new(1),
-            lanes: std::array::from_fn(|_| Semaphore::new(1)),
-            lots: std::hash::RandomState::new(),
+            lanes: Lanes::default(),
         }
     }
 
     /// Is what somebody was let in by still in force?
     pub fn stands(&self, identity: &Identity) -> bool {
         self.tokens.stands(identity)
-    }
-
-    /// The lane of a peer; of IPv6 a whole subnet, for a host has as many addresses there as it likes.
-    fn lane(&self, peer: Option<IpAddr>) -> Option<&Semaphore> {
-        let subnet = peer.map(|peer| match peer.to_canonical() {
-            IpAddr::V4(address) => u128::from(u32::from(address)),
-            IpAddr::V6(address) => u128::from(address) >> 64,
-        });
-        self.lanes.get(self.lots.hash_one(subnet) as usize % LANES)
     }
 
     /// Who asks.
@@ -80,10 +88,8 @@ impl Gate {
         if let Some(identity) = self.tokens.remembered(&token) {
             return Ok(identity);
         }
-        let _first_of_its_lane = match self.lane(peer) {
-            Some(lane) => lane.acquire().await.ok(),
-            None => None,
-        };
+        let lane = self.lanes.of(peer);
+        let _first_of_its_lane = lane.acquire().await;
         let _one_at_a_time = self.work.acquire().await;
         // Accepted while this one waited, on another connection.
         if let Some(identity) = self.tokens.remembered(&token) {
@@ -189,6 +195,23 @@ mod tests {
         assert_eq!(needed(&Method::GET, "/"), None);
         assert_eq!(needed(&Method::GET, "/docs/index.css"), None);
         assert_eq!(needed(&Method::GET, "/documents"), Some(Role::Viewer));
+    }
+
+    #[test]
+    fn every_peer_waits_in_a_lane_of_its_own() {
+        let lanes = Lanes::default();
+        let peers: Vec<IpAddr> = (0..200).map(|host| IpAddr::from([10, 0, 0, host])).collect();
+        let held: Vec<_> = peers.iter().map(|peer| lanes.of(Some(*peer))).collect();
+        assert!(held.iter().all(|lane| lane.try_acquire().map(std::mem::forget).is_ok()));
+        // The same peer, whichever way its address is written; hosts of one subnet of IPv6.
+        assert!(lanes.of(Some("::ffff:10.0.0.7".parse().unwrap())).try_acquire().is_err());
+        let (one, other) = ("2001:db8::1".parse().ok(), "2001:db8::2".parse().ok());
+        let lane = lanes.of(one);
+        assert!(Arc::ptr_eq(&lane, &lanes.of(other)));
+        // Whoever is gone leaves nothing behind.
+        drop((held, lane));
+        lanes.of(one);
+        assert_eq!(lock(&lanes.0).len(), 1);
     }
 
     #[test]
