@@ -6,7 +6,8 @@ use kort_emulators::{Adapter, Bench as Emulator, Cia402, Mischief};
 use kort_proto::faults::Fault;
 use kort_proto::messages::{Command, DriveKind};
 
-use crate::link::{Case, SILENCE, alone, rig};
+use crate::common::in_real_time;
+use crate::link::{Case, SILENCE, rig};
 
 fn case() -> Case {
     Case::new("cia402", "units_per_turn = 4096")
@@ -18,14 +19,14 @@ fn cia402(make: Make) -> Emulator {
 
 #[test]
 fn the_service_drives_it_and_records() {
-    alone(|| case().serves(&cia402(Make::default())));
+    in_real_time(|| case().serves(&cia402(Make::default())));
 }
 
 /// An adapter's line has no check sum: a turned bit is noticed by what it makes of status or speed, or by a line that is none. Of
 /// answers that are repeated one of the two that make a reading is missing.
 #[test]
 fn every_fault_of_the_wire_ends_at_zero() {
-    alone(|| {
+    in_real_time(|| {
         let flipped = [
             Fault::DriveLost,
             Fault::DriveUnguarded,
@@ -42,7 +43,7 @@ fn every_fault_of_the_wire_ends_at_zero() {
 
 #[test]
 fn a_servo_that_dies_or_stands_still_leaves_no_torque() {
-    alone(|| {
+    in_real_time(|| {
         case().outlives_its_servo(&cia402(Make::default()));
         // One that cannot but go into fault without its master, and coasts there once it is told to.
         let faults = Make { locked: vec![(0x6007, 0)], ..Make::default() };
@@ -52,7 +53,7 @@ fn a_servo_that_dies_or_stands_still_leaves_no_torque() {
 
 #[test]
 fn a_drive_that_resets_or_reports_a_fault_ends_at_zero() {
-    alone(|| {
+    in_real_time(|| {
         let emulator = cia402(Make { node: 5, bitrate: 6, ..Make::default() });
         let case = Case { keys: "units_per_turn = 4096, address = 5, bitrate = 500000", ..case() };
         case.resets_and_reports(&emulator, 0x2310, "error 0x2310, current");
@@ -61,7 +62,7 @@ fn a_drive_that_resets_or_reports_a_fault_ends_at_zero() {
 
 #[test]
 fn it_is_not_armed_while_its_watchdog_is_not_confirmed() {
-    alone(|| {
+    in_real_time(|| {
         let locked = |at| Make { locked: vec![at], ..Make::default() };
         let without = |at| Make { without: vec![at], ..Make::default() };
         let fault_brakes = Make { locked: vec![(0x6007, 0), (0x605e, 0)], ..Make::default() };
@@ -82,7 +83,7 @@ fn it_is_not_armed_while_its_watchdog_is_not_confirmed() {
 /// Swapped units, a mode that it does not have, and a drive that is not the one that is meant.
 #[test]
 fn it_is_not_armed_when_it_is_another_one_than_was_described() {
-    alone(|| {
+    in_real_time(|| {
         let rpm = || Make { stored: vec![((0x60a9, 0), 4, 0x00b4_4700)], ..Make::default() };
         case().cannot_be_armed(&cia402(rpm()), "speed_units = 60");
         let no_torque = Make { stored: vec![((0x6502, 0), 4, 0x01ed)], ..Make::default() };
@@ -96,7 +97,7 @@ fn it_is_not_armed_when_it_is_another_one_than_was_described() {
 
 #[test]
 fn speed_is_given_to_its_own_loop() {
-    alone(|| {
+    in_real_time(|| {
         let emulator =
             Emulator::start(Adapter::new(Cia402::new(Make::default(), &rig("speed-drive")))).unwrap();
         let command = Command { kind: DriveKind::Speed as u32, ..Command::default() };

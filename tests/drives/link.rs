@@ -1,6 +1,5 @@
 //! What is asked of every drive on a wire, whatever it speaks.
 
-use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use kort_emulators::{Bench as Emulator, Mischief};
@@ -32,15 +31,6 @@ const HELD_UP: u64 = Fault::DriveLost.bit()
     | Fault::AmplifierFault.bit()
     | Fault::CommandTimeout.bit()
     | Fault::LoopStalled.bit();
-/// One deployment at a time: emulators beside each other would hold each other up.
-static ALONE: Mutex<()> = Mutex::new(());
-
-/// Runs a test when no other one runs a deployment, and once more where the machine stood still.
-pub fn alone(test: impl Fn()) {
-    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
-    crate::common::in_real_time(test);
-}
-
 /// A rig that the repository describes.
 pub fn rig(name: &str) -> Rig {
     let file = format!("{}/config/thrusters/{name}.toml", env!("CARGO_MANIFEST_DIR"));

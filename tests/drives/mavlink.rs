@@ -8,8 +8,9 @@ use kort_proto::faults::Fault;
 use kort_proto::messages::{Command, DriveKind, Outcome, RequestKind};
 
 use crate::common::bench::Bench;
+use crate::common::in_real_time;
 use crate::common::wait;
-use crate::link::{Case, SILENCE, alone, rig};
+use crate::link::{Case, SILENCE, rig};
 
 const RIG: &str = "t200-vehicle";
 
@@ -26,13 +27,13 @@ fn vehicle(make: Make) -> Emulator {
 
 #[test]
 fn the_service_drives_it_and_records() {
-    alone(|| case().serves(&vehicle(Make::default())));
+    in_real_time(|| case().serves(&vehicle(Make::default())));
 }
 
 /// The same by UDP, with an ESC that tells its speed with a sign.
 #[test]
 fn by_udp_it_is_driven_too_and_ends_at_zero() {
-    alone(|| {
+    in_real_time(|| {
         let make = Make { telemetry: Telemetry::Signed, ..Make::default() };
         let emulator = Emulator::start_udp(ArduSub::new(make, &rig(RIG))).unwrap();
         case().serves(&emulator);
@@ -54,7 +55,7 @@ fn by_udp_it_is_driven_too_and_ends_at_zero() {
 
 #[test]
 fn every_fault_of_the_wire_ends_at_zero() {
-    alone(|| {
+    in_real_time(|| {
         let lost = [Fault::DriveLost];
         let harmless = [Mischief::Split, Mischief::Noisy];
         // A repeated message tells its age by the vehicle's clock.
@@ -64,12 +65,12 @@ fn every_fault_of_the_wire_ends_at_zero() {
 
 #[test]
 fn a_servo_that_dies_or_stands_still_leaves_no_torque() {
-    alone(|| case().outlives_its_servo(&vehicle(Make::default())));
+    in_real_time(|| case().outlives_its_servo(&vehicle(Make::default())));
 }
 
 #[test]
 fn a_vehicle_that_resets_or_whose_fail_safe_acts_ends_at_zero() {
-    alone(|| {
+    in_real_time(|| {
         let emulator = vehicle(Make::default());
         case().resets_and_reports(&emulator, 9, "it is in mode 9, and is driven in MANUAL (19) only");
         emulator.restart();
@@ -95,7 +96,7 @@ fn ended_by(case: &Case, emulator: &Emulator, code: u32, words: &str) -> Bench {
 /// What a pilot does stops kort; the vehicle's cool-down is waited for and told.
 #[test]
 fn a_pilot_ends_it_and_its_cool_down_is_told() {
-    alone(|| {
+    in_real_time(|| {
         let emulator = vehicle(Make::default());
         let patient = Case { revive: |_| (), ..case() };
         let bench = ended_by(&patient, &emulator, 100, "it ended the motor test: disarmed");
@@ -105,7 +106,7 @@ fn a_pilot_ends_it_and_its_cool_down_is_told() {
 
 #[test]
 fn it_is_not_armed_without_a_known_time_out_or_against_somebody() {
-    alone(|| {
+    in_real_time(|| {
         let unknown = Make { version: [4, 9, 0], ..Make::default() };
         case().cannot_be_armed(&vehicle(unknown), "the time-out of its motor test is not known to kort");
         let copter = Make { kind: 2, ..Make::default() };
@@ -122,7 +123,7 @@ fn it_is_not_armed_without_a_known_time_out_or_against_somebody() {
 /// What it says when it does not let itself be armed is in the log, and nothing is driven.
 #[test]
 fn its_reason_not_to_be_armed_is_told() {
-    alone(|| {
+    in_real_time(|| {
         let emulator = vehicle(Make { unfit: Some("Arm: Leak detected"), ..Make::default() });
         let mut bench = case().servo(&emulator);
         wait("it to be known", || bench.site.log().contains("a motor test ends").then_some(()));
@@ -138,5 +139,5 @@ fn its_reason_not_to_be_armed_is_told() {
 
 #[test]
 fn volts_are_given_as_pulse_width() {
-    alone(|| case().follows(&vehicle(Make::default())));
+    in_real_time(|| case().follows(&vehicle(Make::default())));
 }

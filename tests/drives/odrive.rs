@@ -3,7 +3,8 @@
 use kort_emulators::{Bench as Emulator, Mischief, ODrive};
 use kort_proto::faults::Fault;
 
-use crate::link::{Case, FROZEN, alone, rig};
+use crate::common::in_real_time;
+use crate::link::{Case, FROZEN, rig};
 
 fn case() -> Case {
     Case::new("odrive", "")
@@ -15,12 +16,12 @@ fn odrive(read_only: bool) -> Emulator {
 
 #[test]
 fn the_service_drives_it_and_records() {
-    alone(|| case().serves(&odrive(false)));
+    in_real_time(|| case().serves(&odrive(false)));
 }
 
 #[test]
 fn every_fault_of_the_wire_ends_at_zero() {
-    alone(|| {
+    in_real_time(|| {
         // Noise costs a line, and with it the answer; a line repeated in the place of the others is no whole answer;
         // whole old answers are VESC's test.
         let stale = [Fault::SensorFrozen, Fault::DriveLost];
@@ -30,15 +31,15 @@ fn every_fault_of_the_wire_ends_at_zero() {
 
 #[test]
 fn a_servo_that_dies_or_stands_still_leaves_no_torque() {
-    alone(|| case().outlives_its_servo(&odrive(false)));
+    in_real_time(|| case().outlives_its_servo(&odrive(false)));
 }
 
 #[test]
 fn a_drive_that_resets_or_reports_a_fault_ends_at_zero() {
-    alone(|| case().resets_and_reports(&odrive(false), 0x40, "axis error 0x40"));
+    in_real_time(|| case().resets_and_reports(&odrive(false), 0x40, "axis error 0x40"));
 }
 
 #[test]
 fn it_is_not_armed_without_its_watchdog() {
-    alone(|| case().cannot_be_armed(&odrive(true), "its watchdog stays off"));
+    in_real_time(|| case().cannot_be_armed(&odrive(true), "its watchdog stays off"));
 }

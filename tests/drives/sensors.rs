@@ -8,8 +8,8 @@ use kort_proto::faults::Fault;
 use kort_proto::messages::{Command, Outcome, RequestKind, Telemetry};
 
 use crate::common::bench::Bench;
+use crate::common::in_real_time;
 use crate::common::{Site, wait};
-use crate::link::alone;
 
 const KGF_N: f64 = 9.806_65;
 
@@ -51,7 +51,7 @@ fn arms_again(bench: &mut Bench) {
 
 #[test]
 fn a_force_cell_that_prints_is_believed_over_the_drives_own_and_missed_when_it_is_silent() {
-    alone(|| {
+    in_real_time(|| {
         let cell = Emulator::start(Printer::new(2.5, 50.0)).unwrap();
         let keys = |required: bool| {
             format!(
@@ -88,7 +88,7 @@ fn a_force_cell_that_prints_is_believed_over_the_drives_own_and_missed_when_it_i
 
 #[test]
 fn a_channel_of_industrial_io_is_read_and_missed_when_it_is_gone() {
-    alone(|| {
+    in_real_time(|| {
         let device = tempfile::tempdir().unwrap();
         let put = |name: &str, text: &str| std::fs::write(device.path().join(name), text).unwrap();
         put("in_voltage0_raw", "1000\n");
@@ -123,7 +123,7 @@ fn a_channel_of_industrial_io_is_read_and_missed_when_it_is_gone() {
 /// A force cell that needs its line asked for would be silent without: it is asked, and at its rate.
 #[test]
 fn an_instrument_is_asked_at_its_rate() {
-    alone(|| {
+    in_real_time(|| {
         let cell = Emulator::start(Printer::new(1.0, 20.0)).unwrap();
         let keys = format!(
             "kind = \"serial_line\", port = {:?}, ask = \"R\\n\", rate_hz = 20, signals = {{ thrust_n = {{ column = 2, unit = \"kgf\" }} }}",

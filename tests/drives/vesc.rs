@@ -8,7 +8,8 @@ use kort_proto::faults::Fault;
 use kort_proto::messages::{Command, DriveKind};
 
 use crate::common::Stack;
-use crate::link::{Case, FROZEN, SILENCE, alone, rig};
+use crate::common::in_real_time;
+use crate::link::{Case, FROZEN, SILENCE, rig};
 
 fn case() -> Case {
     Case::new("vesc", "pole_pairs = 7")
@@ -20,12 +21,12 @@ fn vesc(make: Make) -> Emulator {
 
 #[test]
 fn the_service_drives_it_and_records() {
-    alone(|| case().serves(&vesc(Make::default())));
+    in_real_time(|| case().serves(&vesc(Make::default())));
 }
 
 #[test]
 fn every_fault_of_the_wire_ends_at_zero() {
-    alone(|| {
+    in_real_time(|| {
         let harmless = [Mischief::Split, Mischief::Noisy];
         case().endures_its_wire(
             &vesc(Make::default()),
@@ -39,12 +40,12 @@ fn every_fault_of_the_wire_ends_at_zero() {
 
 #[test]
 fn a_servo_that_dies_or_stands_still_leaves_no_torque() {
-    alone(|| case().outlives_its_servo(&vesc(Make::default())));
+    in_real_time(|| case().outlives_its_servo(&vesc(Make::default())));
 }
 
 #[test]
 fn a_drive_that_resets_or_reports_a_fault_ends_at_zero() {
-    alone(|| {
+    in_real_time(|| {
         case().resets_and_reports(&vesc(Make::default()), 4, "fault 4: absolute over-current");
         // So quick a reset that no answer is missed shows by what the drive counts.
         let emulator = vesc(Make { boot_s: 0.0, ..Make::default() });
@@ -56,7 +57,7 @@ fn a_drive_that_resets_or_reports_a_fault_ends_at_zero() {
 
 #[test]
 fn it_is_not_armed_without_its_time_out() {
-    alone(|| {
+    in_real_time(|| {
         let off = Make { stored_timeout_ms: 0, read_only: true, ..Make::default() };
         case().cannot_be_armed(&vesc(off), "does not take its settings");
         let old = Make { firmware: (5, 2), ..Make::default() };
@@ -69,7 +70,7 @@ fn it_is_not_armed_without_its_time_out() {
 /// What is stored stays; what is in force until the next power-off is what was asked for.
 #[test]
 fn a_time_out_that_is_too_long_is_set_until_the_next_power_off() {
-    alone(|| {
+    in_real_time(|| {
         let make = Make { stored_timeout_ms: 5000, stored_brake_current_a: 4.0, ..Make::default() };
         case().outlives_its_servo(&vesc(make));
     });
@@ -78,7 +79,7 @@ fn a_time_out_that_is_too_long_is_set_until_the_next_power_off() {
 /// Duty for a rig that is driven by volts, and the drive's own speed loop.
 #[test]
 fn volts_are_given_as_duty_and_speed_to_its_own_loop() {
-    alone(|| {
+    in_real_time(|| {
         for (name, kind, drive) in
             [("t200-vehicle", DriveKind::Voltage, 6.0), ("speed-drive", DriveKind::Speed, 30.0)]
         {
@@ -93,7 +94,7 @@ fn volts_are_given_as_duty_and_speed_to_its_own_loop() {
 /// by the drive's current limit, or it trips.
 #[test]
 fn a_reversed_encoder_stays_within_the_current_limit() {
-    alone(reversed_encoder);
+    in_real_time(reversed_encoder);
 }
 
 fn reversed_encoder() {
