@@ -23,19 +23,19 @@ pub struct Instant<'a, T> {
     pub last_row: &'a Sensed<T>,
     /// Time since then, s.
     pub row_s: f64,
-    /// Whether every control tick is logged.
-    pub every_tick: bool,
+    /// Whether every control period is logged.
+    pub every_period: bool,
 }
 
 impl<T: Real> Instant<'_, T> {
     /// Rate of change of a response, over the last row for a slow sensor, else over the step; for a speed that is a bare
-    /// difference of counts, from its mean over the tick to its end. A rig that states the counts does not say whether
-    /// its drive shows that mean or the speed of an instant: half a tick earlier it is exactly that, steps of the command
-    /// included, across which the rate over a step would not tell. Where not every tick is logged it is the lesser part of
+    /// difference of counts, from its mean over the control period to its end. A rig that states the counts does not say whether
+    /// its drive shows that mean or the speed of an instant: half a period earlier it is exactly that, steps of the command
+    /// included, across which the rate over a step would not tell. Where not every period is logged it is the lesser part of
     /// what is not known of the instant.
     pub fn rate(&self, response: Response, slow: bool) -> T {
         if let (Response::ShaftSpeed, false, true, Some(rate)) =
-            (response, slow, self.every_tick, self.now.since_mean_rad_s2)
+            (response, slow, self.every_period, self.now.since_mean_rad_s2)
         {
             return rate;
         }
@@ -173,7 +173,7 @@ mod tests {
             step_s: 0.002,
             last_row: &last_row,
             row_s: 0.01,
-            every_tick: true,
+            every_period: true,
         };
         let of = |slow| {
             let target = Target::Sampling { response: Response::ShaftSpeed, slow };

@@ -130,6 +130,7 @@ impl<'a> Problem<'a> {
             hypothesis.effects.iter().map(|m| m.effect).zip(effects.iter().map(Vec::as_slice)).collect();
         for (r, recording) in self.recordings.iter().enumerate() {
             let mut plant = Plant::new(self.model, self.rig, &parameters, &hooked, recording.tick_s)
+                .with_control_period(recording.ticks_per_period)
                 .with_observer(recording.observer_rad_s);
             let [speed, flow, current, angle] = recording.start;
             plant.start(recording.time_s[0], speed, flow, current, angle);
@@ -306,10 +307,10 @@ fn run<T: Real>(
     let mut next = stimulus.logs.iter().enumerate().peekable();
     let mut before = plant.sensed();
     let mut last_row = before;
-    let every_tick = recording.ticks_per_row == 1;
+    let every_period = recording.every_command;
     let mut log = |row: usize, now: &Sensed<T>, step: (&Sensed<T>, &Sensed<T>), step_s: f64| {
         let row_s = if row == 0 { tick_s } else { time_s[row] - time_s[row - 1] };
-        show(row, &Instant { now, step, step_s, last_row: &last_row, row_s, every_tick });
+        show(row, &Instant { now, step, step_s, last_row: &last_row, row_s, every_period });
         last_row = *now;
     };
     // An instant on the grid shows the state before that tick's command acts.

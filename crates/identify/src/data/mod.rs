@@ -147,6 +147,8 @@ pub struct Prepared {
     pub command: Vec<f64>,
     /// Control ticks a log interval (nominal).
     pub ticks_per_row: usize,
+    /// Ticks of the simulation a control period: over it an encoder's counts are differenced.
+    pub ticks_per_period: usize,
     /// Whether the log has a row for every command: the drive's stated control is no faster than the log.
     pub every_command: bool,
     /// Step of the simulation, s.
@@ -218,6 +220,16 @@ pub fn control_period_s(rig: &Rig, row_s: f64) -> f64 {
     tick_s / (tick_s / COARSEST_TICK_S).ceil().max(1.0)
 }
 
+/// A row may be this many control periods for the log to have every command: stamps scatter, and now and then a row is
+/// missing.
+const EVERY: f64 = 1.05;
+
+/// Steps in a stated control period, in a row at most; one where none is stated.
+fn ticks_per_period(rig: &Rig, row_s: f64, tick_s: f64) -> usize {
+    let period_s = rig.sensors.control_rate_hz.map_or(tick_s, |rate_hz| (1.0 / rate_hz).min(row_s));
+    (period_s / tick_s).round().max(1.0) as usize
+}
+
 impl Prepared {
     /// Prepares a recording for a rig. A shaft-speed drive is chosen only where `speed_driven`
     /// asks for it (Model 3) or nothing else can drive.
@@ -265,7 +277,8 @@ impl Prepared {
             edges: Vec::new(),
             command: if driving == Driving::Current { steps_of(&recorded) } else { recorded },
             ticks_per_row: (row_s / tick_s).round() as usize,
-            every_command: rig.sensors.control_rate_hz.is_some_and(|rate_hz| rate_hz * row_s < 1.001),
+            ticks_per_period: ticks_per_period(rig, row_s, tick_s),
+            every_command: rig.sensors.control_rate_hz.is_some_and(|rate_hz| rate_hz * row_s < EVERY),
             tick_s,
             grain_s: Grain::new(rig, row_s, tick_s),
             start: [0.0; 4],

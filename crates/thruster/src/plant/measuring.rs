@@ -8,12 +8,52 @@ use crate::real::Real;
 #[derive(Clone, Copy)]
 pub(super) struct Filters<T> {
     pub(super) angle_rad: T,
-    pub(super) last_angle_rad: T,
     pub(super) speed_rad_s: T,
     pub(super) thrust_n: T,
     pub(super) last_thrust_n: T,
     pub(super) torque_n_m: T,
     pub(super) last_torque_n_m: T,
+}
+
+/// Angles that the encoder showed at the last ticks, the oldest in turn: its speed is their difference over a control
+/// period, which may be several steps of a simulation.
+pub(super) struct Counted<T> {
+    angles_rad: Vec<T>,
+    oldest: usize,
+    span_s: f64,
+}
+
+impl<T: Real> Counted<T> {
+    /// At rest at zero, over some ticks.
+    pub(super) fn over(ticks: usize, tick_s: f64) -> Self {
+        let ticks = ticks.max(1);
+        Self { angles_rad: vec![T::ZERO; ticks], oldest: 0, span_s: ticks as f64 * tick_s }
+    }
+
+    /// As if it had come to this angle at this speed.
+    pub(super) fn came_to(&mut self, angle_rad: f64, speed_rad_s: f64) {
+        let tick_s = self.span_s / self.angles_rad.len() as f64;
+        let ago = (1..=self.angles_rad.len()).rev();
+        for (angle, ticks) in self.angles_rad.iter_mut().zip(ago) {
+            *angle = T::from(angle_rad - speed_rad_s * tick_s * ticks as f64);
+        }
+        self.oldest = 0;
+    }
+
+    /// The mean speed over the control period that ends here, rad/s.
+    #[inline(always)]
+    fn speed_rad_s(&mut self, angle_rad: T) -> T {
+        let Some(oldest) = self.angles_rad.get_mut(self.oldest) else { return T::ZERO };
+        let by = angle_rad - *oldest;
+        *oldest = angle_rad;
+        self.oldest = if self.oldest + 1 < self.angles_rad.len() { self.oldest + 1 } else { 0 };
+        by / self.span_s
+    }
+
+    /// The scale's zero is moved: no motion is seen.
+    pub(super) fn shift(&mut self, by: T) {
+        self.angles_rad.iter_mut().for_each(|angle| *angle += by);
+    }
 }
 
 /// The way through one tick or several: where it began, and the shaft's own angle at both ends, rad.
@@ -38,7 +78,6 @@ impl<T: Real> Filters<T> {
     pub(super) const fn still() -> Self {
         Self {
             angle_rad: T::ZERO,
-            last_angle_rad: T::ZERO,
             speed_rad_s: T::ZERO,
             thrust_n: T::ZERO,
             last_thrust_n: T::ZERO,
@@ -103,13 +142,12 @@ impl<T: Real> Plant<T> {
         let f = &mut self.filters;
         f.angle_rad = angle;
         // Angle differenced at the control rate, then a first-order filter.
-        let raw = (angle - f.last_angle_rad) / self.tick_s;
+        let raw = self.counted.speed_rad_s(angle);
         f.speed_rad_s = match self.decays.speed {
             Some(left) => raw + (f.speed_rad_s - raw) * left,
             _ if self.sensors.encoder_counts_per_rev.is_some() => raw,
             _ => self.at.shaft_speed_rad_s,
         };
-        f.last_angle_rad = angle;
     }
 
     /// The filters of thrust and torque over some ticks through which both run straight to these.
@@ -174,11 +212,11 @@ impl<T: Real> Plant<T> {
             supply_v: T::from(self.supply_v),
             since_mean_rad_s2: self
                 .shows_a_bare_difference()
-                .then(|| (self.at.shaft_speed_rad_s - f.speed_rad_s) / (0.5 * self.tick_s)),
+                .then(|| (self.at.shaft_speed_rad_s - f.speed_rad_s) / (0.5 * self.counted.span_s)),
         }
     }
 
-    /// Whether the shown speed is the encoder's angle differenced over a tick, with no filter behind.
+    /// Whether the shown speed is the encoder's angle differenced over a control period, with no filter behind.
     fn shows_a_bare_difference(&self) -> bool {
         self.decays.speed.is_none() && self.sensors.encoder_counts_per_rev.is_some()
     }

@@ -24,7 +24,7 @@ pub use run::{Response, Stimulus, simulate, simulate_each};
 pub use state::{Balance, Course, Drive, Driven, Local, Sensed, Tick};
 
 use friction::Rub;
-use measuring::{Filters, Way};
+use measuring::{Counted, Filters, Way};
 use rates::Constants;
 use stiff::Slopes;
 use stiffness::Stiff;
@@ -74,6 +74,7 @@ pub struct Plant<T = f64> {
     current_a: T,
     time_s: f64,
     filters: Filters<T>,
+    counted: Counted<T>,
     /// What the sensors show, where effects are at work on them.
     sensed: Sensed<T>,
     supply_v: f64,
@@ -212,6 +213,7 @@ impl<T: Real> Plant<T> {
             current_a: T::ZERO,
             time_s: 0.0,
             filters: Filters::still(),
+            counted: Counted::over(1, tick_s),
             sensed: Sensed { supply_v: T::from(nominal_supply_v), ..Sensed::default() },
             supply_v: nominal_supply_v,
             true_thrust_n: T::ZERO,
@@ -231,6 +233,12 @@ impl<T: Real> Plant<T> {
         self
     }
 
+    /// Has the encoder differenced over this many ticks, where a control period is several steps of a simulation.
+    pub fn with_control_period(mut self, ticks: usize) -> Self {
+        self.counted = Counted::over(ticks, self.tick_s);
+        self
+    }
+
     /// Starts from a moving state instead of rest.
     pub fn start(
         &mut self,
@@ -247,7 +255,7 @@ impl<T: Real> Plant<T> {
         self.x[FLOW] = T::from(axial_m_s);
         self.x[ANGLE] = T::from(angle_rad);
         self.current_a = T::from(current_a);
-        self.filters.last_angle_rad = T::from(angle_rad - shaft_speed_rad_s * self.tick_s);
+        self.counted.came_to(angle_rad, shaft_speed_rad_s);
         self.filters.speed_rad_s = T::from(shaft_speed_rad_s);
         self.at = self.local_at(&self.x, self.current_a, 0.0, &Tick { time_s, ..Tick::default() });
         let mut balance = Balance::default();

@@ -30,7 +30,7 @@ impl<T: Real> Plant<T> {
             let by = behind * (1.4 * reach).min(1.0);
             self.x[SPEED] += behind * (reach * self.observer_rad_s);
             self.x[ANGLE] += by;
-            self.filters.last_angle_rad += by;
+            self.counted.shift(by);
         } else if let Some(speed) = tick.observed_speed_rad_s {
             let behind = T::from(speed) - shown.shaft_speed_rad_s;
             self.x[SPEED] += behind * reach.min(1.0);

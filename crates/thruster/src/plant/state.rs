@@ -215,8 +215,8 @@ pub struct Sensed<T = f64> {
     pub true_thrust_n: T,
     /// Supply, V.
     pub supply_v: T,
-    /// Where the shown speed is a bare difference of the encoder's angle over a tick, so the speed's mean over it: how fast
-    /// the speed itself left that mean since the middle of the tick, rad/s^2.
+    /// Where the shown speed is a bare difference of the encoder's angle over a control period, so the speed's mean over it:
+    /// how fast the speed itself left that mean since the middle of the period, rad/s^2.
     pub since_mean_rad_s2: Option<T>,
 }
 
