@@ -142,6 +142,7 @@ pub fn unused(series: &[Series], problem: &Problem) -> Option<String> {
         used.push(recording.driving.column());
         used.extend(recording.channels.iter().map(|c| c.response.name()));
         used.extend(recording.extra.as_deref());
+        used.extend(recording.is_loaded().then_some("torque_n_m"));
     }
     let mut left: Vec<&str> = series
         .iter()

@@ -7,7 +7,7 @@ use kort_thruster::parameters::Parameters;
 use kort_thruster::rig::Rig;
 
 use crate::checks;
-use crate::data::{DataError, Driving, Prepared, Series, counted_angle, possible_drivers, spread};
+use crate::data::{DataError, Driving, Prepared, Series, counted_angle, loaded, possible_drivers, spread};
 use crate::excerpt;
 use crate::held;
 use crate::hypothesis::{Hypothesis, Inputs, UNSTATED_TOL, nothing_stated};
@@ -125,9 +125,18 @@ impl<'a> Setup<'a> {
             let baseline = Hypothesis::baseline(model, rig, prescribed, inputs).with_sampling(&recordings);
             (Problem::new(model, rig, recordings, masked.clone(), criterion), baseline)
         };
-        let held = held::held(&recordings, rig);
         let (mut problem, mut baseline) = compared(recordings);
-        if let Some(held) = held {
+        let mut load = None;
+        for sign in loaded::SIGNS {
+            let Some(under_load) = loaded::loaded(&problem.recordings, series, rig, sign) else { break };
+            let (other, its) = compared(under_load);
+            if held::fits_better(&other, &its, &problem, &baseline) {
+                load = Some(loaded::words(sign));
+                (problem, baseline) = (other, its);
+            }
+        }
+        notes.extend(load);
+        if let Some(held) = held::held(&problem.recordings, rig) {
             let (other, as_held) = compared(held);
             if held::fits_better(&other, &as_held, &problem, &baseline) {
                 notes.push(held::words(&other.recordings));

@@ -1,6 +1,6 @@
 //! A recording made ready for simulation: inputs on the control grid, responses on the log grid.
 
-use kort_thruster::plant::{Course, Driven, Leap, Stimulus, Tick, load_inertia_kg_m2};
+use kort_thruster::plant::{Driven, Leap, Stimulus, Tick, load_inertia_kg_m2};
 use kort_thruster::rig::{AmplifierKind, Load, Rig};
 
 use crate::over_the_top::TOP_RAD;
@@ -14,6 +14,7 @@ mod driving;
 mod error;
 mod fill;
 mod grain;
+pub mod loaded;
 mod pauses;
 mod scale;
 mod start;
@@ -345,7 +346,6 @@ impl Prepared {
             let at = |column: &[f64], t: f64| linear(&self.time_s, column, row, t);
             ticks.push(Tick {
                 time_s,
-                command: 0.0,
                 driven: match self.driving {
                     Driving::Command(_) => Driven::Command,
                     Driving::Current => Driven::Current(at(&self.command, time_s), at(&self.command, next_s)),
@@ -360,12 +360,11 @@ impl Prepared {
                 shaft_angle_rad: angle.as_deref().map(|a| (at(a, time_s), at(a, next_s))),
                 depth_m: depth.as_deref().map(|d| at(d, time_s)),
                 temperature_c: temperature.as_deref().map(|d| at(d, time_s)),
-                extra: 0.0,
                 released: enabled.as_deref().is_some_and(|e| e[row] < 0.5),
                 observed_angle_rad: recorded_angle.as_deref().map(|a| at(a, next_s)),
                 observed_speed_rad_s: measured_speed.as_deref().filter(|_| signed).map(|s| at(s, next_s)),
                 observed_size_rad_s: measured_speed.as_deref().filter(|_| !signed).map(|s| at(s, next_s)),
-                course: Course::Any,
+                ..Tick::default()
             });
             i += 1;
         }

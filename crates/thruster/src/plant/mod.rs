@@ -378,6 +378,7 @@ impl<T: Real> Plant<T> {
             swirl_m_s: x[SWIRL],
             current_a,
             ambient_m_s: tick.ambient_at(part),
+            load_n_m: tick.load_at(part),
             depth_m: tick.depth_m,
             temperature_c: tick.temperature_c,
             thrust_n: T::ZERO,

@@ -72,7 +72,10 @@ impl<T: Real> Plant<T> {
             added_mass_kg: c.added_mass_kg,
             flux_kg_m: c.flux_kg_m,
             ambient_m_s: T::from(at.ambient_m_s),
-            load_torque_n_m: if c.load.pulls { c.load.torque_n_m(x[ANGLE], speed) } else { T::ZERO },
+            load_torque_n_m: match c.load.pulls {
+                true => c.load.torque_n_m(x[ANGLE], speed),
+                false => T::from(-at.load_n_m),
+            },
             friction_ahead_n_m: T::ZERO,
             friction_astern_n_m: T::ZERO,
             blade_torque_n_m: T::ZERO,

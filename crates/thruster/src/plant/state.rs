@@ -15,6 +15,8 @@ pub struct Tick {
     pub driven: Driven,
     /// Ambient axial flow at start and end, m/s; positive when it feeds the propeller ahead.
     pub ambient_m_s: (f64, f64),
+    /// Recorded torque that a load takes from a dry shaft at start and end, N m; positive brakes a shaft that turns ahead.
+    pub load_n_m: (f64, f64),
     /// Recorded supply, V.
     pub supply_v: Option<f64>,
     /// Recorded shaft angle at start and end, rad: keeps effects that follow the angle in phase.
@@ -76,6 +78,10 @@ impl Tick {
         self.ambient_m_s.0 + (self.ambient_m_s.1 - self.ambient_m_s.0) * part
     }
 
+    pub(super) fn load_at(&self, part: f64) -> f64 {
+        self.load_n_m.0 + (self.load_n_m.1 - self.load_n_m.0) * part
+    }
+
     pub(super) fn angle_at(&self, part: f64) -> Option<f64> {
         self.shaft_angle_rad.map(|(a, b)| a + (b - a) * part)
     }
@@ -121,6 +127,8 @@ pub struct Local<T = f64> {
     pub current_a: T,
     /// Ambient axial flow, m/s.
     pub ambient_m_s: f64,
+    /// Measured torque that a load takes from a dry shaft, N m.
+    pub load_n_m: f64,
     /// Depth, m, if known.
     pub depth_m: Option<f64>,
     /// Temperature, deg C, if known.
@@ -141,6 +149,7 @@ impl<T: Real> Local<T> {
             |a: T, b: T| (a.re() - b.re()).abs() <= 1e-12 * (a.re().abs() + b.re().abs()) && a.same_slopes(b);
         near(self.current_a, before.current_a)
             && near(T::from(self.ambient_m_s), T::from(before.ambient_m_s))
+            && near(T::from(self.load_n_m), T::from(before.load_n_m))
             && near(self.shaft_speed_rad_s, before.shaft_speed_rad_s)
             && (!HOOKED
                 || near(self.shaft_angle_rad, before.shaft_angle_rad)
@@ -254,7 +263,7 @@ macro_rules! at_rest {
 at_rest! {
     Local {
         shaft_speed_rad_s shaft_angle_rad axial_m_s swirl_m_s current_a thrust_n blade_torque_n_m,
-        time_s ambient_m_s depth_m temperature_c
+        time_s ambient_m_s load_n_m depth_m temperature_c
     }
     Foil { speed_m_s normal_m_s chordwise_m_s sin_2a one_minus_cos_2a lift drag density_kg_m3 }
     Balance {
