@@ -125,18 +125,18 @@ impl<'a> Setup<'a> {
             let baseline = Hypothesis::baseline(model, rig, prescribed, inputs).with_sampling(&recordings);
             (Problem::new(model, rig, recordings, masked.clone(), criterion), baseline)
         };
-        let (mut problem, mut baseline) = compared(recordings);
-        let mut load = None;
+        let (mut problem, mut baseline) = compared(recordings.clone());
+        let (mut recordings, mut load) = (recordings, None);
         for sign in loaded::SIGNS {
-            let Some(under_load) = loaded::loaded(&problem.recordings, series, rig, sign) else { break };
-            let (other, its) = compared(under_load);
+            let Some(under_load) = loaded::loaded(&recordings, series, rig, sign) else { break };
+            let (other, its) = compared(under_load.clone());
             if held::fits_better(&other, &its, &problem, &baseline) {
                 load = Some(loaded::words(sign));
-                (problem, baseline) = (other, its);
+                (problem, baseline, recordings) = (other, its, under_load);
             }
         }
         notes.extend(load);
-        if let Some(held) = held::held(&problem.recordings, rig) {
+        if let Some(held) = held::held(&recordings, rig) {
             let (other, as_held) = compared(held);
             if held::fits_better(&other, &as_held, &problem, &baseline) {
                 notes.push(held::words(&other.recordings));

@@ -307,7 +307,7 @@ fn run<T: Real>(
     let mut next = stimulus.logs.iter().enumerate().peekable();
     let mut before = plant.sensed();
     let mut last_row = before;
-    let every_period = recording.every_command;
+    let every_period = recording.ticks_per_row <= recording.ticks_per_period;
     let mut log = |row: usize, now: &Sensed<T>, step: (&Sensed<T>, &Sensed<T>), step_s: f64| {
         let row_s = if row == 0 { tick_s } else { time_s[row] - time_s[row - 1] };
         show(row, &Instant { now, step, step_s, last_row: &last_row, row_s, every_period });
