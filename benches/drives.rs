@@ -19,7 +19,8 @@ use common::Site;
 use common::bench::Bench;
 use kort_emulators::vesc::Make;
 use kort_emulators::{
-    Adapter, ArduSub, Bench as Emulator, Cia402, Moteus, ODrive, Vesc, ardusub, cia402, moteus,
+    Adapter, Amplifier, ArduSub, Bench as Emulator, Cia402, Moteus, ODrive, Vesc, ardusub, cia402, iio,
+    moteus,
 };
 use kort_proto::messages::{Command, DriveKind, Outcome, RequestKind, Telemetry};
 use kort_proto::transport::{Ticker, monotonic_ns};
@@ -73,6 +74,18 @@ fn main() {
     let text = text.replace("whitcomb-yoerger-1999", "t200-vehicle");
     std::fs::write(site.config(), text).expect("a configuration");
     measure("mavlink", site, Some(emulator), VOLTS, seconds);
+    let emulator = Emulator::start_in_folder(Amplifier::new(iio::Make::default(), &rig)).expect("a folder");
+    let at = |file: &str| emulator.port().join(file);
+    let keys = format!(
+        "dac = {:?}, gain_a_per_v = 2.0, limit_v = 10.0, watchdog = {:?}, enabled = {:?}, timeout_ms = 200, rate_hz = 500, reading_life_ms = 200, \
+         current = {{ adc = {:?}, gain_a_per_v = 2.0 }}, counter = {{ count = {:?}, counts_per_turn = 4096 }}",
+        at("iio:device0/out_voltage0"),
+        at("leds/watchdog/brightness"),
+        at("gpio/enabled/value"),
+        at("iio:device1/in_voltage0"),
+        at("counter0/count0")
+    );
+    measure("iio", Site::new().with_drive("iio", &keys), Some(emulator), AMPERES, seconds);
 }
 
 fn measure(name: &str, site: Site, emulator: Option<Emulator>, stairs: Stairs, seconds: u64) {

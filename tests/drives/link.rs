@@ -1,4 +1,4 @@
-//! What is asked of every drive on a wire, whatever it speaks.
+//! What is asked of every real drive, whatever it speaks.
 
 use std::time::{Duration, Instant};
 
@@ -41,8 +41,10 @@ pub fn rig(name: &str) -> Rig {
 pub struct Case {
     /// Name in `amplifier`.
     pub kind: &'static str,
-    /// Keys of `drive` beside its port.
+    /// Keys of `drive` beside where it is.
     pub keys: &'static str,
+    /// Those that say where it is.
+    pub place: fn(&Emulator) -> String,
     /// Drive that makes the shaft turn, in the unit of the drive.
     pub drive: f64,
     /// The command that carries it.
@@ -64,6 +66,7 @@ impl Case {
         Self {
             kind,
             keys,
+            place: |emulator| format!("port = {:?}", emulator.port()),
             drive: 4.0,
             command,
             rig: RIG,
@@ -74,7 +77,7 @@ impl Case {
     }
 
     /// After this the drive itself has taken the torque away; it may look at it every 10 ms only.
-    fn timeout(&self) -> Duration {
+    pub fn timeout(&self) -> Duration {
         Duration::from_millis(self.timeout_ms + 10)
     }
 
@@ -87,8 +90,8 @@ impl Case {
 
     pub fn site(&self, emulator: &Emulator) -> Site {
         let keys = format!(
-            "port = {:?}, reading_life_ms = {LIFE_MS}, timeout_ms = {}, {}",
-            emulator.port(),
+            "{}, reading_life_ms = {LIFE_MS}, timeout_ms = {}, {}",
+            (self.place)(emulator),
             self.timeout_ms,
             self.keys
         );

@@ -5,6 +5,7 @@ mod calibrate;
 mod cia402;
 #[path = "../common/mod.rs"]
 mod common;
+mod iio;
 mod link;
 mod mavlink;
 mod moteus;

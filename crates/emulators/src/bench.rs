@@ -1,4 +1,4 @@
-//! Any device on a pseudo terminal or behind UDP, served by a thread, with a wire that can be spoiled.
+//! Any device on a pseudo terminal, behind UDP or behind files, served by a thread, with a wire that can be spoiled.
 
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -10,9 +10,9 @@ use kort_proto::transport::{monotonic_ns, realtime};
 use crate::far::Far;
 
 /// How often the device lives.
-const STEP: Duration = Duration::from_micros(500);
+pub(crate) const STEP: Duration = Duration::from_micros(500);
 /// Priority of the device where the system permits, below the servo's.
-const PRIORITY: i32 = 60;
+pub(crate) const PRIORITY: i32 = 60;
 /// The device's name in its folder.
 const PORT: &str = "port";
 /// Changes of the command that are kept.
@@ -74,7 +74,7 @@ pub enum Mischief {
 }
 
 #[derive(Default)]
-struct Shared {
+pub(crate) struct Shared {
     mischief: Mischief,
     restart: bool,
     report: Option<u32>,
@@ -85,6 +85,37 @@ struct Shared {
     heard: u64,
     /// When the power stage was asked for something else, on CLOCK_MONOTONIC, ns, and for what.
     commands: Vec<(u64, f64)>,
+}
+
+/// What a test asked for since the device lived last.
+pub(crate) struct Asked {
+    pub(crate) mischief: Mischief,
+    pub(crate) restart: bool,
+    pub(crate) report: Option<u32>,
+}
+
+impl Shared {
+    /// What is asked for; none: the device ends.
+    pub(crate) fn asked(&mut self) -> Option<Asked> {
+        let (restart, report) = (std::mem::take(&mut self.restart), self.report.take());
+        (!self.ending).then_some(Asked { mischief: self.mischief, restart, report })
+    }
+
+    /// The device lived on, heard so many bytes at this instant on CLOCK_MONOTONIC, ns, and this is true of it now.
+    pub(crate) fn lived(&mut self, heard_ns: u64, truth: Truth, heard: u64) {
+        let before = std::mem::replace(&mut self.truth, truth);
+        if truth.command != before.command && self.commands.len() < COMMANDS_MAX {
+            self.commands.push((heard_ns, truth.command));
+        }
+        self.heard += heard;
+        if truth.command != 0.0 {
+            self.driven = Some(Instant::now());
+        }
+    }
+}
+
+pub(crate) fn lock(shared: &Mutex<Shared>) -> MutexGuard<'_, Shared> {
+    shared.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// A device, running.
@@ -116,11 +147,19 @@ impl Bench {
     }
 
     fn start_on(device: impl Device + 'static, folder: tempfile::TempDir, far: Far) -> std::io::Result<Self> {
+        let port = far.name();
+        Self::serve(folder, port, |shared| Serving { device, shared, last: Vec::new(), dice: 1 }.run(far))
+    }
+
+    /// Starts the thread behind a port, whose name lies in this folder.
+    pub(crate) fn serve(
+        folder: tempfile::TempDir,
+        port: PathBuf,
+        run: impl FnOnce(Arc<Mutex<Shared>>) + Send + 'static,
+    ) -> std::io::Result<Self> {
         let shared = Arc::new(Mutex::new(Shared::default()));
-        let (theirs, port) = (Arc::clone(&shared), far.name());
-        let thread = std::thread::Builder::new()
-            .name("emulator".into())
-            .spawn(move || Serving { device, shared: theirs, last: Vec::new(), dice: 1 }.run(far))?;
+        let theirs = Arc::clone(&shared);
+        let thread = std::thread::Builder::new().name("emulator".into()).spawn(move || run(theirs))?;
         Ok(Self { _folder: folder, port, shared, thread: Some(thread) })
     }
 
@@ -165,7 +204,7 @@ impl Bench {
     }
 
     fn lock(&self) -> MutexGuard<'_, Shared> {
-        self.shared.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.shared)
     }
 }
 
@@ -195,13 +234,7 @@ impl<D: Device> Serving<D> {
             far.wait(STEP);
             let heard_ns = monotonic_ns();
             let now_s = began.elapsed().as_secs_f64();
-            let (mischief, restart, report) = {
-                let mut shared = self.shared.lock().unwrap_or_else(PoisonError::into_inner);
-                if shared.ending {
-                    return;
-                }
-                (shared.mischief, std::mem::take(&mut shared.restart), shared.report.take())
-            };
+            let Some(Asked { mischief, restart, report }) = lock(&self.shared).asked() else { return };
             if restart {
                 self.device.restart(now_s);
             }
@@ -215,16 +248,7 @@ impl<D: Device> Serving<D> {
             for frame in said {
                 self.send(&far, frame, mischief);
             }
-            let mut shared = self.shared.lock().unwrap_or_else(PoisonError::into_inner);
-            let before = std::mem::replace(&mut shared.truth, self.device.truth());
-            let command = shared.truth.command;
-            if command != before.command && shared.commands.len() < COMMANDS_MAX {
-                shared.commands.push((heard_ns, command));
-            }
-            shared.heard += bytes.len() as u64;
-            if shared.truth.command != 0.0 {
-                shared.driven = Some(Instant::now());
-            }
+            lock(&self.shared).lived(heard_ns, self.device.truth(), bytes.len() as u64);
         }
     }
 

@@ -1,4 +1,4 @@
-//! Drives and instruments on pseudo terminals, or behind UDP, for tests.
+//! Drives and instruments on pseudo terminals, behind UDP, or behind files as the kernel shows them, for tests.
 //!
 //! Each is written from the protocol's public description and shares no code with kort's drivers: its framing, its check sums
 //! and its text are its own. Behind each a simulated thruster turns in real time, with the drive's own limits, quantisation and
@@ -12,6 +12,8 @@ mod bench;
 mod canopen;
 pub mod cia402;
 mod far;
+mod folder;
+pub mod iio;
 mod mavlink;
 pub mod moteus;
 pub mod odrive;
@@ -24,6 +26,8 @@ pub mod vesc;
 pub use ardusub::ArduSub;
 pub use bench::{Bench, Device, Mischief, Truth};
 pub use cia402::Cia402;
+pub use folder::InFiles;
+pub use iio::Amplifier;
 pub use moteus::Moteus;
 pub use odrive::ODrive;
 pub use printer::Printer;

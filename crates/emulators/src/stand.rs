@@ -72,6 +72,12 @@ impl Stand {
         self.plant.truth().shaft_angle_rad
     }
 
+    /// Shaft angle at an instant since the last step, s, by the speed of that step, rad.
+    pub fn shaft_angle_rad_at(&self, time_s: f64) -> f64 {
+        let since_s = (time_s - self.time_s).clamp(0.0, STEP_S);
+        self.shaft_angle_rad() + self.shaft_speed_rad_s() * since_s
+    }
+
     /// What is true while the power stage is asked for this command, in the amplifier's unit.
     pub fn truth(&self, command: f64) -> Truth {
         let at = self.plant.truth();

@@ -19,6 +19,7 @@ mod process;
 pub mod sensors;
 pub mod settings;
 mod still;
+pub mod sysfs;
 pub mod tick;
 
 #[cfg(feature = "process")]

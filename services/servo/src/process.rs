@@ -117,7 +117,7 @@ fn ports_apart(
 ) -> Result<(), ConfigError> {
     let drive = match drive {
         drives::Chosen::OnWire(wired, _) => Some(("drive".to_owned(), &wired.port)),
-        drives::Chosen::Simulated(_) => None,
+        drives::Chosen::Simulated(_) | drives::Chosen::Iio(_) => None,
     };
     let sensors = sensors.iter().filter_map(|sensor| match &sensor.kind {
         sensors::Kind::SerialLine(line) => Some((format!("sensors.{}", sensor.name), &line.port)),

@@ -7,8 +7,8 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use kort_emulators::{
-    Adapter, ArduSub, Bench, Cia402, Device, Mischief, Moteus, ODrive, Printer, Truth, Vesc, ardusub, cia402,
-    moteus, vesc,
+    Adapter, Amplifier, ArduSub, Bench, Cia402, Device, Mischief, Moteus, ODrive, Printer, Truth, Vesc,
+    ardusub, cia402, iio, moteus, vesc,
 };
 use kort_proto::config::Config;
 use kort_proto::faults::Fault;
@@ -292,4 +292,52 @@ fn a_slow_instrument_does_not_cost_the_drive_its_first_ticks() {
     let mut devices = Devices::start(drive, sensors, "t1", 0).unwrap();
     let _instrument = speaks.join();
     assert_eq!(devices.show(At { now_ns: monotonic_ns(), ticks: 1 }).faults, 0);
+}
+
+/// A loop that stands still while the thread behind the drive lives on gives no pulse: a DAC keeps its volts, and the watchdog
+/// in the amplifier's enable takes the torque away. What comes back by itself then drives nothing.
+#[test]
+fn an_amplifier_whose_ticks_stop_loses_its_enable() {
+    let emulator = Bench::start_in_folder(Amplifier::new(iio::Make::default(), &rig())).unwrap();
+    let at = |file: &str| emulator.port().join(file);
+    let drive = format!(
+        "\"iio\"\ndrive = {{ dac = {:?}, gain_a_per_v = 2.0, limit_v = 10.0, watchdog = {:?}, enabled = {:?}, timeout_ms = 300, \
+         current = {{ adc = {:?}, gain_a_per_v = 2.0 }}, counter = {{ count = {:?}, counts_per_turn = 4096 }} }}",
+        at("iio:device0/out_voltage0"),
+        at("leds/watchdog/brightness"),
+        at("gpio/enabled/value"),
+        at("iio:device1/in_voltage0"),
+        at("counter0/count0")
+    );
+    let text = include_str!("../../../config/kort.toml")
+        .replace("amplifier = \"simulated\"", &format!("amplifier = {drive}"));
+    let config = Config::parse(&text, None).unwrap();
+    let drive = drives::choose(&config, "t1", config.thruster("t1").unwrap(), &rig()).unwrap();
+    let mut devices = Devices::new(drive.start("t1", 0).unwrap(), Vec::new(), monotonic_ns());
+    let mut tick = |drive: Option<f64>| {
+        let faults = devices.show(At { now_ns: monotonic_ns(), ticks: 1 }).faults;
+        devices.drive(monotonic_ns(), drive.filter(|_| faults == 0));
+        std::thread::sleep(Duration::from_millis(1));
+        faults
+    };
+    let end = Instant::now() + PATIENCE;
+    while emulator.truth().command < 0.9 {
+        tick(Some(1.0));
+        assert!(Instant::now() < end, "it is never driven: {:?}", emulator.truth());
+    }
+    let stopped = Instant::now();
+    while emulator.truth().command != 0.0 {
+        assert!(Instant::now() < end, "it drives on: {:?}", emulator.truth());
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let took = emulator.driven().unwrap().saturating_duration_since(stopped);
+    assert!(took < Duration::from_millis(300), "{took:?}");
+    // The first ticks after it find the enable fallen.
+    let driven = emulator.driven();
+    let mut seen = 0;
+    for _ in 0..100 {
+        seen |= tick(Some(1.0));
+    }
+    assert!(seen & Fault::AmplifierFault.bit() != 0, "{seen:#x}");
+    assert_eq!(emulator.driven(), driven, "it drove again by itself");
 }

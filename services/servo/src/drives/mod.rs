@@ -1,6 +1,7 @@
 //! Drives. One drive, one file, behind one trait; the loop knows no hardware.
 
 pub mod cia402;
+pub mod iio;
 mod lying;
 pub mod mavlink;
 pub mod moteus;
@@ -17,6 +18,7 @@ use crate::devices::{At, Shown};
 use crate::link::Protocol;
 
 use cia402::Cia402;
+use iio::Iio;
 use mavlink::Mavlink;
 use moteus::Moteus;
 use odrive::ODrive;
@@ -46,10 +48,12 @@ pub enum Chosen {
     Simulated(Box<Simulated>),
     /// A drive on a wire, and what is said on it.
     OnWire(Wired, Box<dyn Protocol>),
+    /// An analogue amplifier behind the kernel's files.
+    Iio(Box<Iio>),
 }
 
 /// Names of the drives, as `amplifier` gives them.
-pub const ALL: [&str; 6] = ["simulated", "vesc", "odrive", "moteus", "cia402", "mavlink"];
+pub const ALL: [&str; 7] = ["simulated", "vesc", "odrive", "moteus", "cia402", "mavlink", "iio"];
 
 /// Reads what the configuration says of the drive.
 ///
@@ -78,6 +82,7 @@ pub fn choose(config: &Config, id: &str, thruster: &Thruster, rig: &Rig) -> Resu
             let drive = Mavlink::new(config, id, thruster, rig)?;
             Ok(Chosen::OnWire(drive.wired.clone(), Box::new(mavlink::Protocol::new(drive))))
         }
+        "iio" => Ok(Chosen::Iio(Box::new(Iio::new(config, id, thruster, rig)?))),
         other => Err(config.error(format!(
             "`thrusters.{id}.amplifier` = \"{other}\" is no drive\nhint: known are \"{}\"",
             ALL.join("\", \"")
@@ -97,6 +102,7 @@ impl Chosen {
             Self::OnWire(wired, protocol) => {
                 Ok(Box::new(crate::link::Link::start(wired.wire(id, priority), protocol)?))
             }
+            Self::Iio(iio) => Ok(Box::new(iio.start(id, priority)?)),
         }
     }
 }

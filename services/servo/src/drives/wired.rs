@@ -28,12 +28,13 @@ struct Keys {
 
 impl Default for Keys {
     fn default() -> Self {
+        let times = Times::default();
         Self {
             port: PathBuf::new(),
             baud: 115_200,
-            rate_hz: 200.0,
-            timeout_ms: 100.0,
-            reading_life_ms: 50.0,
+            rate_hz: times.rate_hz,
+            timeout_ms: times.timeout_ms,
+            reading_life_ms: times.reading_life_ms,
             reversed: false,
             identity: String::new(),
             pole_pairs: None,
@@ -43,6 +44,62 @@ impl Default for Keys {
             speed_units: None,
             motor: None,
         }
+    }
+}
+
+/// How often every real drive is spoken to, and how long it may be silent.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Times {
+    pub(super) rate_hz: f64,
+    pub(super) timeout_ms: f64,
+    pub(super) reading_life_ms: f64,
+}
+
+impl Default for Times {
+    fn default() -> Self {
+        Self { rate_hz: 200.0, timeout_ms: 100.0, reading_life_ms: 50.0 }
+    }
+}
+
+impl Times {
+    /// An error begins with its key, behind the section's name.
+    pub(super) fn check(&self, thruster: &Thruster) -> Result<(), String> {
+        for (key, value, low, high, hint) in [
+            (
+                "rate_hz",
+                self.rate_hz,
+                10.0,
+                thruster.servo.rate_hz,
+                "200; at most the servo's rate and what the wire carries",
+            ),
+            ("timeout_ms", self.timeout_ms, 20.0, 1000.0, "100: torque outlives a broken cable by this time"),
+            (
+                "reading_life_ms",
+                self.reading_life_ms,
+                5.0,
+                1000.0,
+                "50: three answers and more may be lost in it",
+            ),
+        ] {
+            if !(low..=high).contains(&value) {
+                return Err(format!("{key}` = {value} is outside {low} to {high}\nhint: {hint}"));
+            }
+        }
+        let period_ms = 1e3 / self.rate_hz;
+        for (key, value) in [("timeout_ms", self.timeout_ms), ("reading_life_ms", self.reading_life_ms)] {
+            if value < 3.0 * period_ms {
+                return Err(format!(
+                    "{key}` = {value} is less than three exchanges at rate_hz = {}\nhint: {} or more, or a faster exchange",
+                    self.rate_hz,
+                    3.0 * period_ms
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    pub(super) fn reading_life_ns(&self) -> u64 {
+        (self.reading_life_ms * 1e6) as u64
     }
 }
 
@@ -112,47 +169,24 @@ impl Wired {
                 "is missing\nhint: the drive's device, best by its serial number: /dev/serial/by-id/…".into(),
             );
         }
-        for (key, value, low, high, hint) in [
-            ("baud", f64::from(keys.baud), 1200.0, 12_000_000.0, "115200; an USB device takes any"),
-            (
-                "rate_hz",
-                keys.rate_hz,
-                10.0,
-                thruster.servo.rate_hz,
-                "200; at most the servo's rate and what the wire carries",
-            ),
-            ("timeout_ms", keys.timeout_ms, 20.0, 1000.0, "100: torque outlives a broken cable by this time"),
-            (
-                "reading_life_ms",
-                keys.reading_life_ms,
-                5.0,
-                1000.0,
-                "50: three answers and more may be lost in it",
-            ),
-        ] {
-            if !(low..=high).contains(&value) {
-                return fail(key, format!("= {value} is outside {low} to {high}\nhint: {hint}"));
-            }
+        if !(1200..=12_000_000).contains(&keys.baud) {
+            return fail(
+                "baud",
+                format!("= {} is outside 1200 to 12000000\nhint: 115200; an USB device takes any", keys.baud),
+            );
         }
-        let period_ms = 1e3 / keys.rate_hz;
-        for (key, value) in [("timeout_ms", keys.timeout_ms), ("reading_life_ms", keys.reading_life_ms)] {
-            if value < 3.0 * period_ms {
-                return fail(
-                    key,
-                    format!(
-                        "= {value} is less than three exchanges at rate_hz = {}\nhint: {} or more, or a faster exchange",
-                        keys.rate_hz,
-                        3.0 * period_ms
-                    ),
-                );
-            }
-        }
+        let times = Times {
+            rate_hz: keys.rate_hz,
+            timeout_ms: keys.timeout_ms,
+            reading_life_ms: keys.reading_life_ms,
+        };
+        times.check(thruster).map_err(|words| config.error(format!("`{section}.{words}")))?;
         Ok(Self {
             medium: Medium::Serial { port: keys.port.clone(), baud: keys.baud },
             port: keys.port,
             rate_hz: keys.rate_hz,
             timeout_s: keys.timeout_ms * 1e-3,
-            reading_life_ns: (keys.reading_life_ms * 1e6) as u64,
+            reading_life_ns: times.reading_life_ns(),
             reversed: keys.reversed,
             identity: keys.identity.to_ascii_lowercase(),
             pole_pairs: keys.pole_pairs,

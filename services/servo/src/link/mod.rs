@@ -27,6 +27,10 @@ use kort_proto::signals::Signals;
 
 pub use lines::Lines;
 #[cfg(feature = "process")]
+pub(crate) use thread::{below_the_loop, printable};
+#[cfg(feature = "process")]
+pub(crate) use wire::{Ends, Told};
+#[cfg(feature = "process")]
 pub use wire::{Link, Wire};
 
 /// What leads to a device.

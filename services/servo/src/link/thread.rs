@@ -14,7 +14,7 @@ use triple_buffer::{Input, Output};
 
 use super::port::Port;
 use super::stamps::Stamps;
-use super::wire::{Command, Told, Wire};
+use super::wire::{Command, Ends, Told, Wire};
 use super::{Heard, Protocol};
 
 /// Pause before a port that could not be opened, or was lost, is tried again.
@@ -45,14 +45,8 @@ pub(super) struct Serving {
 }
 
 impl Serving {
-    pub(super) fn new(
-        wire: Wire,
-        protocol: Box<dyn Protocol>,
-        commands: Output<Command>,
-        tell: Input<Told>,
-        waker: Arc<OwnedFd>,
-        ending: Arc<AtomicBool>,
-    ) -> Self {
+    pub(super) fn new(wire: Wire, protocol: Box<dyn Protocol>, ends: Ends) -> Self {
+        let Ends { commands, tell, waker, ending } = ends;
         let stamps = Stamps::new(protocol.ages(), wire.reading_life_ns);
         Self {
             wire,
@@ -72,12 +66,7 @@ impl Serving {
     }
 
     pub(super) fn run(mut self) {
-        if self.wire.priority > 0 {
-            // What is not permitted the loop's own thread has said.
-            let _ = realtime((self.wire.priority - 1).max(1), false);
-        } else {
-            ordinary();
-        }
+        below_the_loop(self.wire.priority);
         while !self.ending.load(Ordering::Relaxed) {
             let done = Port::open(&self.wire.medium).and_then(|mut port| self.serve(&mut port));
             if let Err(error) = done {
@@ -257,8 +246,18 @@ impl Serving {
     }
 }
 
+/// Puts this thread just below the loop, whose priority this is.
+pub(crate) fn below_the_loop(priority: i32) {
+    if priority > 0 {
+        // What is not permitted the loop's own thread has said.
+        let _ = realtime((priority - 1).max(1), false);
+    } else {
+        ordinary();
+    }
+}
+
 /// Words with something of a device in them, as they may stand in a log: no control character but the break before a hint.
-fn printable(words: &str) -> String {
+pub(crate) fn printable(words: &str) -> String {
     let escaped =
         |c: char| if c.is_control() && c != '\n' { c.escape_default().collect() } else { c.to_string() };
     words.chars().map(escaped).collect()

@@ -39,27 +39,27 @@ pub struct Wire {
 
 /// Newest command of the tick.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Command {
-    pub(super) drive: Option<f64>,
+pub(crate) struct Command {
+    pub(crate) drive: Option<f64>,
 }
 
 /// Newest word of the device.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Told {
-    pub(super) readings: u64,
-    pub(super) stamp_ns: u64,
-    pub(super) signals: Signals,
-    pub(super) faults: u64,
-    pub(super) restarts: u32,
-    pub(super) guarded: bool,
+pub(crate) struct Told {
+    pub(crate) readings: u64,
+    pub(crate) stamp_ns: u64,
+    pub(crate) signals: Signals,
+    pub(crate) faults: u64,
+    pub(crate) restarts: u32,
+    pub(crate) guarded: bool,
 }
 
 impl Told {
-    pub(super) const NOTHING: Self =
+    pub(crate) const NOTHING: Self =
         Self { readings: 0, stamp_ns: 0, signals: Signals::UNKNOWN, faults: 0, restarts: 0, guarded: false };
 
     /// Takes a reading, if it is known when it was taken.
-    pub(super) fn take(&mut self, signals: Signals, stamp_ns: Option<u64>) {
+    pub(crate) fn take(&mut self, signals: Signals, stamp_ns: Option<u64>) {
         if let Some(stamp_ns) = stamp_ns {
             self.readings = self.readings.wrapping_add(1);
             (self.stamp_ns, self.signals) = (stamp_ns, signals);
@@ -67,7 +67,16 @@ impl Told {
     }
 }
 
-/// The tick's end of a wire.
+/// The device's end of what a thread and the tick leave for each other.
+pub(crate) struct Ends {
+    pub(crate) commands: Output<Command>,
+    pub(crate) tell: Input<Told>,
+    /// A counter that each tick adds to.
+    pub(crate) waker: Arc<OwnedFd>,
+    pub(crate) ending: Arc<AtomicBool>,
+}
+
+/// The tick's end of a wire, or of whatever else a thread serves.
 pub struct Link {
     life_ns: u64,
     commands: Input<Command>,
@@ -84,16 +93,27 @@ impl Link {
     /// # Errors
     /// No thread or no descriptor is to be had.
     pub fn start(wire: Wire, protocol: Box<dyn Protocol>) -> std::io::Result<Self> {
+        let (life_ns, is_drive) = (wire.reading_life_ns, wire.is_drive);
+        Self::spawn(life_ns, is_drive, |ends| thread::Serving::new(wire, protocol, ends).run())
+    }
+
+    /// The same with a thread that serves a device in its own way.
+    ///
+    /// # Errors
+    /// No thread or no descriptor is to be had.
+    pub(crate) fn spawn(
+        life_ns: u64,
+        is_drive: bool,
+        serve: impl FnOnce(Ends) + Send + 'static,
+    ) -> std::io::Result<Self> {
         let (commands, newest) = triple_buffer(&Command { drive: None });
         // Until the thread has confirmed something else.
-        let lost = if wire.is_drive { Fault::DriveLost.bit() } else { 0 };
+        let lost = if is_drive { Fault::DriveLost.bit() } else { 0 };
         let (tell, told) = triple_buffer(&Told { faults: lost, ..Told::NOTHING });
         let waker = Arc::new(eventfd(0, EventfdFlags::NONBLOCK | EventfdFlags::CLOEXEC)?);
         let ending = Arc::new(AtomicBool::new(false));
-        let life_ns = wire.reading_life_ns;
-        let serving =
-            thread::Serving::new(wire, protocol, newest, tell, Arc::clone(&waker), Arc::clone(&ending));
-        let thread = std::thread::Builder::new().name("device".into()).spawn(move || serving.run())?;
+        let ends = Ends { commands: newest, tell, waker: Arc::clone(&waker), ending: Arc::clone(&ending) };
+        let thread = std::thread::Builder::new().name("device".into()).spawn(move || serve(ends))?;
         let mut link =
             Self { life_ns, commands, told, seen: Told::NOTHING, waker, ending, thread: Some(thread) };
         let end = std::time::Instant::now() + PATIENCE;

@@ -2,16 +2,16 @@
 //! quadrature counter. The kernel shows them as files; one read of one file is one conversion, which may take
 //! milliseconds, so a thread of its own reads them.
 //!
-//! Read for this: the kernel's `Documentation/ABI/testing/sysfs-bus-iio` and `sysfs-bus-counter`. A channel `in_voltage0` has
-//! `in_voltage0_raw`, and mostly `in_voltage0_scale` and `in_voltage0_offset`; (raw + offset) scale is in millivolts
-//! (milliamperes for currents). A counter is the file `count0/count`, in counts. What a millivolt or a count means is the bench's
-//! own: `scale` and `offset` say it.
+//! What the kernel's scale and offset make of a raw value is in millivolts, of a current in milliamperes, and a counter
+//! (`count0/count`) is in counts ([`crate::sysfs`]). What a millivolt or a count means is the bench's own: `scale` and
+//! `offset` say it.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use kort_proto::signals::{SIGNALS, Signals};
 
 use super::Channel;
+use crate::sysfs;
 
 /// A folder of channels as the configuration describes it.
 #[derive(Clone, Debug)]
@@ -24,17 +24,10 @@ pub struct Iio {
     pub channels: Vec<Channel<String>>,
 }
 
-/// A channel that was found: its file, and the kernel's own offset and scale.
-struct Open {
-    file: PathBuf,
-    offset: f64,
-    scale: f64,
-}
-
 /// All channels of a folder.
 pub struct Reader {
     iio: Iio,
-    open: Vec<Open>,
+    open: Vec<sysfs::Channel>,
 }
 
 impl Reader {
@@ -49,15 +42,14 @@ impl Reader {
     /// The file that is not there or holds no number, with a hint.
     pub fn read(&mut self) -> Result<Signals, String> {
         if self.open.is_empty() {
-            let channels = self.iio.channels.iter();
-            self.open =
-                channels.map(|channel| open(&self.iio.path, &channel.from)).collect::<Result<_, _>>()?;
+            let find = |channel: &Channel<String>| sysfs::Channel::find(&self.iio.path, &channel.from);
+            self.open = self.iio.channels.iter().map(find).collect::<Result<_, _>>()?;
         }
         let mut signals = Signals::UNKNOWN;
         for (channel, open) in self.iio.channels.iter().zip(&self.open) {
-            let raw = number(&open.file)?;
+            let value = open.read()?;
             if let Some(signal) = SIGNALS.get(channel.place) {
-                (signal.set)(&mut signals, channel.si((raw + open.offset) * open.scale));
+                (signal.set)(&mut signals, channel.si(value));
             }
         }
         Ok(signals)
@@ -74,42 +66,10 @@ impl Reader {
     }
 }
 
-fn open(folder: &Path, channel: &str) -> Result<Open, String> {
-    let with = |end: &str| folder.join(format!("{channel}{end}"));
-    let optional = |end: &str, without: f64| {
-        let file = with(end);
-        if file.exists() { number(&file) } else { Ok(without) }
-    };
-    // A raw value comes with offset and scale; a processed one, and a counter's file, stand for themselves.
-    if with("_raw").exists() {
-        return Ok(Open {
-            file: with("_raw"),
-            offset: optional("_offset", 0.0)?,
-            scale: optional("_scale", 1.0)?,
-        });
-    }
-    let file = [with("_input"), with("")].into_iter().find(|file| file.is_file());
-    let file = file.ok_or_else(|| {
-        format!(
-            "{}: there is neither {channel}_raw nor {channel}_input nor {channel}\nhint: `ls` there shows the channels",
-            folder.display()
-        )
-    })?;
-    Ok(Open { file, offset: 0.0, scale: 1.0 })
-}
-
-fn number(file: &Path) -> Result<f64, String> {
-    let text = std::fs::read_to_string(file).map_err(|e| {
-        format!("{}: {e}\nhint: is the device there, and may this user read it?", file.display())
-    })?;
-    let value = text.trim().parse::<f64>().ok().filter(|value| value.is_finite());
-    value.ok_or_else(|| {
-        format!("{} = \"{}\" is no number\nhint: is it the right file?", file.display(), text.trim())
-    })
-}
-
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use super::*;
     use crate::sensors::place;
 
