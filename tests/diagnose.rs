@@ -136,6 +136,12 @@ fn a_dry_shaft_has_no_blades_to_blame() {
     assert_eq!(found(&report), ["coulomb_friction"], "{}", report["summary"]);
     let torque = report["findings"][0]["parameters"][0]["value"].as_f64().unwrap();
     assert!((torque - 0.3).abs() < 0.03, "{torque} N m of 0.3");
+    // Nobody spoke of a gear.
+    assert!(
+        report["notes"].to_string().contains("If there is one, say so in rig.class"),
+        "{}",
+        report["notes"]
+    );
     // A reading without its sign is another motion of every effect: friction is looked for beside it anew.
     let amount = |_: usize, cell: &str| cell.trim_start_matches('-').to_string();
     let columns = ["time_s", "current_cmd_a", "shaft_speed_rad_s"];

@@ -6,7 +6,8 @@ use kort_identify::data::Series;
 use kort_identify::fit::Fit;
 use kort_identify::scores::{self, ChannelReport, HeldOut, ParameterReport, parameters};
 use kort_identify::simulate::{Problem, Stack};
-use kort_thruster::effects::Descriptor;
+use kort_thruster::effects::{Descriptor, speaks_of_a_gear};
+use kort_thruster::rig::Rig;
 
 use crate::flexible;
 use crate::locate;
@@ -127,8 +128,26 @@ pub fn strained(baseline: &Fit) -> Option<String> {
     })
 }
 
+/// Columns that were not used, and what was not looked for.
+pub fn left_aside(
+    series: &[Series],
+    problem: &Problem,
+    verdict: Verdict,
+    rig: &Rig,
+) -> impl Iterator<Item = String> + use<> {
+    unused(series, problem).into_iter().chain(gearless(verdict, rig))
+}
+
+/// What is not looked for because nobody speaks of it, where a dry shaft leaves something.
+fn gearless(verdict: Verdict, rig: &Rig) -> Option<String> {
+    let dry = rig.propeller.is_none() && verdict != Verdict::NoMismatch;
+    (dry && !speaks_of_a_gear(rig)).then(|| {
+        "play and load-dependent friction of a gear are not looked for: neither name nor class of the rig speaks of a gear, belt or screw. If there is one, say so in rig.class".into()
+    })
+}
+
 /// Columns that were not used.
-pub fn unused(series: &[Series], problem: &Problem) -> Option<String> {
+fn unused(series: &[Series], problem: &Problem) -> Option<String> {
     let mut used: Vec<&str> = vec![
         "time_s",
         "torque_enable",

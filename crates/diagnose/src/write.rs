@@ -249,7 +249,7 @@ impl<'a, 'p> Writer<'a, 'p> {
         }
         notes.extend(negligible.iter().map(|(id, share)| words::negligible(id, *share)));
         notes.extend(words::strained(self.baseline));
-        notes.extend(words::unused(self.series, problem));
+        notes.extend(words::left_aside(self.series, problem, decision.verdict, self.rig));
         let std_baseline = problem.standard_errors(self.baseline);
         let baseline = Baseline {
             model: options.model.name().into(),

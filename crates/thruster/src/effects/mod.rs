@@ -206,7 +206,7 @@ mod spec;
 
 pub use needs::{
     ANGLE_KNOWN, Available, EXTRA, always, angle_known, commanded, flow_measured, free_shaft, geared,
-    speed_measured, thrust_measured, wet,
+    speaks_of_a_gear, speed_measured, thrust_measured, wet,
 };
 pub use spec::{Scale, Spec, Stretch};
 

@@ -100,13 +100,52 @@ pub fn angle_known(_: &Rig, available: &Available) -> Result<(), &'static str> {
     }
 }
 
-/// Needs a gear, a belt or a screw between motor and load: the rig's class names one.
+/// What a rig's name or class calls that which lies between motor and load.
+const GEARS: [&str; 12] = [
+    "gear",
+    "belt",
+    "screw",
+    "worm",
+    "servo",
+    "actuator",
+    "reduction",
+    "harmonic",
+    "planetary",
+    "transmission",
+    "joint",
+    "winch",
+];
+
+/// Whether a rig's name or class speaks of a gear, a belt or a screw between motor and load.
+pub fn speaks_of_a_gear(rig: &Rig) -> bool {
+    let words = format!("{} {}", rig.name, rig.class).to_lowercase();
+    GEARS.iter().any(|gear| words.contains(gear))
+}
+
+/// Needs a gear, a belt or a screw between motor and load: the rig's name or class speaks of one.
 pub fn geared(rig: &Rig, available: &Available) -> Result<(), &'static str> {
     free_shaft(rig, available)?;
-    let class = rig.class.to_lowercase();
-    if ["gear", "belt", "screw", "worm", "servo", "actuator", "reduction"].iter().any(|w| class.contains(w)) {
+    if speaks_of_a_gear(rig) {
         Ok(())
     } else {
-        Err("the rig is direct drive: its class names no gear, belt or screw")
+        Err("neither name nor class of the rig speaks of a gear, belt or screw: it passes for direct drive")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::speaks_of_a_gear;
+    use crate::rig::Rig;
+
+    #[test]
+    fn a_gear_is_spoken_of_in_name_or_class() {
+        let speaks = |head: &str| {
+            let rest =
+                "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = 0.01\ntorque_constant_nm_a = 1.0\n";
+            speaks_of_a_gear(&Rig::from_toml(&format!("[rig]\n{head}\n{rest}")).unwrap())
+        };
+        assert!(speaks("name = \"Geared motor\""));
+        assert!(speaks("name = \"axis 3\"\nclass = \"linear axis on a ball screw\""));
+        assert!(!speaks("name = \"axis 3\"\nclass = \"dry brushless motor\""));
     }
 }
