@@ -125,17 +125,17 @@ impl Case {
             ((truth.thrust_n - thrust_n).abs() < 0.2 * thrust_n).then_some(())
         });
         std::thread::sleep(Duration::from_secs(2));
-        let (truth, state) = (emulator.truth(), stack.state().expect("a state"));
+        // A single reading may lie off by what a busy machine holds an emulator up; a wrong unit or sign stays.
+        wait("what is told to be true", || {
+            let (truth, state) = (emulator.truth(), stack.state().expect("a state"));
+            let told = |name: &str| state["measured"][name].as_f64().unwrap_or(f64::NAN);
+            let near = |name: &str, truth: f64| (told(name) - truth).abs() < 0.1 * truth.abs() + 0.1;
+            let true_of_both =
+                near("shaft_speed_rad_s", truth.shaft_speed_rad_s) && near("current_a", truth.current_a);
+            true_of_both.then_some(())
+        });
+        let truth = emulator.truth();
         agent.delete(&url).call().unwrap();
-        let told = |name: &str| state["measured"][name].as_f64().unwrap_or(f64::NAN);
-        for (name, truth) in [("shaft_speed_rad_s", truth.shaft_speed_rad_s), ("current_a", truth.current_a)]
-        {
-            assert!(
-                (told(name) - truth).abs() < 0.1 * truth.abs() + 0.1,
-                "{name}: {} for {truth}",
-                told(name)
-            );
-        }
         let csv = stack.text(&format!("{recordings}/{}?format=csv", self.kind)).expect("the recording");
         let mut lines = csv.lines().map(|line| line.split(',').collect::<Vec<_>>());
         let head = lines.next().expect("a head");
@@ -148,10 +148,12 @@ impl Case {
         let seconds = rows.last().expect("rows").0 - rows[0].0;
         let rate_hz = sampled.len() as f64 / seconds;
         assert!((50.0..=205.0).contains(&rate_hz), "{rate_hz} readings a second, asked for 200");
-        let last = sampled.last().expect("readings");
+        let mut last: Vec<f64> = sampled.iter().rev().take(50).copied().collect();
+        last.sort_by(f64::total_cmp);
+        let median = last[last.len() / 2];
         assert!(
-            (last - truth.shaft_speed_rad_s).abs() < 0.1 * truth.shaft_speed_rad_s,
-            "{last} for {truth:?}"
+            (median - truth.shaft_speed_rad_s).abs() < 0.1 * truth.shaft_speed_rad_s,
+            "{median} for {truth:?}"
         );
     }
 
