@@ -32,10 +32,6 @@ const READ: [&str; 1] = ["torque_enable"];
 /// varying. What a controller asks for is no physics: in a closed loop it follows whatever is wrong.
 pub fn possible_drivers(series: &[Series]) -> Vec<String> {
     let Some(first) = series.first() else { return Vec::new() };
-    let varies = |column: &[f64]| {
-        let mut known = column.iter().filter(|v| v.is_finite());
-        known.next().is_some_and(|first| known.any(|v| v != first))
-    };
     let unknown = |name: &str| !KNOWN.contains(&name) && !READ.contains(&name) && !name.contains("_cmd");
     first
         .columns
@@ -44,6 +40,12 @@ pub fn possible_drivers(series: &[Series]) -> Vec<String> {
         .filter(|name| unknown(name))
         .filter(|name| series.iter().all(|s| s.column(name).is_some_and(varies)))
         .collect()
+}
+
+/// Whether a column shows more than one value.
+pub(super) fn varies(column: &[f64]) -> bool {
+    let mut known = column.iter().filter(|v| v.is_finite());
+    known.next().is_some_and(|first| known.any(|v| v != first))
 }
 
 /// A column over all recordings: mean and standard deviation of its samples.

@@ -6,6 +6,7 @@
 
 use kort_thruster::rig::{Load, Rig};
 
+use super::columns::varies;
 use super::fill::{filled, linear};
 use super::{Driving, Prepared, Series};
 
@@ -40,15 +41,11 @@ pub fn loaded(recordings: &[Prepared], series: &[Series], rig: &Rig, sign: f64) 
     if !dry || recordings.iter().any(|r| r.driving == Driving::Speed) {
         return None;
     }
-    let moves = |torque: &&[f64]| {
-        let mut known = torque.iter().filter(|t| t.is_finite());
-        known.next().is_some_and(|first| known.any(|t| t != first))
-    };
-    recordings
-        .iter()
-        .zip(series)
-        .map(|(r, one)| one.column("torque_n_m").filter(moves).map(|torque| r.with_load(torque, sign)))
-        .collect()
+    let each = recordings.iter().zip(series).map(|(recording, one)| {
+        let torque = one.column("torque_n_m").filter(|torque| varies(torque))?;
+        Some(recording.with_load(torque, sign))
+    });
+    each.collect()
 }
 
 /// What was taken for true.
