@@ -55,12 +55,11 @@ impl Prepared {
     /// What drives, on another course that its samples allow as well: from sample to sample by a jump at an instant
     /// drawn for each interval, as far as the samples about it do not foretell its course. `commands` are those of
     /// the control grid; steps that have a tick of their own stay where they are, and a command that is logged
-    /// whenever it changes leaves nothing open.
+    /// whenever it changes leaves nothing open but the supply that its duty is a share of, where that was read less often: it
+    /// may stand from sample to sample.
     fn drive_otherwise(&mut self, commands: &mut [f64]) {
-        let leaves_nothing = self.every_command || self.ticks_per_row < 2;
-        if leaves_nothing && matches!(self.driving, Driving::Command(_)) {
-            return;
-        }
+        let logged = self.every_command || self.ticks_per_row < 2;
+        let leaves_nothing = logged && matches!(self.driving, Driving::Command(_));
         let values = if self.driving == Driving::Speed { &self.speed_between } else { &self.command };
         let n = values.len();
         let mut row = 0;
@@ -68,7 +67,8 @@ impl Prepared {
             while row + 2 < n && self.time_s[row + 1] <= tick.time_s + 0.02 * self.tick_s {
                 row += 1;
             }
-            if self.edges.binary_search(&(row + 1)).is_ok() {
+            *command *= self.supply_held.get(row).unwrap_or(&1.0);
+            if leaves_nothing || self.edges.binary_search(&(row + 1)).is_ok() {
                 continue;
             }
             let (from, to) = (values[row], values[row + 1]);
@@ -124,6 +124,36 @@ mod tests {
         let problem = Setup::new(&series, &rig, ModelName::Model2, criterion).unwrap().problem;
         let powers = problem.doubt_of_drivers().expect("the simulation holds");
         powers.iter().sum::<f64>().sqrt()
+    }
+
+    #[test]
+    fn a_supply_read_less_often_than_the_rows_is_in_doubt_between() {
+        let duty = |every: usize, dips: f64| {
+            let rows = 2000;
+            let at = |k: usize| 0.01 * k as f64;
+            let steps = |k: usize| if (k / 100).is_multiple_of(2) { 0.8 } else { 0.2 };
+            let supply = (0..rows).map(|k| {
+                let shown = 16.0 - dips * steps(k);
+                if k.is_multiple_of(every) { shown } else { f64::NAN }
+            });
+            let columns = vec![
+                ("duty_cmd".into(), (0..rows).map(steps).collect()),
+                ("supply_v".into(), supply.collect()),
+                ("shaft_speed_rad_s".into(), (0..rows).map(|k| 10.0 * at(k).sin()).collect()),
+            ];
+            let rig = RIG.replace("current", "voltage").replace("[sensors]", "supply_v = 16\n[sensors]")
+                + "control_rate_hz = 100\n";
+            let rig = Rig::from_toml(&rig.replace("[amplifier]", "winding_resistance_ohm = 10\n[amplifier]"))
+                .unwrap();
+            let series = [Series { name: "log".into(), time_s: (0..rows).map(at).collect(), columns }];
+            let criterion =
+                Criterion { form_error: 0.01, own_form_error: 0.1, facts_a_band: 10.0, timing_s: 0.001 };
+            let problem = Setup::new(&series, &rig, ModelName::Model2, criterion).unwrap().problem;
+            problem.doubt_of_drivers().expect("the simulation holds").iter().sum::<f64>().sqrt()
+        };
+        assert!(duty(30, 4.0) > 1e-3);
+        assert!(duty(1, 4.0) < 1e-9, "every row has its own");
+        assert!(duty(30, 0.0) < 1e-9, "a stiff supply hides nothing");
     }
 
     fn rough(k: usize) -> f64 {

@@ -7,7 +7,9 @@ use kort_thruster::parameters::Parameters;
 use kort_thruster::rig::Rig;
 
 use crate::checks;
-use crate::data::{DataError, Driving, Prepared, Series, counted_angle, loaded, possible_drivers, spread};
+use crate::data::{
+    DataError, Driving, Prepared, Series, counted_angle, fresh, loaded, possible_drivers, spread,
+};
 use crate::excerpt;
 use crate::held;
 use crate::hypothesis::{Hypothesis, Inputs, UNSTATED_TOL, nothing_stated};
@@ -79,12 +81,15 @@ impl<'a> Setup<'a> {
         model: ModelName,
         criterion: Criterion,
     ) -> Result<Self, DataError> {
+        let recorded = series;
+        let (series, repeated): (Vec<Series>, Vec<Option<String>>) = recorded.iter().map(fresh).unzip();
         let recordings: Vec<Prepared> = series
             .iter()
             .map(|s| Prepared::new(s, rig, model == ModelName::Model3))
             .collect::<Result<_, _>>()?;
-        let (mut notes, mut masked) = (Vec::new(), Vec::new());
-        for (one, prepared) in series.iter().zip(&recordings) {
+        let (mut notes, mut masked): (Vec<String>, Vec<_>) =
+            (repeated.into_iter().flatten().collect(), Vec::new());
+        for (one, prepared) in recorded.iter().zip(&recordings) {
             let checked = checks::check(one, rig);
             notes.extend(checked.notes);
             let mut rows = checked.masked;
@@ -128,7 +133,7 @@ impl<'a> Setup<'a> {
         let (mut problem, mut baseline) = compared(recordings.clone());
         let (mut recordings, mut load) = (recordings, None);
         for sign in loaded::SIGNS {
-            let Some(under_load) = loaded::loaded(&recordings, series, rig, sign) else { break };
+            let Some(under_load) = loaded::loaded(&recordings, &series, rig, sign) else { break };
             let (other, its) = compared(under_load.clone());
             if held::fits_better(&other, &its, &problem, &baseline) {
                 load = Some(loaded::words(sign));
@@ -152,13 +157,13 @@ impl<'a> Setup<'a> {
             problem = problem.without(&hidden.rows);
         }
         notes.extend(problem.recordings.iter().filter_map(Prepared::hidden_between_rows));
-        if let Some(name) = telling_column(series, &problem, &baseline) {
-            let sizes = spread(series, &name);
+        if let Some(name) = telling_column(&series, &problem, &baseline) {
+            let sizes = spread(&series, &name);
             for (one, recording) in series.iter().zip(&mut problem.recordings) {
                 recording.lay_extra(&name, one.column(&name).unwrap_or(&[]), sizes);
             }
         }
-        Ok(Self { series: series.to_vec(), problem, baseline, notes, thin })
+        Ok(Self { series, problem, baseline, notes, thin })
     }
 }
 

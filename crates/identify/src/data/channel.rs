@@ -18,14 +18,7 @@ pub struct Channel {
 impl Channel {
     pub(super) fn new(series: &Series, response: Response) -> Option<Self> {
         let column = series.column(response.name())?;
-        let mut rows: Vec<usize> = (0..column.len()).filter(|k| column[*k].is_finite()).collect();
-        // A held sensor logged at every row repeats itself: keep the fresh samples only.
-        let changes = rows.windows(2).filter(|w| column[w[0]] != column[w[1]]).count();
-        if response == Response::Flow && rows.len() > 50 && changes * 2 < rows.len() {
-            rows = std::iter::once(rows[0])
-                .chain(rows.windows(2).filter(|w| column[w[0]] != column[w[1]]).map(|w| w[1]))
-                .collect();
-        }
+        let rows: Vec<usize> = (0..column.len()).filter(|k| column[*k].is_finite()).collect();
         let mut values: Vec<f64> = rows.iter().map(|k| column[*k]).collect();
         if response == Response::ShaftAngle {
             rates(&mut values, &rows, &series.time_s);

@@ -1,6 +1,6 @@
 //! A recording made ready for simulation: inputs on the control grid, responses on the log grid.
 
-use kort_thruster::plant::{Driven, Leap, Stimulus, Tick, load_inertia_kg_m2};
+use kort_thruster::plant::{Leap, Stimulus, load_inertia_kg_m2};
 use kort_thruster::rig::{AmplifierKind, Load, Rig};
 
 use crate::over_the_top::TOP_RAD;
@@ -13,7 +13,9 @@ mod counted;
 mod driving;
 mod error;
 mod fill;
+mod fresh;
 mod grain;
+mod lay_out;
 pub mod loaded;
 mod pauses;
 mod scale;
@@ -23,14 +25,14 @@ pub use channel::{Channel, rates};
 pub use columns::{KNOWN, possible_drivers, spread};
 pub use counted::counted_angle;
 pub use error::DataError;
+pub use fresh::fresh;
 pub use grain::Grain;
 pub use pauses::pause_s;
 pub use scale::{COLUMN, available, scale};
 
-use command::{find_edges, steps_of};
+use command::steps_of;
 use driving::{choose_driving, driving_power, instead};
-use fill::{filled, held, linear, median_step};
-use pauses::leap_to;
+use fill::{filled, held, median_step};
 use start::start_state;
 
 /// A measured response that a model can be compared with.
@@ -168,15 +170,19 @@ pub struct Prepared {
     pub speed_between: Vec<f64>,
     /// The column that is laid beside the inputs as a possible driver of what is left.
     pub extra: Option<String>,
+    /// Of the supply that a duty is a share of, by row: held from each of its samples to the next, over its course straight
+    /// between them, which is taken.
+    pub supply_held: Vec<f64>,
     /// Bandwidth with which the simulated shaft is kept with the recorded one, rad/s; 0 where it runs freely.
     pub observer_rad_s: f64,
 }
 
-/// Whether a rig shows a response. A dry shaft has no water to feel; its angle tells what a filtered speed
-/// hides, which beside a propeller thrust and flow do.
+/// Whether a rig shows a response. Of a speed drive's current nothing is modelled. A dry shaft has no water to feel; its
+/// angle tells what a filtered speed hides, which beside a propeller thrust and flow do.
 fn shown(rig: &Rig, driving: Driving, response: Response) -> bool {
     match response {
-        Response::Current | Response::ShaftSpeed => true,
+        Response::Current => rig.amplifier.kind != AmplifierKind::Speed,
+        Response::ShaftSpeed => true,
         Response::ShaftAngle => rig.propeller.is_none() && driving != Driving::Speed,
         _ => rig.propeller.is_some(),
     }
@@ -288,91 +294,21 @@ impl Prepared {
             leaps: Vec::new(),
             speed_between: Vec::new(),
             extra: None,
+            supply_held: Vec::new(),
             observer_rad_s: if returns(series, rig, driving) { 0.0 } else { OBSERVER_RAD_S },
         };
         if let Driving::Command("duty_cmd") = driving {
             // A duty of the supply is a voltage: of the recorded supply, or else the nominal one.
             let nominal = vec![rig.amplifier.supply_v.unwrap_or(1.0); rows];
-            let supply = series.column("supply_v").map_or(nominal, filled);
-            prepared.command.iter_mut().zip(supply).for_each(|(c, v)| *c *= v);
+            let recorded = series.column("supply_v");
+            let supply = recorded.map_or(nominal, filled);
+            prepared.command.iter_mut().zip(&supply).for_each(|(c, v)| *c *= v);
+            let stands = recorded.map_or_else(|| supply.clone(), held);
+            prepared.supply_held = stands.iter().zip(&supply).map(|(held, v)| held / v.max(1e-9)).collect();
         }
         prepared.lay_out(series, rig);
         (prepared.start, prepared.before) = start_state(series, &prepared);
         Ok(prepared)
-    }
-
-    /// Lays the recorded inputs on the control grid.
-    fn lay_out(&mut self, series: &Series, rig: &Rig) {
-        let t0 = self.time_s[0];
-        let end = (self.time_s[self.time_s.len() - 1] - t0) / self.tick_s;
-        let count = (end - 1e-6).ceil().max(1.0) as usize;
-        let mut pauses = self.pauses().into_iter().peekable();
-        let mut passed = 0;
-        for (row, t) in self.time_s.iter().enumerate() {
-            if let Some(pause) = pauses.next_if(|pause| pause.row == row) {
-                passed += pause.to - pause.from;
-                let leap = leap_to(series, row, pause.to - passed);
-                self.leaps.push(leap);
-            }
-            let at = (t - t0) / self.tick_s;
-            let near = at.round();
-            let (tick, part) =
-                if (at - near).abs() < 0.02 { (near, 0.0) } else { (at.floor(), at - at.floor()) };
-            self.stimulus.logs.push((tick as usize - passed, part));
-        }
-        let mut pauses = self.pauses().into_iter().peekable();
-        let ambient = series.column("ambient_m_s").map(filled);
-        let supply = series.column("supply_v").map(filled);
-        let recorded_angle = series.column("shaft_angle_rad").map(filled);
-        let angle = recorded_angle.clone().or_else(|| counted_angle(series, rig));
-        let depth = series.column("depth_m").map(filled);
-        let temperature = series.column("temperature_c").map(filled);
-        let signed = !crate::checks::is_unsigned_speed(series);
-        let measured_speed = series.column("shaft_speed_rad_s").map(filled);
-        let enabled = series.column("torque_enable").map(held);
-        let speed = (self.driving == Driving::Speed).then(|| self.driving_speed(series, rig));
-        let mut ticks = Vec::with_capacity(count);
-        let mut row = 0;
-        let mut i = 0;
-        while i < count {
-            if let Some(pause) = pauses.next_if(|pause| pause.from == i) {
-                i = pause.to;
-            }
-            let time_s = t0 + i as f64 * self.tick_s;
-            let next_s = time_s + self.tick_s;
-            while row + 2 < self.time_s.len() && self.time_s[row + 1] <= time_s + 0.02 * self.tick_s {
-                row += 1;
-            }
-            let at = |column: &[f64], t: f64| linear(&self.time_s, column, row, t);
-            ticks.push(Tick {
-                time_s,
-                driven: match self.driving {
-                    Driving::Command(_) => Driven::Command,
-                    Driving::Current => Driven::Current(at(&self.command, time_s), at(&self.command, next_s)),
-                    Driving::Speed => {
-                        let s = speed.as_deref().unwrap_or(&[]);
-                        Driven::Speed(at(s, time_s), at(s, next_s))
-                    }
-                    Driving::Power => Driven::Power(at(&self.command, time_s), at(&self.command, next_s)),
-                },
-                ambient_m_s: ambient.as_deref().map_or((0.0, 0.0), |a| (at(a, time_s), at(a, next_s))),
-                supply_v: supply.as_deref().map(|s| at(s, time_s)),
-                shaft_angle_rad: angle.as_deref().map(|a| (at(a, time_s), at(a, next_s))),
-                depth_m: depth.as_deref().map(|d| at(d, time_s)),
-                temperature_c: temperature.as_deref().map(|d| at(d, time_s)),
-                released: enabled.as_deref().is_some_and(|e| e[row] < 0.5),
-                observed_angle_rad: recorded_angle.as_deref().map(|a| at(a, next_s)),
-                observed_speed_rad_s: measured_speed.as_deref().filter(|_| signed).map(|s| at(s, next_s)),
-                observed_size_rad_s: measured_speed.as_deref().filter(|_| !signed).map(|s| at(s, next_s)),
-                ..Tick::default()
-            });
-            i += 1;
-        }
-        self.stimulus.ticks = ticks;
-        self.speed_between = speed.unwrap_or_default();
-        if matches!(self.driving, Driving::Command(_) | Driving::Current) {
-            self.edges = find_edges(&self.command);
-        }
     }
 
     /// Shaft speed without the stated measuring chain: from the angle where it is recorded, else
