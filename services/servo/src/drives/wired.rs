@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use kort_proto::config::{Config, ConfigError, Thruster};
 use serde::Deserialize;
 
+use crate::claims::Claim;
 use crate::link::Medium;
 
 /// Section `drive` as written.
@@ -147,6 +148,8 @@ pub struct Wired {
     pub speed_units: Option<f64>,
     /// Number of the motor, for drives that have several.
     pub motor: Option<u32>,
+    /// What no other device may have too: the wire, unless the drive shares it, and the one drive that is meant.
+    pub claims: Vec<Claim>,
 }
 
 impl Wired {
@@ -181,14 +184,18 @@ impl Wired {
             reading_life_ms: keys.reading_life_ms,
         };
         times.check(thruster).map_err(|words| config.error(format!("`{section}.{words}")))?;
+        let identity = keys.identity.to_ascii_lowercase();
+        let meant = Some(&identity).filter(|identity| !identity.is_empty());
+        let meant = meant.map(|identity| Claim::identity(&thruster.amplifier, identity));
         Ok(Self {
+            claims: [Claim::port(&keys.port)].into_iter().chain(meant).collect(),
             medium: Medium::Serial { port: keys.port.clone(), baud: keys.baud },
             port: keys.port,
             rate_hz: keys.rate_hz,
             timeout_s: keys.timeout_ms * 1e-3,
             reading_life_ns: times.reading_life_ns(),
             reversed: keys.reversed,
-            identity: keys.identity.to_ascii_lowercase(),
+            identity,
             pole_pairs: keys.pole_pairs,
             address: keys.address,
             bitrate: keys.bitrate,
