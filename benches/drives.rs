@@ -20,7 +20,7 @@ use common::bench::Bench;
 use kort_emulators::vesc::Make;
 use kort_emulators::{
     Adapter, Amplifier, ArduSub, Bench as Emulator, Cia402, Moteus, ODrive, Vesc, ardusub, cia402, iio,
-    moteus,
+    moteus, odrive,
 };
 use kort_proto::messages::{Command, DriveKind, Outcome, RequestKind, Telemetry};
 use kort_proto::transport::{Ticker, monotonic_ns};
@@ -56,7 +56,7 @@ fn main() {
     let vesc = Emulator::start(Vesc::new(Make::default(), &rig)).expect("a pseudo terminal");
     let (site, emulator) = wired("vesc", "pole_pairs = 7", vesc);
     measure("vesc", site, Some(emulator), AMPERES, seconds);
-    let odrive = Emulator::start(ODrive::new(&rig, false)).expect("a pseudo terminal");
+    let odrive = Emulator::start(ODrive::new(odrive::Make::default(), &rig)).expect("a pseudo terminal");
     let (site, emulator) = wired("odrive", "timeout_ms = 100", odrive);
     measure("odrive", site, Some(emulator), AMPERES, seconds);
     let moteus = Emulator::start(Moteus::new(moteus::Make::default(), &rig)).expect("a pseudo terminal");

@@ -105,14 +105,9 @@ impl Times {
 }
 
 /// Keys that only some drives have: why another has none, and what to do.
-const OWN: [(&str, &str, &str); 7] = [
+const OWN: [(&str, &str, &str); 6] = [
     ("pole_pairs", "this drive tells the speed of the shaft itself", "leave the key out"),
     ("address", "this drive is alone on its wire", "leave the key out"),
-    (
-        "identity",
-        "kort reads no serial number of this drive",
-        "leave the key out, and name the port by the adapter's: /dev/serial/by-id/…",
-    ),
     ("bitrate", "this drive is on no CAN adapter", "leave the key out; `baud` is a serial port's"),
     ("units_per_turn", "this drive tells angles in turns", "leave the key out"),
     ("speed_units", "this drive tells speed in a unit that kort knows", "leave the key out"),
@@ -216,6 +211,26 @@ impl Wired {
             priority,
             is_drive: true,
         }
+    }
+
+    /// Why the drive that says this of itself is not the one that is meant, if it is not.
+    pub fn is_another(&self, found: &str) -> Option<String> {
+        let wanted = &self.identity;
+        (!wanted.is_empty() && wanted != found).then(|| {
+            format!(
+                "`drive.identity` = {wanted}, but {found} answers\nhint: two drives swapped? else put that number there"
+            )
+        })
+    }
+
+    /// Why a drive that tells no number is not known to be the one that is meant, if one is.
+    pub fn is_nameless(&self) -> Option<String> {
+        let wanted = &self.identity;
+        (!wanted.is_empty()).then(|| {
+            format!(
+                "`drive.identity` = {wanted}, but it does not tell its serial number\nhint: a noisy wire? else leave the key out, and name the port by the adapter's: /dev/serial/by-id/…"
+            )
+        })
     }
 
     /// Sign between the thruster's ahead and the drive's.

@@ -87,7 +87,7 @@ impl Cia402 {
     /// # Errors
     /// [`ConfigError`] names key, value and what is allowed.
     pub fn new(config: &Config, id: &str, thruster: &Thruster, rig: &Rig) -> Result<Self, ConfigError> {
-        let own = ["address", "identity", "bitrate", "units_per_turn", "speed_units"];
+        let own = ["address", "bitrate", "units_per_turn", "speed_units"];
         let mut wired = Wired::new(config, id, thruster, &own)?;
         let kind = current_or_speed(config, id, thruster, rig)?;
         let fail =

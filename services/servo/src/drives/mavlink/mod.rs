@@ -79,7 +79,7 @@ impl Mavlink {
     /// # Errors
     /// [`ConfigError`] names key, value and what is allowed.
     pub fn new(config: &Config, id: &str, thruster: &Thruster, rig: &Rig) -> Result<Self, ConfigError> {
-        let mut wired = Wired::new(config, id, thruster, &["identity", "address", "motor"])?;
+        let mut wired = Wired::new(config, id, thruster, &["address", "motor"])?;
         let fail =
             |key: &str, words: String| Err(config.error(format!("`thrusters.{id}.drive.{key}` {words}")));
         if kind_of(rig) != DriveKind::Voltage {
