@@ -20,13 +20,16 @@ use common::bench::Bench;
 use kort_emulators::vesc::Make;
 use kort_emulators::{
     Adapter, Amplifier, ArduSub, Bench as Emulator, Cia402, Moteus, ODrive, Vesc, ardusub, cia402, iio,
-    moteus,
+    moteus, odrive,
 };
 use kort_proto::messages::{Command, DriveKind, Outcome, RequestKind, Telemetry};
 use kort_proto::transport::{Ticker, monotonic_ns};
 use kort_thruster::rig::Rig;
 
 const COMMAND_NS: u64 = 4_000_000;
+/// Time from arming until the drive has what it is commanded, ns: an enable takes its time to come, and the command comes in over
+/// `full_drive_s` then. A share of it is no step of the stairs, though it may look like an earlier one.
+const COMING_IN_NS: u64 = 300_000_000;
 /// Steps of the drive until it begins anew.
 const STEPS: u64 = 100;
 
@@ -56,7 +59,7 @@ fn main() {
     let vesc = Emulator::start(Vesc::new(Make::default(), &rig)).expect("a pseudo terminal");
     let (site, emulator) = wired("vesc", "pole_pairs = 7", vesc);
     measure("vesc", site, Some(emulator), AMPERES, seconds);
-    let odrive = Emulator::start(ODrive::new(&rig, false)).expect("a pseudo terminal");
+    let odrive = Emulator::start(ODrive::new(odrive::Make::default(), &rig)).expect("a pseudo terminal");
     let (site, emulator) = wired("odrive", "timeout_ms = 100", odrive);
     measure("odrive", site, Some(emulator), AMPERES, seconds);
     let moteus = Emulator::start(Moteus::new(moteus::Make::default(), &rig)).expect("a pseudo terminal");
@@ -101,7 +104,7 @@ fn measure(name: &str, site: Site, emulator: Option<Emulator>, stairs: Stairs, s
     let mut ticker = Ticker::new(COMMAND_NS);
     let end = Instant::now() + Duration::from_secs(seconds);
     let (mut sent, mut rows): (Vec<(u64, f64)>, Vec<Telemetry>) = (Vec::new(), Vec::new());
-    let mut armed = false;
+    let (mut armed, mut armings): (bool, Vec<u64>) = (false, Vec::new());
     for n in 0u64.. {
         if Instant::now() > end {
             break;
@@ -109,7 +112,9 @@ fn measure(name: &str, site: Site, emulator: Option<Emulator>, stairs: Stairs, s
         if !armed {
             // Trips of a busy machine are part of it; then it is armed again.
             bench.ask(RequestKind::ClearFaults);
+            let asked_ns = monotonic_ns();
             armed = bench.ask(RequestKind::Arm).0 == Outcome::Done;
+            armings.extend(armed.then_some(asked_ns));
         }
         let drive = stairs.first + (n % STEPS) as f64 * stairs.step;
         let now_ns = monotonic_ns();
@@ -131,6 +136,11 @@ fn measure(name: &str, site: Site, emulator: Option<Emulator>, stairs: Stairs, s
             rows.iter().map(|row| (row.time_ns + row.timing.lateness_ns, row.signals.current_cmd_a)).collect()
         }
     };
+    let coming_in = |at_ns: u64| {
+        let last = armings.iter().rev().find(|arming| **arming <= at_ns);
+        last.is_none_or(|arming| at_ns - arming < COMING_IN_NS)
+    };
+    let arrived: Vec<_> = arrived.into_iter().filter(|(at_ns, _)| !coming_in(*at_ns)).collect();
     print_row(name, "command", latencies(&sent, &arrived, stairs.step));
     let overruns = rows.last().map_or(0, |row| row.timing.overruns);
     println!("{name:>10}  ticks left out: {overruns} of {}\n", rows.len());
@@ -147,6 +157,9 @@ fn latencies(sent: &[(u64, f64)], arrived: &[(u64, f64)], step: f64) -> Vec<u64>
         }
         last = *drive;
         let same = |(_, sent): &(u64, f64)| (sent - drive).abs() < 0.4 * step;
+        // Half of the stairs before it a step looks like another one.
+        let oldest_ns = at_ns.saturating_sub(STEPS / 2 * COMMAND_NS);
+        from = from.max(sent.partition_point(|(sent_ns, _)| *sent_ns < oldest_ns));
         if let Some(place) = sent.iter().skip(from).take(STEPS as usize / 2).position(same) {
             from += place;
             took.extend(at_ns.checked_sub(sent[from].0));

@@ -160,11 +160,10 @@ fn deployment(file: Option<&Path>, into: &mut Found) {
 /// What each service says.
 fn services(config: &Config) -> Vec<String> {
     let mut said = Vec::new();
-    #[cfg(any(feature = "servo", feature = "controller"))]
+    #[cfg(feature = "servo")]
+    said.extend(kort_servo::problems(config).iter().map(ToString::to_string));
+    #[cfg(feature = "controller")]
     for id in config.thrusters.keys() {
-        #[cfg(feature = "servo")]
-        said.extend(kort_servo::problems(config, id).iter().map(ToString::to_string));
-        #[cfg(feature = "controller")]
         said.extend(kort_controller::check(config, id).err().map(|e| e.to_string()));
     }
     #[cfg(feature = "gateway")]

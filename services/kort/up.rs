@@ -51,8 +51,8 @@ pub fn run(config: &Config, deployment: &Deployment) -> Result<(), UpError> {
         move |error| UpError::System { what, error }
     };
     let gateway = kort_gateway::Settings::new(config)?;
+    kort_servo::check(config)?;
     for id in config.thrusters.keys() {
-        kort_servo::check(config, id)?;
         kort_controller::check(config, id)?;
     }
     let stop = Arc::new(AtomicBool::new(false));

@@ -200,10 +200,14 @@ impl Stack {
 
     /// As [`Site::spawn_in`].
     pub fn start_in(surroundings: &[&str], site: Site) -> Self {
-        let supervisor = site.spawn_in(surroundings, "up");
-        let stack = Self { site, supervisor, thruster: "t1", leases: Default::default() };
+        let stack = Self::of(site.spawn_in(surroundings, "up"), site);
         stack.wait_until_up();
         stack
+    }
+
+    /// One that nobody waits for: its drives may tell nothing.
+    pub fn of(supervisor: Child, site: Site) -> Self {
+        Self { site, supervisor, thruster: "t1", leases: Default::default() }
     }
 
     /// From here on everything is about this thruster.

@@ -11,4 +11,5 @@ mod mavlink;
 mod moteus;
 mod odrive;
 mod sensors;
+mod two;
 mod vesc;

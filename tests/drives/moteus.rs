@@ -51,3 +51,14 @@ fn it_is_not_armed_while_its_time_out_would_brake() {
         case().cannot_be_armed(&moteus(make), "timeout_mode stays 12");
     });
 }
+
+/// One that tells no number is driven where none is asked for, and not where one is.
+#[test]
+fn it_is_not_armed_when_it_does_not_tell_who_it_is() {
+    in_real_time(|| {
+        let nameless = Make { serial_number: None, ..Make::default() };
+        case().outlives_its_servo(&moteus(nameless.clone()));
+        let meant = Case { keys: "identity = \"2037375753504b068034001c\"", ..case() };
+        meant.cannot_be_armed(&moteus(nameless), "it does not tell its serial number");
+    });
+}

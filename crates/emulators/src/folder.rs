@@ -13,6 +13,10 @@ use kort_proto::transport::{monotonic_ns, realtime};
 
 use crate::bench::{Bench, Mischief, PRIORITY, STEP, Shared, Truth, lock};
 
+/// Where files are kept in memory, as those of the kernel are: on a disk that others write to, a writing may take longer than
+/// a watchdog waits.
+const IN_MEMORY: &str = "/dev/shm";
+
 /// A device behind files.
 pub trait InFiles: Send {
     /// Every file that it has, with its text.
@@ -43,7 +47,7 @@ impl Bench {
     /// # Errors
     /// No folder is to be had.
     pub fn start_in_folder(device: impl InFiles + 'static) -> std::io::Result<Self> {
-        let folder = tempfile::tempdir()?;
+        let folder = tempfile::tempdir_in(IN_MEMORY).or_else(|_| tempfile::tempdir())?;
         let root = folder.path().join("sys");
         let files = Folder { root: root.clone(), shown: BTreeMap::new() };
         Self::serve(folder, root, move |shared| serve(device, files, &shared))

@@ -11,6 +11,11 @@ use crate::stand::Stand;
 /// Time from power to the first answer, s.
 const BOOT_S: f64 = 0.3;
 
+/// Its number, unless it is made with another one.
+const SERIAL_NUMBER: [u32; 3] = [0x8034_001c, 0x5350_4b06, 0x2037_3757];
+/// Registers of that.
+const SERIAL_REGISTERS: std::ops::Range<u32> = 0x120..0x123;
+
 /// How this one is made and set.
 #[derive(Clone, Debug)]
 pub struct Make {
@@ -22,11 +27,19 @@ pub struct Make {
     pub read_only: bool,
     /// A UART, whose lines carry check sums.
     pub uart: bool,
+    /// Its number, the least significant word first; none: it has no such registers.
+    pub serial_number: Option<[u32; 3]>,
 }
 
 impl Default for Make {
     fn default() -> Self {
-        Self { address: 1, stored_timeout_mode: 12, read_only: false, uart: false }
+        Self {
+            address: 1,
+            stored_timeout_mode: 12,
+            read_only: false,
+            uart: false,
+            serial_number: Some(SERIAL_NUMBER),
+        }
     }
 }
 
@@ -97,6 +110,10 @@ impl Moteus {
             0x0d => self.stand.supply_v(),
             0x0e => 31.0,
             0x0f => f64::from(self.fault),
+            number if SERIAL_REGISTERS.contains(&number) => {
+                let words = self.make.serial_number.unwrap_or_default();
+                f64::from(words[(number - SERIAL_REGISTERS.start) as usize])
+            }
             0x70 => ((self.now_s - self.power_s) * 1e3).floor(),
             _ => 0.0,
         }
@@ -130,17 +147,23 @@ impl Moteus {
                 0x00..=0x1f => {
                     let kind = part & 0x0c;
                     let size = [1, 2, 4, 4][usize::from(kind >> 2)];
-                    let count = if part & 3 == 0 { rest.next().unwrap_or(0) } else { part & 3 };
-                    let first = rest.next().unwrap_or(0);
+                    let count = if part & 3 == 0 { varuint(&mut rest) } else { u32::from(part & 3) };
+                    let first = varuint(&mut rest);
                     if part & 0x10 != 0 {
-                        answer.extend([0x20 | kind, count, first]);
+                        if SERIAL_REGISTERS.contains(&first) && self.make.serial_number.is_none() {
+                            // A read error, of the first register that is not there.
+                            answer.extend([0x31, 0xa0, 0x02, 1]);
+                            continue;
+                        }
+                        answer.extend([0x20 | kind, count as u8]);
+                        put_varuint(first, &mut answer);
                     }
-                    for number in u32::from(first)..u32::from(first) + u32::from(count) {
+                    for number in first..first + count {
                         if part & 0x10 != 0 {
                             let value = self.register(number);
                             match kind {
                                 0x0c => answer.extend((value as f32).to_le_bytes()),
-                                0x08 => answer.extend((value as i32).to_le_bytes()),
+                                0x08 => answer.extend((value as i64 as i32).to_le_bytes()),
                                 0x04 => answer.extend((value as i16).to_le_bytes()),
                                 _ => answer.push(value as i8 as u8),
                             }
@@ -279,6 +302,27 @@ impl Device for Moteus {
     fn truth(&self) -> Truth {
         self.stand.truth(self.asked())
     }
+}
+
+/// A number of seven bits a byte, the lowest first; the highest bit says that more follow.
+fn varuint(bytes: &mut impl Iterator<Item = u8>) -> u32 {
+    let (mut number, mut shift) = (0, 0);
+    while let Some(byte) = bytes.next().filter(|_| shift < 28) {
+        number |= u32::from(byte & 0x7f) << shift;
+        shift += 7;
+        if byte & 0x80 == 0 {
+            break;
+        }
+    }
+    number
+}
+
+fn put_varuint(mut number: u32, into: &mut Vec<u8>) {
+    while number > 0x7f {
+        into.push(number as u8 | 0x80);
+        number >>= 7;
+    }
+    into.push(number as u8);
 }
 
 /// CRC-8 with the polynomial x^8 + x^7 + x^4 + x^2 + x + 1, from zero, bit by bit.

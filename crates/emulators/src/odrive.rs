@@ -17,13 +17,30 @@ const WATCHDOG_EXPIRED: u64 = 0x800;
 const IDLE: u32 = 1;
 const CLOSED_LOOP: u32 = 8;
 
+/// Characters of a number that `r` prints: the firmware's buffer ends there.
+const PRINTED: usize = 9;
+
+/// How this one is made.
+#[derive(Clone, Debug)]
+pub struct Make {
+    /// Its number, as `i` prints it; none: it does not print it.
+    pub serial_number: Option<&'static str>,
+    /// The watchdog's settings cannot be written.
+    pub read_only: bool,
+}
+
+impl Default for Make {
+    fn default() -> Self {
+        Self { serial_number: Some("2084377D3548"), read_only: false }
+    }
+}
+
 /// An emulated ODrive with a thruster on its first axis.
 pub struct ODrive {
+    make: Make,
     stand: Stand,
     held: String,
     properties: BTreeMap<&'static str, f64>,
-    /// The watchdog's settings cannot be written.
-    read_only: bool,
     error: u64,
     state: u32,
     torque_n_m: f64,
@@ -44,12 +61,12 @@ fn stored() -> BTreeMap<&'static str, f64> {
 
 impl ODrive {
     /// One with the rig's motor on it.
-    pub fn new(rig: &Rig, read_only: bool) -> Self {
+    pub fn new(make: Make, rig: &Rig) -> Self {
         Self {
+            make,
             stand: Stand::new(rig),
             held: String::new(),
             properties: stored(),
-            read_only,
             error: 0,
             state: IDLE,
             torque_n_m: 0.0,
@@ -73,7 +90,17 @@ impl ODrive {
         }
     }
 
-    fn act(&mut self, now_s: f64, words: &str) -> Option<String> {
+    /// The lines that answer one.
+    fn act(&mut self, now_s: f64, words: &str) -> Vec<String> {
+        if words.trim() != "i" {
+            return self.act_alone(now_s, words).into_iter().collect();
+        }
+        let lines = ["Hardware version: 3.6-56V", "Firmware version: 0.5.6"].map(str::to_owned);
+        let number = self.make.serial_number.map(|number| format!("Serial number: {number}"));
+        lines.into_iter().chain(number).collect()
+    }
+
+    fn act_alone(&mut self, now_s: f64, words: &str) -> Option<String> {
         let mut words = words.split_whitespace();
         let (command, mut rest) = (words.next()?, words.map(str::to_owned));
         let mut number = || rest.next().and_then(|word| word.parse::<f64>().ok());
@@ -93,7 +120,7 @@ impl ODrive {
                 return Some(format!("{angle:.6} {speed:.6}"));
             }
             "sc" => self.error = 0,
-            "r" => return Some(self.read(&rest.next()?)),
+            "r" => return Some(self.read(&rest.next()?).chars().take(PRINTED).collect()),
             "w" => {
                 let name = rest.next()?;
                 let value = rest.next()?.parse::<f64>().ok()?;
@@ -102,7 +129,7 @@ impl ODrive {
                     let enters = value == f64::from(CLOSED_LOOP) && self.error == 0;
                     self.state = if enters { CLOSED_LOOP } else { IDLE };
                 } else if let Some((_, held)) = self.properties.iter_mut().find(|(held, _)| **held == name) {
-                    if !self.read_only {
+                    if !self.make.read_only {
                         *held = value;
                     }
                 } else {
@@ -125,6 +152,7 @@ impl ODrive {
                     format!("{value:.0}")
                 }
                 Some(value) => format!("{value:.6}"),
+                // Its own refusals are words, which nothing cuts short.
                 None => "invalid property".into(),
             },
         }
@@ -150,8 +178,10 @@ impl Device for ODrive {
             if sum.as_ref().is_some_and(|sum| *sum != Ok(right)) {
                 continue;
             }
-            if let Some(answer) = self.act(now_s, words) {
-                let end = sum.map_or(String::new(), |_| format!("*{}", answer.bytes().fold(0, |a, b| a ^ b)));
+            for answer in self.act(now_s, words) {
+                let end = sum
+                    .as_ref()
+                    .map_or(String::new(), |_| format!("*{}", answer.bytes().fold(0, |a, b| a ^ b)));
                 answers.push(format!("{answer}{end}\r\n").into_bytes());
             }
         }

@@ -5,10 +5,11 @@
 //! ```
 //!
 //! [`tick`] is the pure step, [`guard`] holds limits and trips, [`drives`] and [`sensors`] are what
-//! hangs on wires, merged by [`devices`]; the process (feature `process`) adds the clock, real-time
+//! hangs on wires, merged by [`devices`]; what each has to itself is in [`claims`]; the process (feature `process`) adds the clock, real-time
 //! scheduling and shared memory. Once the loop runs it allocates nothing, takes no lock and has no path
 //! that panics; `tests/no_allocation.rs` counts, and says what iceoryx2 does when a sample is sent.
 
+pub mod claims;
 pub mod devices;
 pub mod direction;
 pub mod drives;

@@ -1,11 +1,10 @@
 //! The servo's process: clock, real-time scheduling, shared memory around the pure tick.
 
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use kort_proto::config::{Config, ConfigError};
+use kort_proto::config::{Config, ConfigError, Thruster};
 use kort_proto::messages::{Answered, Request, Trip};
 use kort_proto::transport::{
     Deployment, ServoPorts, Ticker, TransportError, keep_on, monotonic_ns, ordinary, realtime,
@@ -14,6 +13,7 @@ use kort_thruster::rig::Rig;
 use thiserror::Error;
 use tracing::{info, warn};
 
+use crate::claims::{Claim, Taken, doubles};
 use crate::devices::{At, Devices};
 use crate::drives;
 use crate::sensors;
@@ -61,23 +61,27 @@ pub enum ServoError {
     Signals(#[from] std::io::Error),
 }
 
-/// Could the servo of this thruster start? Reads everything it reads.
+/// Could the servos of this deployment start? Reads everything they read.
 ///
 /// # Errors
 /// [`ServoError`] names file, key, value and what is allowed.
-pub fn check(config: &Config, id: &str) -> Result<(), ServoError> {
-    read(config, id).map(drop)
+pub fn check(config: &Config) -> Result<(), ServoError> {
+    problems(config).into_iter().next().map_or(Ok(()), Err)
 }
 
-/// Everything that keeps the servo of this thruster from starting; each names file, key, value and what is allowed.
-pub fn problems(config: &Config, id: &str) -> Vec<ServoError> {
-    let rig = || {
-        let thruster = config.thruster(id)?;
-        let (file, text) = config.rig_text(id, thruster)?;
-        let rig = Rig::from_toml(&text).map_err(|error| ServoError::Rig { file, error })?;
-        Ok::<_, ServoError>((thruster, rig))
-    };
-    let (thruster, rig) = match rig() {
+/// Everything that keeps a servo of this deployment from starting; each names file, key, value and what is allowed.
+pub fn problems(config: &Config) -> Vec<ServoError> {
+    let (mut wrong, mut taken) = (Vec::new(), Vec::new());
+    for id in config.thrusters.keys() {
+        wrong.extend(of_one(config, id, &mut taken));
+    }
+    wrong.extend(doubles(config, &taken).into_iter().map(|double| double.error.into()));
+    wrong
+}
+
+/// Everything that keeps the servo of this thruster from starting; what it takes is left in `taken`.
+fn of_one(config: &Config, id: &str, taken: &mut Vec<Taken>) -> Vec<ServoError> {
+    let (thruster, rig) = match rig_of(config, id) {
         Ok(there) => there,
         Err(error) => return vec![error],
     };
@@ -86,53 +90,65 @@ pub fn problems(config: &Config, id: &str) -> Vec<ServoError> {
     // Bounds that are crossed by a value that is wrong already are told by that one.
     let settings = settings.err().filter(|_| wrong.is_empty());
     wrong.extend(settings);
-    let (drive, sensors) =
-        (drives::choose(config, id, thruster, &rig), sensors::choose(config, id, thruster));
-    if let (Ok(drive), Ok(sensors)) = (&drive, &sensors) {
-        wrong.extend(ports_apart(config, id, drive, sensors).err());
-    }
+    let drive = drives::choose(config, id, thruster, &rig);
+    let sensors = sensors::choose(config, id, thruster);
+    takes(id, drive.as_ref().ok(), sensors.as_deref().unwrap_or_default(), taken);
     wrong.extend(drive.err());
     wrong.extend(sensors.err());
     wrong.into_iter().map(Into::into).collect()
 }
 
-/// All that the configuration says of the thruster's servo; nothing is opened yet.
-fn read(config: &Config, id: &str) -> Result<(Settings, drives::Chosen, Vec<sensors::Chosen>), ServoError> {
+fn rig_of<'a>(config: &'a Config, id: &str) -> Result<(&'a Thruster, Rig), ServoError> {
     let thruster = config.thruster(id)?;
     let (file, text) = config.rig_text(id, thruster)?;
     let rig = Rig::from_toml(&text).map_err(|error| ServoError::Rig { file, error })?;
+    Ok((thruster, rig))
+}
+
+/// Adds what the devices of a thruster take.
+fn takes(id: &str, drive: Option<&drives::Chosen>, sensors: &[sensors::Chosen], taken: &mut Vec<Taken>) {
+    let mut add = |section: String, claims: Vec<Claim>| {
+        let section = format!("thrusters.{id}.{section}");
+        let one = |claim| Taken { id: id.to_owned(), section: section.clone(), claim };
+        taken.extend(claims.into_iter().map(one));
+    };
+    if let Some(drive) = drive {
+        add("drive".into(), drive.claims());
+    }
+    for sensor in sensors {
+        add(format!("sensors.{}", sensor.name), sensor.claims());
+    }
+}
+
+/// All that the configuration says of the thruster's servo; nothing is opened yet.
+fn read(config: &Config, id: &str) -> Result<(Settings, drives::Chosen, Vec<sensors::Chosen>), ServoError> {
+    let (thruster, rig) = rig_of(config, id)?;
     let settings = Settings::new(config, id, thruster, &rig)?;
     let (drive, sensors) =
         (drives::choose(config, id, thruster, &rig)?, sensors::choose(config, id, thruster)?);
-    ports_apart(config, id, &drive, &sensors)?;
+    takes_its_own(config, id, &drive, &sensors)?;
     Ok((settings, drive, sensors))
 }
 
-/// Two devices on one serial port take each other's answers.
-fn ports_apart(
+/// Refuses a thruster that takes what another one of the deployment takes, or takes something twice. Another one that cannot be read
+/// is no hindrance to this one.
+fn takes_its_own(
     config: &Config,
     id: &str,
     drive: &drives::Chosen,
     sensors: &[sensors::Chosen],
 ) -> Result<(), ConfigError> {
-    let drive = match drive {
-        drives::Chosen::OnWire(wired, _) => Some(("drive".to_owned(), &wired.port)),
-        drives::Chosen::Simulated(_) | drives::Chosen::Iio(_) => None,
-    };
-    let sensors = sensors.iter().filter_map(|sensor| match &sensor.kind {
-        sensors::Kind::SerialLine(line) => Some((format!("sensors.{}", sensor.name), &line.port)),
-        sensors::Kind::Iio(_) => None,
-    });
-    let mut taken: Vec<(String, &PathBuf)> = Vec::new();
-    for (name, port) in drive.into_iter().chain(sensors) {
-        if let Some((other, _)) = taken.iter().find(|(_, there)| *there == port) {
-            return Err(config.error(format!(
-                "`thrusters.{id}.{name}.port` = {port:?} is `thrusters.{id}.{other}.port` too; allowed is one device a port\nhint: /dev/serial/by-id has a name for each"
-            )));
-        }
-        taken.push((name, port));
+    let mut taken = Vec::new();
+    takes(id, Some(drive), sensors, &mut taken);
+    if taken.is_empty() {
+        return Ok(());
     }
-    Ok(())
+    taken.clear();
+    for id in config.thrusters.keys() {
+        of_one(config, id, &mut taken);
+    }
+    let double = doubles(config, &taken).into_iter().find(|double| double.ids.iter().any(|of| of == id));
+    double.map_or(Ok(()), |double| Err(double.error))
 }
 
 /// Runs the servo of one thruster until SIGTERM, SIGINT or SIGHUP. With `join` another process owns the
@@ -271,26 +287,4 @@ fn own(
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn drive_and_instrument_on_one_port_are_refused_by_name() {
-        let sensor = |port: &str| {
-            format!(
-                "[thrusters.t1]\nrig = \"thrusters/whitcomb-yoerger-1999.toml\"\namplifier = \"vesc\"\n\
-                 [thrusters.t1.drive]\nport = \"/dev/p\"\npole_pairs = 7\n\
-                 [thrusters.t1.sensors.cell]\nkind = \"serial_line\"\nport = \"{port}\"\n\
-                 signals = {{ thrust_n = {{ column = 1, unit = \"N\" }} }}\n"
-            )
-        };
-        let wrong = |port: &str| {
-            let config = Config::parse(&sensor(port), None).unwrap();
-            problems(&config, "t1").iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
-        };
-        assert_eq!(wrong("/dev/q"), "");
-        let words = wrong("/dev/p");
-        assert!(words.contains("`thrusters.t1.sensors.cell.port` = \"/dev/p\""), "{words}");
-        assert!(words.contains("`thrusters.t1.drive.port` too") && words.contains("\nhint: "), "{words}");
-    }
-}
+mod tests;

@@ -14,6 +14,7 @@ use kort_proto::config::{Config, ConfigError, Thruster};
 use kort_proto::messages::DriveKind;
 use kort_thruster::rig::{AmplifierKind, Rig};
 
+use crate::claims::Claim;
 use crate::devices::{At, Shown};
 use crate::link::Protocol;
 
@@ -47,7 +48,7 @@ pub enum Chosen {
     /// A model of the rig in real time.
     Simulated(Box<Simulated>),
     /// A drive on a wire, and what is said on it.
-    OnWire(Wired, Box<dyn Protocol>),
+    OnWire(Box<Wired>, Box<dyn Protocol>),
     /// An analogue amplifier behind the kernel's files.
     Iio(Box<Iio>),
 }
@@ -64,29 +65,40 @@ pub fn choose(config: &Config, id: &str, thruster: &Thruster, rig: &Rig) -> Resu
         "simulated" => Ok(Chosen::Simulated(Box::new(Simulated::new(config, id, thruster, rig)?))),
         "vesc" => {
             let vesc = Vesc::new(config, id, thruster, rig)?;
-            Ok(Chosen::OnWire(vesc.wired.clone(), Box::new(vesc::Protocol::new(vesc))))
+            Ok(Chosen::OnWire(Box::new(vesc.wired.clone()), Box::new(vesc::Protocol::new(vesc))))
         }
         "odrive" => {
             let odrive = ODrive::new(config, id, thruster, rig)?;
-            Ok(Chosen::OnWire(odrive.wired.clone(), Box::new(odrive::Protocol::new(odrive))))
+            Ok(Chosen::OnWire(Box::new(odrive.wired.clone()), Box::new(odrive::Protocol::new(odrive))))
         }
         "moteus" => {
             let moteus = Moteus::new(config, id, thruster, rig)?;
-            Ok(Chosen::OnWire(moteus.wired.clone(), Box::new(moteus::Protocol::new(moteus))))
+            Ok(Chosen::OnWire(Box::new(moteus.wired.clone()), Box::new(moteus::Protocol::new(moteus))))
         }
         "cia402" => {
             let drive = Cia402::new(config, id, thruster, rig)?;
-            Ok(Chosen::OnWire(drive.wired.clone(), Box::new(cia402::Protocol::new(drive))))
+            Ok(Chosen::OnWire(Box::new(drive.wired.clone()), Box::new(cia402::Protocol::new(drive))))
         }
         "mavlink" => {
             let drive = Mavlink::new(config, id, thruster, rig)?;
-            Ok(Chosen::OnWire(drive.wired.clone(), Box::new(mavlink::Protocol::new(drive))))
+            Ok(Chosen::OnWire(Box::new(drive.wired.clone()), Box::new(mavlink::Protocol::new(drive))))
         }
         "iio" => Ok(Chosen::Iio(Box::new(Iio::new(config, id, thruster, rig)?))),
         other => Err(config.error(format!(
             "`thrusters.{id}.amplifier` = \"{other}\" is no drive\nhint: known are \"{}\"",
             ALL.join("\", \"")
         ))),
+    }
+}
+
+impl Chosen {
+    /// What no other device may have too.
+    pub fn claims(&self) -> Vec<Claim> {
+        match self {
+            Self::Simulated(_) => Vec::new(),
+            Self::OnWire(wired, _) => wired.claims.clone(),
+            Self::Iio(iio) => iio.claims(),
+        }
     }
 }
 

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use kort_proto::config::{Config, ConfigError, Thruster};
 use serde::Deserialize;
 
+use crate::claims::Claim;
 use crate::link::Medium;
 
 /// Section `drive` as written.
@@ -104,14 +105,9 @@ impl Times {
 }
 
 /// Keys that only some drives have: why another has none, and what to do.
-const OWN: [(&str, &str, &str); 7] = [
+const OWN: [(&str, &str, &str); 6] = [
     ("pole_pairs", "this drive tells the speed of the shaft itself", "leave the key out"),
     ("address", "this drive is alone on its wire", "leave the key out"),
-    (
-        "identity",
-        "kort reads no serial number of this drive",
-        "leave the key out, and name the port by the adapter's: /dev/serial/by-id/…",
-    ),
     ("bitrate", "this drive is on no CAN adapter", "leave the key out; `baud` is a serial port's"),
     ("units_per_turn", "this drive tells angles in turns", "leave the key out"),
     ("speed_units", "this drive tells speed in a unit that kort knows", "leave the key out"),
@@ -147,6 +143,8 @@ pub struct Wired {
     pub speed_units: Option<f64>,
     /// Number of the motor, for drives that have several.
     pub motor: Option<u32>,
+    /// What no other device may have too: the wire, unless the drive shares it, and the one drive that is meant.
+    pub claims: Vec<Claim>,
 }
 
 impl Wired {
@@ -181,14 +179,18 @@ impl Wired {
             reading_life_ms: keys.reading_life_ms,
         };
         times.check(thruster).map_err(|words| config.error(format!("`{section}.{words}")))?;
+        let identity = keys.identity.to_ascii_lowercase();
+        let meant = Some(&identity).filter(|identity| !identity.is_empty());
+        let meant = meant.map(|identity| Claim::identity(&thruster.amplifier, identity));
         Ok(Self {
+            claims: [Claim::port(&keys.port)].into_iter().chain(meant).collect(),
             medium: Medium::Serial { port: keys.port.clone(), baud: keys.baud },
             port: keys.port,
             rate_hz: keys.rate_hz,
             timeout_s: keys.timeout_ms * 1e-3,
             reading_life_ns: times.reading_life_ns(),
             reversed: keys.reversed,
-            identity: keys.identity.to_ascii_lowercase(),
+            identity,
             pole_pairs: keys.pole_pairs,
             address: keys.address,
             bitrate: keys.bitrate,
@@ -209,6 +211,26 @@ impl Wired {
             priority,
             is_drive: true,
         }
+    }
+
+    /// Why the drive that says this of itself is not the one that is meant, if it is not.
+    pub fn is_another(&self, found: &str) -> Option<String> {
+        let wanted = &self.identity;
+        (!wanted.is_empty() && wanted != found).then(|| {
+            format!(
+                "`drive.identity` = {wanted}, but {found} answers\nhint: two drives swapped? else put that number there"
+            )
+        })
+    }
+
+    /// Why a drive that tells no number is not known to be the one that is meant, if one is.
+    pub fn is_nameless(&self) -> Option<String> {
+        let wanted = &self.identity;
+        (!wanted.is_empty()).then(|| {
+            format!(
+                "`drive.identity` = {wanted}, but it does not tell its serial number\nhint: a noisy wire? else leave the key out, and name the port by the adapter's: /dev/serial/by-id/…"
+            )
+        })
     }
 
     /// Sign between the thruster's ahead and the drive's.

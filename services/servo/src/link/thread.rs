@@ -34,6 +34,8 @@ pub(super) struct Serving {
     ending: Arc<AtomicBool>,
     /// Said last, so that what lasts is said once.
     complaint: String,
+    /// Who answered last, likewise: a drive that is refused is asked again and again.
+    who: String,
     /// The fault that the device reports of itself.
     fault: Option<String>,
     /// The device has said something since the port was opened.
@@ -57,6 +59,7 @@ impl Serving {
             waker,
             ending,
             complaint: String::new(),
+            who: String::new(),
             fault: None,
             answered: false,
             driving: false,
@@ -161,6 +164,7 @@ impl Serving {
         self.protocol.begin();
         self.stamps.forget(self.wire.reading_life_ns);
         self.answered = false;
+        self.who.clear();
         self.fault = None;
         self.told.guarded = false;
         self.publish();
@@ -193,11 +197,14 @@ impl Serving {
     }
 
     fn converse(&mut self, talk: impl FnOnce(&mut dyn Protocol, &mut dyn FnMut(Heard))) {
-        let Self { protocol, wire, told, answered, complaint, fault, guarded_ns, stamps, .. } = self;
+        let Self { protocol, wire, told, answered, complaint, who, fault, guarded_ns, stamps, .. } = self;
         let mut restarted = false;
         talk(protocol.as_mut(), &mut |heard| match heard {
             Heard::Known(words) => {
-                info!("{}: {}", wire.name, printable(&words));
+                if *who != words {
+                    info!("{}: {}", wire.name, printable(&words));
+                    *who = words;
+                }
                 *answered = true;
             }
             // One that nobody asked for is an answer of before.

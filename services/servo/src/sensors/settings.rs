@@ -12,6 +12,7 @@ use super::iio::Iio;
 use super::serial_line::SerialLine;
 use super::units::to_si;
 use super::{Channel, place};
+use crate::claims::Claim;
 
 /// Names of the kinds, as `kind` gives them.
 const KINDS: [&str; 2] = ["serial_line", "iio"];
@@ -243,6 +244,16 @@ fn channel<F>(
         ));
     }
     Ok(Channel { from, place, scale: factor * scale, offset: zero + given.offset })
+}
+
+impl Chosen {
+    /// What no other device may have too. Files of the kernel are read by any number.
+    pub fn claims(&self) -> Vec<Claim> {
+        match &self.kind {
+            Kind::SerialLine(line) => vec![Claim::port(&line.port)],
+            Kind::Iio(_) => Vec::new(),
+        }
+    }
 }
 
 #[cfg(feature = "process")]

@@ -40,6 +40,7 @@ use kort_thruster::rig::Rig;
 pub use protocol::Protocol;
 
 use super::{Wired, current_or_speed};
+use crate::claims::Claim;
 use crate::link::Medium;
 use crate::link::can::Carrier;
 
@@ -86,7 +87,7 @@ impl Cia402 {
     /// # Errors
     /// [`ConfigError`] names key, value and what is allowed.
     pub fn new(config: &Config, id: &str, thruster: &Thruster, rig: &Rig) -> Result<Self, ConfigError> {
-        let own = ["address", "identity", "bitrate", "units_per_turn", "speed_units"];
+        let own = ["address", "bitrate", "units_per_turn", "speed_units"];
         let mut wired = Wired::new(config, id, thruster, &own)?;
         let kind = current_or_speed(config, id, thruster, rig)?;
         let fail =
@@ -145,6 +146,20 @@ impl Cia402 {
         }
         if on_interface {
             wired.medium = Medium::Can { interface: wired.port.clone(), node };
+            // Others may be on the bus: the node is its own.
+            let interface = wired.port.display();
+            wired.claims.retain(|claim| claim.key != "port");
+            wired.claims.push(Claim {
+                key: "address",
+                value: node.to_string(),
+                thing: format!("{interface} node {node}"),
+                allowed: format!("one drive a node on {interface}"),
+                hint: "another node for one of them, 1 to 63, by its switches or its own tool",
+            });
+        }
+        // Drives without a serial number of their own all tell the same.
+        if wired.identity.ends_with(":0") {
+            wired.claims.retain(|claim| claim.key != "identity");
         }
         let carrier = if on_interface { Carrier::Socket } else { Carrier::Slcan };
         Ok(Self { wired, kind, node, carrier, bitrate: digit, units_per_turn, speed_units })

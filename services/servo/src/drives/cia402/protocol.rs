@@ -169,12 +169,9 @@ impl Protocol {
             return self.refuse(words, heard);
         }
         if (index, sub) == (0x1018, 4) {
-            let (identity, wanted) = (self.learned.identity(), &self.drive.wired.identity);
+            let identity = self.learned.identity();
             heard(Heard::Known(format!("CiA 402 drive, node {}, identity {identity}", self.drive.node)));
-            if !wanted.is_empty() && *wanted != identity {
-                let words = format!(
-                    "`drive.identity` = {wanted}, but {identity} answers\nhint: two drives swapped? else put that there"
-                );
+            if let Some(words) = self.drive.wired.is_another(&identity) {
                 return self.refuse(words, heard);
             }
         }

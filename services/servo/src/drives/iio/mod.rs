@@ -37,6 +37,8 @@ use std::path::PathBuf;
 
 use kort_proto::messages::DriveKind;
 
+use crate::claims::{Claim, real};
+
 /// An analogue amplifier as the configuration describes it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Iio {
@@ -108,6 +110,54 @@ pub struct Counter {
     pub counts_per_turn: f64,
     /// Largest count, where the kernel does not say.
     pub ceiling: Option<u64>,
+}
+
+impl Iio {
+    /// What no other device may have too: each file that is driven, and each that tells of this amplifier alone.
+    pub fn claims(&self) -> Vec<Claim> {
+        let channel = |key, place: &Place, allowed, hint| {
+            let at = real(&place.folder).join(&place.channel);
+            Claim::file(key, &place.folder.join(&place.channel), at, allowed, hint)
+        };
+        let file = |key, path: &PathBuf, allowed, hint| Claim::file(key, path, real(path), allowed, hint);
+        let mut claims = vec![channel(
+            "dac",
+            &self.dac,
+            "one thruster a channel",
+            "the channel that the other amplifier is wired to: `ls` in the DAC's folder shows them",
+        )];
+        if let Some(watchdog) = &self.watchdog {
+            claims.push(file(
+                "watchdog",
+                &watchdog.pulse,
+                "one thruster a watchdog",
+                "a line and a circuit for each: one that is shared is fed by the other thruster when this one's servo dies",
+            ));
+            claims.push(file(
+                "enabled",
+                &watchdog.enabled,
+                "one thruster an input",
+                "an input at each amplifier's own enable: the other one's says nothing of this one's watchdog",
+            ));
+        }
+        if let Some(current) = &self.current {
+            claims.push(channel(
+                "current.adc",
+                &current.adc,
+                "one thruster a current monitor",
+                "the channel of the other amplifier's own monitor",
+            ));
+        }
+        if let Some(counter) = &self.counter {
+            claims.push(file(
+                "counter.count",
+                &counter.folder,
+                "one thruster a counter",
+                "the counter of the other shaft's encoder",
+            ));
+        }
+        claims
+    }
 }
 
 #[cfg(feature = "process")]

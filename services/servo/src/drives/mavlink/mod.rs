@@ -50,6 +50,7 @@ use kort_thruster::rig::Rig;
 pub use protocol::Protocol;
 
 use super::{Wired, kind_of};
+use crate::claims::Claim;
 use crate::link::Medium;
 
 /// What a port that is an address begins with.
@@ -78,7 +79,7 @@ impl Mavlink {
     /// # Errors
     /// [`ConfigError`] names key, value and what is allowed.
     pub fn new(config: &Config, id: &str, thruster: &Thruster, rig: &Rig) -> Result<Self, ConfigError> {
-        let mut wired = Wired::new(config, id, thruster, &["identity", "address", "motor"])?;
+        let mut wired = Wired::new(config, id, thruster, &["address", "motor"])?;
         let fail =
             |key: &str, words: String| Err(config.error(format!("`thrusters.{id}.drive.{key}` {words}")));
         if kind_of(rig) != DriveKind::Voltage {
@@ -132,6 +133,20 @@ impl Mavlink {
                 }
             }
         }
+        let udp = matches!(wired.medium, Medium::Udp(_));
+        // A vehicle has several motors, and by UDP several may ask it: the motor is its own.
+        let vehicles = [
+            udp.then(|| format!("{} system {system}", wired.medium)),
+            Some(format!("vehicle {}", wired.identity)).filter(|_| !wired.identity.is_empty()),
+        ];
+        wired.claims.retain(|claim| claim.key == "port" && !udp);
+        wired.claims.extend(vehicles.into_iter().flatten().map(|vehicle| Claim {
+            key: "motor",
+            value: motor.to_string(),
+            thing: format!("{vehicle} motor {motor}"),
+            allowed: "one thruster a motor of a vehicle".to_owned(),
+            hint: "its other motors by their numbers, as QGroundControl counts them",
+        }));
         Ok(Self { wired, system, motor, supply_v: rig.amplifier.supply_v.unwrap_or(f64::NAN) })
     }
 }

@@ -168,7 +168,6 @@ impl Protocol {
         }
         self.version = format!("ArduSub {major}.{minor}.{patch}");
         heard(Heard::Known(format!("{}, identity {uid}", self.version)));
-        let wanted = &self.drive.wired.identity;
         if !FIRMWARE.contains(&(major, minor)) {
             let (low, high) = (FIRMWARE.start(), FIRMWARE.end());
             let words = format!(
@@ -176,10 +175,7 @@ impl Protocol {
                 self.version, low.0, low.1, high.0, high.1
             );
             self.refuse(words, heard);
-        } else if !wanted.is_empty() && *wanted != uid {
-            let words = format!(
-                "`drive.identity` = {wanted}, but {uid} answers\nhint: two vehicles swapped? else put that number there"
-            );
+        } else if let Some(words) = self.drive.wired.is_another(&uid) {
             self.refuse(words, heard);
         } else {
             (self.stage, self.asked) = (Stage::Outputs, 0);

@@ -12,6 +12,9 @@
 //! `servo.timeout_mode`, which must be 0, stopped: the factory's 12 would brake. kort reads it through the diagnostic channel and sets it in
 //! RAM where it differs (`conf set`, never `conf write`), and reads it again.
 //!
+//! Which one it is: the serial number of 96 bits in registers 0x120 to 0x122, least significant word first, here in hexadecimal with the
+//! most significant first. With `identity` another one, or one that tells none, is not armed.
+//!
 //! Output off is mode 0, stopped: the shaft coasts; it also clears the drive's faults, which are `amplifier_fault` as long as they
 //! stand. A drive that leaves position mode by itself, or whose millisecond counter goes back, was reset. Lines carry a
 //! check sum wherever the far end uses one, which a UART always does; over USB the bus has its own.

@@ -33,6 +33,9 @@ const FAULT: usize = 0x0f;
 const COMMAND_POSITION: u8 = 0x20;
 const TIMEOUT: u8 = 0x27;
 const MILLISECONDS: u8 = 0x70;
+/// Three words, the least significant first.
+const SERIAL_NUMBER: usize = 0x120;
+const SERIAL_WORDS: usize = 3;
 /// Registers whose answers are kept.
 const KEPT: usize = 0x10;
 
@@ -67,6 +70,8 @@ pub struct Protocol {
     stage: Stage,
     asked: u32,
     known: bool,
+    /// Its number, once it was told.
+    serial_number: Option<String>,
     set: bool,
     /// What came through the diagnostic channel and is no whole line yet.
     said: String,
@@ -85,6 +90,7 @@ impl Protocol {
             stage: Stage::Asking,
             asked: 0,
             known: false,
+            serial_number: None,
             set: false,
             said: String::new(),
             milliseconds: None,
@@ -128,7 +134,22 @@ impl Protocol {
     /// Answers of the diagnostic channel: a number for `conf get`, OK for `conf set`.
     fn diagnostic(&mut self, line: &str, heard: &mut dyn FnMut(Heard)) {
         if !std::mem::replace(&mut self.known, true) {
-            heard(Heard::Known(format!("moteus {}", self.moteus.address)));
+            let number = self.serial_number.as_deref().unwrap_or("not told");
+            heard(Heard::Known(format!("moteus {}, identity {number}", self.moteus.address)));
+        }
+        if self.stage == Stage::Refused {
+            return;
+        }
+        let wired = &self.moteus.wired;
+        let another = match &self.serial_number {
+            Some(number) => wired.is_another(number),
+            // An answer that was lost is asked for again.
+            None if wired.is_nameless().is_some() => return,
+            None => None,
+        };
+        if let Some(words) = another {
+            self.stage = Stage::Refused;
+            return heard(Heard::Unguarded(words));
         }
         match (self.stage, line) {
             (Stage::Asking, "0") => {
@@ -166,30 +187,37 @@ impl Protocol {
     fn registers(&mut self, mut data: &[u8], heard: &mut dyn FnMut(Heard)) {
         let mut kept = [f64::NAN; KEPT];
         let mut milliseconds = None;
+        let mut serial = [None; SERIAL_WORDS];
         while let Some((&part, rest)) = data.split_first() {
             data = rest;
             if part == NOP {
                 continue;
             }
-            let (kind, mut count) = (part & !3, usize::from(part & 3));
+            let (kind, mut count) = (part & !3, u32::from(part & 3));
             if !matches!(kind, REPLY_FLOAT | REPLY_INT32) {
                 return;
             }
             if count == 0 {
-                let Some((&number, rest)) = data.split_first() else { return };
-                (count, data) = (usize::from(number), rest);
+                let Some((number, rest)) = varuint(data) else { return };
+                (count, data) = (number, rest);
             }
-            let Some((&first, rest)) = data.split_first() else { return };
+            let Some((first, rest)) = varuint(data) else { return };
             data = rest;
-            for register in usize::from(first)..usize::from(first) + count {
+            for register in (first as usize..).take(count as usize) {
                 let Some((value, rest)) = data.split_first_chunk::<4>() else { return };
                 data = rest;
+                let word = register.checked_sub(SERIAL_NUMBER).and_then(|word| serial.get_mut(word));
                 if kind == REPLY_INT32 && register == usize::from(MILLISECONDS) {
                     milliseconds = Some(i32::from_le_bytes(*value));
+                } else if let Some(word) = word.filter(|_| kind == REPLY_INT32) {
+                    *word = Some(u32::from_le_bytes(*value));
                 } else if let Some(kept) = kept.get_mut(register).filter(|_| kind == REPLY_FLOAT) {
                     *kept = f64::from(f32::from_le_bytes(*value));
                 }
             }
+        }
+        if let [Some(low), Some(middle), Some(high)] = serial {
+            self.serial_number = Some(format!("{high:08x}{middle:08x}{low:08x}"));
         }
         if let Some(milliseconds) = milliseconds {
             self.values(&kept, milliseconds, heard);
@@ -236,12 +264,20 @@ impl link::Protocol for Protocol {
 
     fn ask(&mut self, out: &mut Vec<u8>, heard: &mut dyn FnMut(Heard)) {
         if self.asked == ASKED_IN_VAIN {
-            heard(Heard::Unguarded(
-                "does not tell its servo.timeout_mode\nhint: `address`, bus wiring and termination, its supply".into(),
-            ));
+            // One that was refused has been told why, and is asked anew.
+            if self.stage != Stage::Refused {
+                let nameless = self.moteus.wired.is_nameless().filter(|_| self.known);
+                heard(Heard::Unguarded(nameless.unwrap_or_else(|| {
+                    "does not tell its servo.timeout_mode\nhint: `address`, bus wiring and termination, its supply".into()
+                })));
+            }
             self.begin();
         }
         self.asked += 1;
+        if self.stage == Stage::Asking && self.serial_number.is_none() {
+            let [low, high] = [SERIAL_NUMBER as u8 | 0x80, (SERIAL_NUMBER >> 7) as u8];
+            self.send(&[READ_INT32 | SERIAL_WORDS as u8, low, high], true, out);
+        }
         match self.stage {
             Stage::Asking => self.say("conf get servo.timeout_mode", out),
             Stage::Setting => self.say("conf set servo.timeout_mode 0", out),
@@ -295,6 +331,14 @@ impl link::Protocol for Protocol {
     }
 }
 
+/// A number in parts of seven bits, the lowest first, each but the last with its highest bit set; and what follows it.
+fn varuint(data: &[u8]) -> Option<(u32, &[u8])> {
+    let end = data.iter().take(5).position(|byte| byte & 0x80 == 0)?;
+    let (parts, rest) = data.split_at_checked(end + 1)?;
+    let number = parts.iter().rev().fold(0u64, |number, part| number << 7 | u64::from(part & 0x7f));
+    Some((u32::try_from(number).ok()?, rest))
+}
+
 /// A fault in the words of the firmware's list (`error.h`); later firmware may have more.
 fn fault_name(code: u8) -> &'static str {
     match code {
@@ -316,6 +360,17 @@ fn fault_name(code: u8) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The number of a register beyond 127 takes two bytes.
+    #[test]
+    fn numbers_of_several_bytes_are_read() {
+        assert_eq!(varuint(&[0x70, 9]), Some((0x70, &[9][..])));
+        assert_eq!(varuint(&[0xa0, 0x02, 9]), Some((0x120, &[9][..])));
+        assert_eq!(varuint(&[0xff, 0xff, 0xff, 0xff, 0x0f]), Some((u32::MAX, &[][..])));
+        for none in [&[][..], &[0x80], &[0xff; 5], &[0x80; 9], &[0xff, 0xff, 0xff, 0xff, 0x1f]] {
+            assert_eq!(varuint(none), None, "{none:?}");
+        }
+    }
 
     #[test]
     fn faults_have_the_firmwares_names() {

@@ -12,6 +12,9 @@
 //! motor go. That error, which every silence leaves, is cleared at the start; any other is `amplifier_fault` until
 //! somebody clears it in the drive.
 //!
+//! Which one it is: the serial number that `i` prints, twelve hexadecimal digits, as `odrivetool` shows it. Property `serial_number` would
+//! not do: `r` prints the first nine characters of a number. With `identity` another one, or one that tells none, is not armed.
+//!
 //! Output on is the axis in closed loop control, off is idle: the shaft coasts. An axis that leaves closed loop by
 //! itself is `amplifier_fault`. A reset shows by the watchdog being off again, or by USB going away.
 

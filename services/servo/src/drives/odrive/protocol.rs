@@ -19,6 +19,11 @@ const ASKED_IN_VAIN: u32 = 10;
 /// Exchanges that the axis may take to enter closed loop.
 const ENTERING: u32 = 100;
 
+/// What lines of the answer to `i` begin with; the number is in the last one.
+const FIRMWARE: &str = "Firmware version: ";
+const SERIAL_NUMBER: &str = "Serial number: ";
+/// Questions for the number before one that nobody asked for is done without.
+const NUMBER_ASKED: u32 = 3;
 /// Properties asked for behind `f 0` at the start, in this order.
 const SETTINGS: [&str; 6] = [
     "fw_version_major",
@@ -39,6 +44,8 @@ const VALUES: [&str; 5] = [
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Stage {
+    /// Which one is it? Nothing is set in another one.
+    Number,
     Settings,
     Guarded,
     /// Not to be driven, for a reason that was said.
@@ -52,6 +59,12 @@ pub struct Protocol {
     stage: Stage,
     asked: u32,
     known: bool,
+    /// Its firmware, by its own words.
+    firmware: Option<String>,
+    /// Its number was just told: the next question need not wait.
+    go_on: bool,
+    /// The next question was asked so.
+    gone_on: bool,
     /// The time-out was set; what is read next must be it.
     set: bool,
     /// The error that silence leaves is to be cleared.
@@ -70,9 +83,12 @@ impl Protocol {
         Self {
             odrive,
             lines: Lines::default(),
-            stage: Stage::Settings,
+            stage: Stage::Number,
             asked: 0,
             known: false,
+            firmware: None,
+            go_on: false,
+            gone_on: false,
             set: false,
             clear: false,
             torque_constant_nm_a: f64::NAN,
@@ -86,6 +102,12 @@ impl Protocol {
     /// An answer begins with the two numbers of `f 0` and goes on with one a line; what comes otherwise is none, and
     /// neither is one with a line lost.
     fn line(&mut self, words: &str, heard: &mut dyn FnMut(Heard)) {
+        if let Some(firmware) = words.strip_prefix(FIRMWARE) {
+            self.firmware = Some(firmware.trim().to_owned());
+        }
+        if let Some(number) = words.strip_prefix(SERIAL_NUMBER) {
+            return self.number(&number.trim().to_ascii_lowercase(), heard);
+        }
         let numbers: Vec<f64> = words.split(' ').filter_map(|word| word.parse().ok()).collect();
         let wanted = if self.stage == Stage::Guarded { VALUES.len() } else { SETTINGS.len() };
         match (numbers.as_slice(), self.moving) {
@@ -109,15 +131,36 @@ impl Protocol {
         }
     }
 
+    /// Its number.
+    fn number(&mut self, number: &str, heard: &mut dyn FnMut(Heard)) {
+        self.moving = None;
+        let is_one = !number.is_empty() && number.bytes().all(|digit| digit.is_ascii_hexdigit());
+        if self.stage != Stage::Number || !is_one {
+            return;
+        }
+        self.asked = 0;
+        self.is_there(number, heard);
+        match self.odrive.wired.is_another(number) {
+            Some(words) => self.refuse(words, heard),
+            None => (self.stage, self.go_on) = (Stage::Settings, true),
+        }
+    }
+
+    /// Says once who answers.
+    fn is_there(&mut self, number: &str, heard: &mut dyn FnMut(Heard)) {
+        if !std::mem::replace(&mut self.known, true) {
+            let firmware = self.firmware.as_deref().unwrap_or("not told");
+            heard(Heard::Known(format!("ODrive, firmware {firmware}, identity {number}")));
+        }
+    }
+
     fn settings(&mut self, numbers: &[f64], heard: &mut dyn FnMut(Heard)) {
         let [major, minor, enabled, timeout_s, torque_constant_nm_a, error] = *numbers else { return };
         if self.stage == Stage::Refused {
             return;
         }
         self.asked = 0;
-        if !std::mem::replace(&mut self.known, true) {
-            heard(Heard::Known(format!("ODrive, firmware {major}.{minor}")));
-        }
+        self.is_there("not told", heard);
         let most_s = self.odrive.wired.timeout_s;
         if (major, minor) != (0.0, 5.0) {
             self.refuse(
@@ -147,6 +190,20 @@ impl Protocol {
             );
             self.refuse(words, heard);
         }
+    }
+
+    /// Off, then what kort needs of it, and asks for it; the error that silence left goes last, when the watchdog is fed again.
+    fn set(&mut self, out: &mut Vec<u8>) {
+        line(&format!("w axis0.requested_state {IDLE}"), out);
+        line(&format!("w axis0.config.watchdog_timeout {}", self.odrive.wired.timeout_s), out);
+        line("u 0", out);
+        line("w axis0.config.enable_watchdog 1", out);
+        line("u 0", out);
+        if std::mem::take(&mut self.clear) {
+            line("sc", out);
+        }
+        self.set = true;
+        ask_for(&SETTINGS, out);
     }
 
     fn refuse(&mut self, words: String, heard: &mut dyn FnMut(Heard)) {
@@ -198,24 +255,35 @@ impl link::Protocol for Protocol {
 
     fn ask(&mut self, out: &mut Vec<u8>, heard: &mut dyn FnMut(Heard)) {
         if self.asked == ASKED_IN_VAIN {
-            heard(Heard::Unguarded(
-                "does not answer in full\nhint: is its ASCII protocol on (config.enable_uart_a, or USB), is it an ODrive of firmware 0.5?".into(),
-            ));
+            let nameless = self.odrive.wired.is_nameless();
+            let nameless = nameless.filter(|_| self.stage == Stage::Number && self.firmware.is_some());
+            if nameless.is_some() {
+                self.is_there("not told", heard);
+            }
+            // One that was refused has been told why, and is asked anew.
+            if self.stage != Stage::Refused {
+                heard(Heard::Unguarded(nameless.unwrap_or_else(|| {
+                    "does not answer in full\nhint: is its ASCII protocol on (config.enable_uart_a, or USB), is it an ODrive of firmware 0.5?".into()
+                })));
+            }
             self.begin();
         }
         self.asked += 1;
-        if self.stage == Stage::Settings {
-            // Off, then what kort needs of it; the error that silence left goes last, when the watchdog is fed again.
-            line(&format!("w axis0.requested_state {IDLE}"), out);
-            line(&format!("w axis0.config.watchdog_timeout {}", self.odrive.wired.timeout_s), out);
-            line("u 0", out);
-            line("w axis0.config.enable_watchdog 1", out);
-            line("u 0", out);
-            if std::mem::take(&mut self.clear) {
-                line("sc", out);
-            }
-            self.set = true;
-            ask_for(&SETTINGS, out);
+        if self.stage == Stage::Number && self.asked > NUMBER_ASKED && self.odrive.wired.identity.is_empty() {
+            self.stage = Stage::Settings;
+        }
+        match self.stage {
+            Stage::Number => line("i", out),
+            // A slow line still carries the answer to what went out behind the number.
+            Stage::Settings if !std::mem::take(&mut self.gone_on) => self.set(out),
+            Stage::Settings | Stage::Guarded | Stage::Refused => (),
+        }
+    }
+
+    fn reply(&mut self, out: &mut Vec<u8>) {
+        if std::mem::take(&mut self.go_on) {
+            self.gone_on = true;
+            self.set(out);
         }
     }
 

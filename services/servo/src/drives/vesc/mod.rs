@@ -50,7 +50,7 @@ impl Vesc {
     /// # Errors
     /// [`ConfigError`] names key, value and what is allowed.
     pub fn new(config: &Config, id: &str, thruster: &Thruster, rig: &Rig) -> Result<Self, ConfigError> {
-        let wired = Wired::new(config, id, thruster, &["pole_pairs", "identity"])?;
+        let wired = Wired::new(config, id, thruster, &["pole_pairs"])?;
         let key = format!("thrusters.{id}.drive.pole_pairs");
         let pole_pairs = match wired.pole_pairs {
             Some(pairs) if (1..=100).contains(&pairs) => f64::from(pairs),

@@ -95,7 +95,6 @@ impl Protocol {
         let uuid = rest.get(name_end + 1..name_end + 13).unwrap_or_default();
         let uuid: String = uuid.iter().map(|b| format!("{b:02x}")).collect();
         let name = String::from_utf8_lossy(rest.get(..name_end).unwrap_or_default()).into_owned();
-        let wanted = &self.vesc.wired.identity;
         self.asked = 0;
         heard(Heard::Known(format!("{name}, firmware {major}.{minor:02}, identity {uuid}")));
         if !FIRMWARE.contains(major) {
@@ -105,11 +104,9 @@ impl Protocol {
                 FIRMWARE.start(),
                 FIRMWARE.end()
             )));
-        } else if !wanted.is_empty() && *wanted != uuid {
+        } else if let Some(words) = self.vesc.wired.is_another(&uuid) {
             self.stage = Stage::Refused;
-            heard(Heard::Unguarded(format!(
-                "`drive.identity` = {wanted}, but {uuid} answers\nhint: two drives swapped? else put that number there"
-            )));
+            heard(Heard::Unguarded(words));
         } else {
             self.stage = Stage::Settings;
         }
@@ -187,11 +184,21 @@ impl link::Protocol for Protocol {
 
     fn ask(&mut self, out: &mut Vec<u8>, heard: &mut dyn FnMut(Heard)) {
         if self.asked == ASKED_IN_VAIN {
-            heard(Heard::Unguarded(match self.stage {
-                Stage::Setting => "does not take its settings: its time-out is not as it must be\nhint: VESC Tool, App Settings, General: time-out, without a braking current".into(),
-                Stage::Settings => "does not tell its app settings, and its time-out with them\nhint: is the firmware whole?".into(),
-                _ => "does not answer\nhint: baud rate, wiring (TX to RX), and UART switched on in VESC Tool, App Settings".to_owned(),
-            }));
+            let why = match self.stage {
+                Stage::Setting => {
+                    "does not take its settings: its time-out is not as it must be\nhint: VESC Tool, App Settings, General: time-out, without a braking current"
+                }
+                Stage::Settings => {
+                    "does not tell its app settings, and its time-out with them\nhint: is the firmware whole?"
+                }
+                _ => {
+                    "does not answer\nhint: baud rate, wiring (TX to RX), and UART switched on in VESC Tool, App Settings"
+                }
+            };
+            // One that was refused has been told why.
+            if self.stage != Stage::Refused {
+                heard(Heard::Unguarded(why.to_owned()));
+            }
             // Perhaps an answer was lost, or the drive is another one by now: from the beginning.
             self.begin();
         }
