@@ -28,7 +28,7 @@ pub struct Decision {
 }
 
 /// A rival stands near a name from this share of its probability on: odds of five to one part them.
-const NEAR: f64 = 0.2;
+pub(crate) const NEAR: f64 = 0.2;
 /// From this probability on, among all that was fitted, a name is believed.
 const BELIEVED: f64 = 0.7;
 /// A remainder below this share of what was to be explained is of no practical size.

@@ -9,7 +9,9 @@ use kort_thruster::rig::Rig;
 use serde::Serialize;
 
 use crate::constants::Constants;
-use crate::posterior::posterior;
+use crate::decide::NEAR;
+use crate::left;
+use crate::posterior::{Explanation, posterior, told};
 use crate::report::Report;
 use crate::search::{Search, Set};
 use crate::traces::Traces;
@@ -59,7 +61,7 @@ pub fn diagnose(
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<Diagnosis, DataError> {
     let constants = Constants::built_in();
-    let Setup { series, problem, mut baseline, notes, thin } =
+    let Setup { series, problem, mut baseline, mut notes, thin } =
         Setup::of_stretches(series, rig, options.model, constants.criterion)?;
     for effect in &options.with {
         let values = baseline.start.clone();
@@ -75,8 +77,13 @@ pub fn diagnose(
     }
     progress("looking for what has no name");
     unknown::look(&mut search, &best, rig, &offered, progress);
-    let costs: Vec<(Set, f64)> = search.fits.keys().map(|set| (set.clone(), search.cost(set))).collect();
-    let explanations = posterior(costs, search.temper(), constants.posterior.surprise);
+    let (explanations, set_aside) = explanations(&search, &constants);
+    if set_aside {
+        notes.push(
+            "the odds alone do not part the baseline from what is told; it is set aside because it leaves more than noise of such sensors can be"
+                .into(),
+        );
+    }
     progress("scoring on held-out data");
     let evidence = search.fits.iter().map(|(set, fit)| Evidence {
         effects: set.clone(),
@@ -86,6 +93,24 @@ pub fn diagnose(
     let evidence = evidence.collect();
     let (report, traces) = Writer::new(&search, explanations, &series, rig, options).write(notes, thin);
     Ok(Diagnosis { report, traces, evidence })
+}
+
+/// Probabilities of all sets that were fitted. What the baseline alone leaves is no noise of sensors where it is larger than
+/// theirs or follows the machine; where it is likeliest all the same and a set near it leaves none of that, it is set
+/// aside, and it is said that it was: a constant is one fact, however plain it is.
+fn explanations(search: &Search, constants: &Constants) -> (Vec<Explanation>, bool) {
+    let costs: Vec<(Set, f64)> = search.fits.keys().map(|set| (set.clone(), search.cost(set))).collect();
+    let of = |costs| posterior(costs, search.temper(), constants.posterior.surprise);
+    let all = of(costs.clone());
+    let leaves_more = |set: &Set| left::leaves_more(search.problem, &search.fits[set]);
+    let Some(likeliest) = told(&all).filter(|e| e.set.is_empty() && leaves_more(&e.set)) else {
+        return (all, false);
+    };
+    let near = |e: &&Explanation| !e.set.is_empty() && e.probability >= NEAR * likeliest.probability;
+    if !all.iter().filter(near).any(|e| !leaves_more(&e.set)) {
+        return (all, false);
+    }
+    (of(costs.into_iter().filter(|(set, _)| !set.is_empty()).collect()), true)
 }
 
 /// Effects that can act here.

@@ -40,11 +40,12 @@ pub struct Rest {
 }
 
 /// What a fit leaves that is no noise: either it follows what the machine does by more than our equations may err, or
-/// it is larger than sensors of this kind err.
+/// it is larger than sensors of this kind err and what drives is in doubt.
 pub fn more_than_noise(problem: &Problem, fit: &Fit, residual: &Stack, floor: &Noise) -> Option<Rest> {
     let may_err = problem.spectrum.variances(&fit.floor.levels());
     let following = follows(problem, fit, residual);
     let lasting = lasting(problem, residual);
+    let doubt = problem.spectrum.variances(&problem.doubt);
     let mut all = Vec::new();
     for (r, recording) in problem.recordings.iter().enumerate() {
         for (c, channel) in recording.channels.iter().enumerate() {
@@ -57,10 +58,17 @@ pub fn more_than_noise(problem: &Problem, fit: &Fit, residual: &Stack, floor: &N
             let noise = floor.get(channel.response.name()).copied().unwrap_or(0.0);
             let beyond = (lasting[r][c] - noise).max(0.0).sqrt();
             let practical = practical(channel.response) * channel.full_scale;
-            all.push(rest(beyond, practical.hypot(resolution(problem.rig, recording, channel.response))));
+            let sensor = practical.hypot(resolution(problem.rig, recording, channel.response));
+            all.push(rest(beyond, sensor.hypot(doubt[r][c].sqrt())));
         }
     }
     all.into_iter().filter(|rest| rest.ratio > 1.0).max_by(|a, b| a.ratio.total_cmp(&b.ratio))
+}
+
+/// Whether a fit leaves more than noise.
+pub fn leaves_more(problem: &Problem, fit: &Fit) -> bool {
+    let residual = problem.residual(&fit.hypothesis, &fit.values);
+    more_than_noise(problem, fit, &residual, &scores::noise_floor(problem, &residual)).is_some()
 }
 
 /// Effects of a fit that do less, on every channel, than our equations may err by, each with what it does at most over

@@ -34,7 +34,7 @@ impl Problem<'_> {
     /// What the response owes to how that which drives runs between its samples, which nobody recorded: mean square
     /// by band of the difference that another course makes which the samples allow as well.
     pub(crate) fn doubt_of_drivers(&self) -> Option<Vec<f64>> {
-        let inputs = Inputs::late(&self.recordings);
+        let inputs = Inputs::new(&self.recordings, self.recordings.iter().map(Prepared::halfway).collect());
         let (mut other, mut jumping) = (self.clone(), inputs.clone());
         for (recording, commands) in other.recordings.iter_mut().zip(&mut jumping.commands) {
             recording.drive_otherwise(commands);
@@ -52,9 +52,14 @@ impl Problem<'_> {
 }
 
 impl Prepared {
+    /// Ticks before its row at which each step lies halfway between rows.
+    fn halfway(&self) -> Vec<usize> {
+        self.edges.iter().map(|row| self.ticks_before(*row) / 2).collect()
+    }
+
     /// What drives, on another course that its samples allow as well: from sample to sample by a jump at an instant
     /// drawn for each interval, as far as the samples about it do not foretell its course. `commands` are those of
-    /// the control grid; steps that have a tick of their own stay where they are, and a command that is logged
+    /// the control grid; steps that have a tick of their own stay where they are, their returns not, and a command that is logged
     /// whenever it changes leaves nothing open but the supply that its duty is a share of, where that was read less often: it
     /// may stand from sample to sample.
     fn drive_otherwise(&mut self, commands: &mut [f64]) {
@@ -62,13 +67,22 @@ impl Prepared {
         let leaves_nothing = logged && matches!(self.driving, Driving::Command(_));
         let values = if self.driving == Driving::Speed { &self.speed_between } else { &self.command };
         let n = values.len();
+        let halfway = self.halfway();
         let mut row = 0;
         for (tick, command) in self.stimulus.ticks.iter_mut().zip(commands) {
             while row + 2 < n && self.time_s[row + 1] <= tick.time_s + 0.02 * self.tick_s {
                 row += 1;
             }
+            let step = self.edges.binary_search(&(row + 1)).ok();
+            if let Some(step) = step {
+                // From a step on the command stands, or returns.
+                let remaining = ((self.time_s[row + 1] - tick.time_s) / self.tick_s).round() as usize;
+                if remaining <= halfway[step] {
+                    *command = self.command[row + 1];
+                }
+            }
             *command *= self.supply_held.get(row).unwrap_or(&1.0);
-            if leaves_nothing || self.edges.binary_search(&(row + 1)).is_ok() {
+            if leaves_nothing || step.is_some() {
                 continue;
             }
             let (from, to) = (values[row], values[row + 1]);

@@ -137,7 +137,7 @@ impl Persistent {
 
 impl Prepared {
     /// Control ticks between a row and the one before it; in a pause nothing can be placed.
-    fn ticks_before(&self, row: usize) -> usize {
+    pub(crate) fn ticks_before(&self, row: usize) -> usize {
         if self.after_pause(row) {
             return 1;
         }

@@ -19,6 +19,7 @@ pub mod noise;
 mod over_the_top;
 mod quadratic;
 mod refuse;
+mod rest;
 pub mod sampling;
 pub mod scores;
 pub mod setup;

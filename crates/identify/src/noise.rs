@@ -118,6 +118,11 @@ impl Floor {
                 moving = 0.0;
             }
             starts = !band.continues;
+            if band.rest {
+                // No equation errs where nothing moves; what a reading scatters by says how well its mean is known.
+                floor.push(band.quantisation / criterion.facts_a_band + ROUNDING);
+                continue;
+            }
             moving = moving.max(band.signal * band.hz * band.hz);
             let form = criterion.form_error.powi(2) * moving / (band.hz * band.hz);
             // Rows stand in order: their stamps are off by less than an instant anywhere in a row would be.
@@ -229,6 +234,7 @@ mod tests {
                 row_s: 0.01,
                 stale_s: 0.0,
                 continues: k < 11,
+                rest: false,
             })
             .collect()
     }

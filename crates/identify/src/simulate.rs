@@ -44,6 +44,8 @@ pub struct Problem<'a> {
     pub spectrum: Spectrum,
     /// Noise floor of any hypothesis.
     pub floor: Floor,
+    /// What of the response is in doubt since nobody recorded what drives between its samples: mean square by band.
+    pub doubt: Vec<f64>,
 }
 
 impl<'a> Problem<'a> {
@@ -59,9 +61,12 @@ impl<'a> Problem<'a> {
         let floor = Floor::of_signal(&spectrum.bands, &criterion);
         let scale = crate::data::scale(&recordings, rig);
         let stated = Parameters::stated(rig);
-        let mut problem = Self { model, rig, stated, recordings, masked, scale, criterion, spectrum, floor };
+        let doubt = vec![0.0; spectrum.bands.len()];
+        let mut problem =
+            Self { model, rig, stated, recordings, masked, scale, criterion, spectrum, floor, doubt };
         if let Some(doubt) = problem.doubt_of_drivers() {
             problem.floor = problem.floor.with_doubt(&doubt);
+            problem.doubt = doubt;
         }
         problem
     }

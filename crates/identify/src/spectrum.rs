@@ -36,6 +36,8 @@ pub struct Band {
     pub stale_s: f64,
     /// Whether the next band continues this channel at higher frequency.
     pub continues: bool,
+    /// Whether this is the mean reading while the drive rests before its first command ([`crate::rest`]).
+    pub rest: bool,
 }
 
 /// One channel of one recording.
@@ -49,6 +51,8 @@ struct Frame {
     less: Option<usize>,
     transform: Arc<dyn TransformType2And3<f64>>,
     lines: Range<usize>,
+    /// Samples at rest; their mean is a line of its own, after the others.
+    rest: Vec<usize>,
 }
 
 /// All channels of all recordings.
@@ -83,6 +87,7 @@ impl Spectrum {
                     less: angle,
                     transform: planner.plan_dct2(n.max(1)),
                     lines: lines..lines + n,
+                    rest: recording.at_rest(channel, masked),
                     picks,
                 };
                 let times: Vec<f64> =
@@ -109,10 +114,27 @@ impl Spectrum {
                         row_s,
                         stale_s,
                         continues: i + 1 < ranges.len(),
+                        rest: false,
                     });
                     places.push(Place { recording: nth, response: channel.response, constant: i == 0 });
                 }
                 lines += n;
+                if !frame.rest.is_empty() {
+                    let scatter = variance(&channel.values, &frame.rest) / channel.full_scale.powi(2);
+                    bands.push(Band {
+                        lines: lines..lines + 1,
+                        hz: 0.5 / (2.0 * n as f64 * interval_s),
+                        alike: 1,
+                        signal: 0.0,
+                        quantisation: quantisation + scatter,
+                        row_s,
+                        stale_s: 0.0,
+                        continues: false,
+                        rest: true,
+                    });
+                    places.push(Place { recording: nth, response: channel.response, constant: true });
+                    lines += 1;
+                }
                 own.push(frame);
             }
             frames.push(own);
@@ -128,6 +150,10 @@ impl Spectrum {
             for (frame, samples) in frames.iter().zip(channels) {
                 let less = frame.less.map(|c| channels[c].as_slice());
                 frame.transform(samples, less, &mut out.as_mut_slice()[frame.lines.clone()]);
+                if !frame.rest.is_empty() {
+                    let sum: f64 = frame.rest.iter().map(|k| samples[*k]).sum();
+                    out[frame.lines.end] = sum / frame.rest.len() as f64 / frame.full_scale;
+                }
             }
         }
         out
@@ -186,8 +212,15 @@ struct Place {
 fn count_alike(bands: &mut [Band], places: &[Place]) {
     let half_a_band = 0.5 / BANDS_A_DECADE;
     let own: Vec<(f64, usize)> = bands.iter().map(|band| (band.hz.log10(), band.lines.len())).collect();
+    let rests: Vec<bool> = bands.iter().map(|band| band.rest).collect();
     for ((band, place), (at, _)) in bands.iter_mut().zip(places).zip(&own) {
-        let others = places.iter().zip(&own).filter(|(other, (hz, _))| {
+        let alike = places
+            .iter()
+            .zip(&own)
+            .zip(&rests)
+            .filter(|(_, rest)| **rest == band.rest)
+            .map(|(other, _)| other);
+        let others = alike.filter(|(other, (hz, _))| {
             other.recording != place.recording
                 && other.response == place.response
                 && other.constant == place.constant
@@ -223,6 +256,13 @@ pub(crate) fn median_interval(times: &[f64]) -> f64 {
 /// Whether a sensor is slower than the log.
 pub(crate) fn is_slow(interval_s: f64, row_s: f64) -> bool {
     interval_s > 1.5 * row_s
+}
+
+/// Variance of some of the values.
+fn variance(values: &[f64], picks: &[usize]) -> f64 {
+    let n = picks.len() as f64;
+    let mean = picks.iter().map(|k| values[*k]).sum::<f64>() / n;
+    picks.iter().map(|k| (values[*k] - mean).powi(2)).sum::<f64>() / n
 }
 
 /// Least distance between two different values: the step of a coarse converter, nearly nothing of a fine one.
@@ -261,6 +301,7 @@ mod tests {
             row_s: 0.01,
             stale_s: 0.0,
             continues: true,
+            rest: false,
         };
         let place = |recording, response, constant| Place { recording, response, constant };
         let (speed, thrust) = (Response::ShaftSpeed, Response::Thrust);
