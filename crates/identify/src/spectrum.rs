@@ -27,7 +27,7 @@ pub struct Band {
     pub alike: usize,
     /// Mean square of the measured signal there, in full scales.
     pub signal: f64,
-    /// Variance of the channel's quantisation, in full scales.
+    /// Variance of the channel's quantisation, in full scales; of a reading at rest what it scatters by too.
     pub quantisation: f64,
     /// Interval between the recording's rows, s.
     pub row_s: f64,
