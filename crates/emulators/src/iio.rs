@@ -81,6 +81,8 @@ pub struct Amplifier {
     changed_s: f64,
     closed_s: Option<f64>,
     enabled: bool,
+    /// Since its supply was cut the watchdog waits for a line that stands still before it lets anything be enabled.
+    starting: bool,
     fault: bool,
     now_s: f64,
 }
@@ -97,6 +99,7 @@ impl Amplifier {
             changed_s: f64::NEG_INFINITY,
             closed_s: None,
             enabled: false,
+            starting: false,
             fault: false,
             now_s: 0.0,
             make,
@@ -186,7 +189,9 @@ impl InFiles for Amplifier {
 
     fn live(&mut self, now_s: f64) {
         self.now_s = now_s;
-        let closed = now_s - self.changed_s < self.make.watchdog_s && !self.fault;
+        let pulsed = now_s - self.changed_s < self.make.watchdog_s;
+        self.starting &= pulsed;
+        let closed = pulsed && !self.starting && !self.fault;
         self.closed_s = if closed { Some(self.closed_s.unwrap_or(now_s)) } else { None };
         self.enabled = self.closed_s.is_some_and(|since| now_s - since >= self.make.relay_s);
         self.stand.turn_to(now_s, self.command());
@@ -194,7 +199,8 @@ impl InFiles for Amplifier {
 
     fn restart(&mut self) {
         self.give(self.middle());
-        self.changed_s = f64::NEG_INFINITY;
+        self.changed_s = self.now_s;
+        self.starting = true;
     }
 
     fn report(&mut self, code: u32) {
