@@ -231,7 +231,8 @@ impl Problem<'_> {
         }
         let key = |h: &Hypothesis, target: Target| match target {
             Target::Base(p) => (p.name(), usize::MAX),
-            Target::Sampling { response, .. } => (response.name(), usize::MAX - 1),
+            Target::Sampling { response } => (response.name(), usize::MAX - 1),
+            Target::Averaging { response } => (response.name(), usize::MAX - 2),
             Target::Effect(i, j) => (h.effects[i].effect.id, j),
         };
         let columns = hypothesis

@@ -8,12 +8,7 @@
 use kort_thruster::rig::Rig;
 
 use crate::data::{Driving, Prepared};
-use crate::hypothesis::Hypothesis;
-use crate::simulate::Problem;
 use crate::spectrum::median_interval;
-
-/// Steps of either fit of the baseline: enough for stated numbers that are honestly rough.
-const STEPS: usize = 8;
 
 /// The recordings with their commands held, where the rig does not tell and it makes a difference.
 pub fn held(recordings: &[Prepared], rig: &Rig) -> Option<Vec<Prepared>> {
@@ -31,11 +26,6 @@ fn moves_on(recording: &Prepared) -> bool {
     matches!(recording.driving, Driving::Command(_))
         && recording.ticks_per_row > 1
         && changes > recording.edges.len()
-}
-
-/// Whether a baseline does better on one problem than on another.
-pub fn fits_better(one: &Problem, its: &Hypothesis, other: &Problem, others: &Hypothesis) -> bool {
-    one.settle_from_stated(its, STEPS).cost() < other.settle_from_stated(others, STEPS).cost()
 }
 
 /// What was taken for true.

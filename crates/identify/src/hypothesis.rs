@@ -29,12 +29,15 @@ const REACH: f64 = 1.5;
 pub enum Target {
     /// A parameter of the baseline.
     Base(P),
-    /// When a channel was sampled, s late; `slow` where its sensor is slower than the log.
+    /// When a channel was sampled, s late.
     Sampling {
         /// The channel.
         response: Response,
-        /// Slower than the log.
-        slow: bool,
+    },
+    /// How long a sensor that is slower than the log takes the mean for a reading, s.
+    Averaging {
+        /// The channel.
+        response: Response,
     },
     /// A value of an effect: which effect of the hypothesis, which value.
     Effect(usize, usize),
@@ -342,7 +345,7 @@ impl Hypothesis {
                 Target::Base(p) => parameters.set(p, *value),
                 Target::Effect(i, j) => effects[i][j] = *value,
                 // Not the plant's business.
-                Target::Sampling { .. } => (),
+                Target::Sampling { .. } | Target::Averaging { .. } => (),
             }
         }
         (parameters, effects)

@@ -3,6 +3,7 @@
 //! Data go one way: recording, data (checks, edges), hypothesis (free numbers, priors, effects), simulate,
 //! noise, fit.
 
+mod averages;
 pub mod between;
 pub mod checks;
 pub mod data;
@@ -15,6 +16,7 @@ pub mod heldout;
 pub mod hypothesis;
 pub mod identifiable;
 pub mod identify;
+mod lag_on_command;
 pub mod noise;
 mod over_the_top;
 mod quadratic;

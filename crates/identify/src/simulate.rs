@@ -13,6 +13,7 @@ use kort_thruster::rig::Rig;
 use nalgebra::DVector;
 use rayon::prelude::*;
 
+use crate::averages::Averages;
 use crate::data::{Prepared, Response, rates};
 use crate::hypothesis::{Hypothesis, Member, Target};
 use crate::noise::{Criterion, Floor};
@@ -136,13 +137,17 @@ impl<'a> Problem<'a> {
         for (r, recording) in self.recordings.iter().enumerate() {
             let mut plant = Plant::new(self.model, self.rig, &parameters, &hooked, recording.tick_s)
                 .with_control_period(recording.ticks_per_period)
-                .with_observer(recording.observer_rad_s);
+                .with_observer(recording.observer_rad_s)
+                .with_lag_on_command(recording.lag_on_command);
             let [speed, flow, current, angle] = recording.start;
             plant.start(recording.time_s[0], speed, flow, current, angle);
             if let Some(command) = recording.before {
                 plant.commanded_before(command);
             }
-            run(&mut plant, recording, &hypothesis.inputs.commands[r], |row, instant| show(r, row, instant));
+            let averages = Averages::of(&hypothesis.free, values, &recording.channels);
+            run(&mut plant, recording, &hypothesis.inputs.commands[r], averages, |row, instant| {
+                show(r, row, instant);
+            });
         }
     }
 
@@ -193,8 +198,9 @@ impl<'a> Problem<'a> {
         wanted: &[usize],
     ) -> Vec<(usize, DVector<f64>)> {
         let always = Stretch { from_s: 0.0, length_s: 0.0, period_s: 0.0 };
-        let (shifts, wanted): (Vec<usize>, Vec<usize>) =
-            wanted.iter().partition(|k| matches!(hypothesis.free[**k].target, Target::Sampling { .. }));
+        let (shifts, wanted): (Vec<usize>, Vec<usize>) = wanted.iter().partition(|k| {
+            matches!(hypothesis.free[**k].target, Target::Sampling { .. } | Target::Averaging { .. })
+        });
         let (some, all): (Vec<usize>, Vec<usize>) =
             wanted.iter().partition(|k| hypothesis.free[**k].acts.is_some());
         let tasks: Vec<Vec<(usize, Stretch)>> = all
@@ -210,7 +216,7 @@ impl<'a> Problem<'a> {
             .collect()
     }
 
-    /// Derivatives by the instants of sampling: rates of change, which one plain simulation tells.
+    /// Derivatives by the instants of sampling and by how long the mean is taken: one plain simulation tells them.
     fn by_sampling(
         &self,
         hypothesis: &Hypothesis,
@@ -220,16 +226,10 @@ impl<'a> Problem<'a> {
         if shifts.is_empty() {
             return Vec::new();
         }
-        let wanted = shifts.iter().filter_map(|k| match hypothesis.free[*k].target {
-            Target::Sampling { response, slow } => Some((*k, response, slow)),
-            _ => None,
-        });
-        let wanted: Vec<(usize, Response, bool)> = wanted.collect();
-        let slow = |response| wanted.iter().any(|(_, r, slow)| *r == response && *slow);
-        let [rates] =
-            self.collect(hypothesis, values, |response, instant| [-instant.rate(response, slow(response))]);
-        let only = |response| {
-            let mut stack = rates.clone();
+        let [by_delay, by_window] =
+            self.collect(hypothesis, values, |response, instant| instant.changes(response));
+        let only = |of: &Stack, response| {
+            let mut stack = of.clone();
             for (recording, channels) in self.recordings.iter().zip(&mut stack) {
                 for (channel, samples) in recording.channels.iter().zip(channels) {
                     if channel.response != response {
@@ -239,7 +239,12 @@ impl<'a> Problem<'a> {
             }
             self.spectrum.transform(&stack)
         };
-        wanted.iter().map(|(k, response, _)| (*k, only(*response))).collect()
+        let each = shifts.iter().filter_map(|k| match hypothesis.free[*k].target {
+            Target::Sampling { response } => Some((*k, only(&by_delay, response))),
+            Target::Averaging { response } => Some((*k, only(&by_window, response))),
+            _ => None,
+        });
+        each.collect()
     }
 
     /// The residual and its derivatives by up to four free numbers, as lines, by one simulation.
@@ -306,21 +311,22 @@ fn run<T: Real>(
     plant: &mut Plant<T>,
     recording: &Prepared,
     commands: &[f64],
+    mut averages: Averages<T>,
     mut show: impl FnMut(usize, &Instant<T>),
 ) {
     let (stimulus, time_s, tick_s) = (&recording.stimulus, &recording.time_s, recording.tick_s);
     let mut next = stimulus.logs.iter().enumerate().peekable();
     let mut before = plant.sensed();
-    let mut last_row = before;
     let every_period = recording.ticks_per_row <= recording.ticks_per_period;
-    let mut log = |row: usize, now: &Sensed<T>, step: (&Sensed<T>, &Sensed<T>), step_s: f64| {
-        let row_s = if row == 0 { tick_s } else { time_s[row] - time_s[row - 1] };
-        show(row, &Instant { now, step, step_s, last_row: &last_row, row_s, every_period });
-        last_row = *now;
-    };
+    let mut log =
+        |row: usize, now: &Sensed<T>, step: (&Sensed<T>, &Sensed<T>), step_s: f64, averages: &Averages<T>| {
+            show(row, &Instant { time_s: time_s[row], now, step, step_s, every_period, averages });
+        };
+    let collects = !averages.is_empty();
+    averages.push(time_s[0], &before);
     // An instant on the grid shows the state before that tick's command acts.
     while let Some((row, _)) = next.next_if(|(_, (tick, part))| *tick == 0 && *part == 0.0) {
-        log(row, &before, (&before, &before), tick_s);
+        log(row, &before, (&before, &before), tick_s, &averages);
     }
     let mut leaps = recording.leaps.iter().peekable();
     let mut i = 0;
@@ -336,14 +342,17 @@ fn run<T: Real>(
             before = plant.sensed();
         }
         plant.stride(&stimulus.ticks[i..end], Some(&commands[i..end]));
+        let span_s = tick_s * count as f64;
+        if collects {
+            averages.push(stimulus.ticks[i].time_s + span_s, &plant.sensed());
+        }
         if shows {
             let after = plant.sensed();
-            let span_s = tick_s * count as f64;
             while let Some((row, (_, part))) =
                 next.next_if(|(_, (at, part))| *at == i && *part > 0.0 || *at == end && *part == 0.0)
             {
                 let now = if *part > 0.0 { before.between(&after, *part) } else { after };
-                log(row, &now, (&before, &after), span_s);
+                log(row, &now, (&before, &after), span_s, &averages);
             }
         }
         i = end;
@@ -351,6 +360,6 @@ fn run<T: Real>(
     // Instants past the last tick see the last state.
     let end = plant.sensed();
     for (row, _) in next {
-        log(row, &end, (&end, &end), tick_s);
+        log(row, &end, (&end, &end), tick_s, &averages);
     }
 }

@@ -27,7 +27,8 @@ const LONGEST_S: f64 = 0.01;
 impl Prepared {
     /// Marks the smooth ticks of the stimulus.
     pub fn mark_smooth(&mut self, model: ModelName, rig: &Rig, stated: &Parameters) {
-        let mut plant = Plant::new(model, rig, stated, &[], self.tick_s);
+        let mut plant =
+            Plant::new(model, rig, stated, &[], self.tick_s).with_lag_on_command(self.lag_on_command);
         let [speed, flow, current, angle] = self.start;
         plant.start(self.time_s[0], speed, flow, current, angle);
         let (mut course, mut decay) = (vec![[speed, flow, current]], Vec::new());

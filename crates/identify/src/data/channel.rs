@@ -1,6 +1,7 @@
 //! Measured responses.
 
 use super::{FEWEST_ROWS, Response, Series};
+use crate::spectrum::{is_slow, median_interval};
 
 /// Samples of one response.
 #[derive(Clone, Debug)]
@@ -13,6 +14,8 @@ pub struct Channel {
     pub values: Vec<f64>,
     /// Largest magnitude (99.5 % quantile), the full scale that errors are compared with.
     pub full_scale: f64,
+    /// Usual time from sample to sample, s, where that is longer than from row to row.
+    pub slow_s: Option<f64>,
 }
 
 impl Channel {
@@ -27,11 +30,15 @@ impl Channel {
         size.sort_by(f64::total_cmp);
         let full_scale = size.get(((size.len() as f64) * 0.995) as usize).copied().unwrap_or(0.0);
         let constant = values.iter().all(|v| *v == values[0]);
+        let times: Vec<f64> = rows.iter().map(|row| series.time_s[*row]).collect();
+        let interval_s = median_interval(&times);
         (values.len() >= FEWEST_ROWS && !constant && full_scale > 0.0).then_some(Self {
             response,
             rows,
             values,
             full_scale,
+            slow_s: Some(interval_s)
+                .filter(|interval_s| is_slow(*interval_s, median_interval(&series.time_s))),
         })
     }
 }

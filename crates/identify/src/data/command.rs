@@ -29,6 +29,7 @@ impl Prepared {
             }
             let (a, b) = (c[row], c[row + 1]);
             commands.push(match edge_at[row + 1] {
+                None if self.row_means => b,
                 Some(before) => {
                     let remaining = ((self.time_s[row + 1] - t) / self.tick_s).round() as usize;
                     if remaining <= before {

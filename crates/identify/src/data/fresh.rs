@@ -5,6 +5,7 @@
 //! interval, which is a lag of physics to any model. Only the row that first shows a sample is one.
 
 use super::Series;
+use crate::spectrum::is_slow;
 
 /// Columns of sensors; what is commanded is meant to hold.
 const SENSED: [&str; 10] = [
@@ -83,7 +84,8 @@ fn rows_a_sample(column: &[f64]) -> Option<f64> {
     lengths.sort_unstable();
     let middle = lengths[lengths.len() / 2];
     let usual: Vec<f64> = lengths.iter().filter(|l| **l <= middle + 1).map(|l| *l as f64).collect();
-    Some(usual.iter().sum::<f64>() / usual.len() as f64).filter(|rows| *rows > 1.0)
+    // A coarse sensor that now and then shows the same is read at every row all the same.
+    Some(usual.iter().sum::<f64>() / usual.len() as f64).filter(|rows| is_slow(*rows, 1.0))
 }
 
 /// First rows and lengths of the runs of one value; empty cells end none.

@@ -18,6 +18,7 @@ mod grain;
 mod lay_out;
 pub mod loaded;
 mod pauses;
+pub mod row_means;
 mod scale;
 mod start;
 
@@ -175,6 +176,10 @@ pub struct Prepared {
     pub supply_held: Vec<f64>,
     /// Bandwidth with which the simulated shaft is kept with the recorded one, rad/s; 0 where it runs freely.
     pub observer_rad_s: f64,
+    /// Whether a measured current that drives is taken for the mean since the row before.
+    pub row_means: bool,
+    /// Whether the drive's stated lag is taken to act on the command, not on the current that follows.
+    pub lag_on_command: bool,
 }
 
 /// Whether a rig shows a response. Of a speed drive's current nothing is modelled. A dry shaft has no water to feel; its
@@ -296,6 +301,8 @@ impl Prepared {
             extra: None,
             supply_held: Vec::new(),
             observer_rad_s: if returns(series, rig, driving) { 0.0 } else { OBSERVER_RAD_S },
+            row_means: false,
+            lag_on_command: false,
         };
         if let Driving::Command("duty_cmd") = driving {
             // A duty of the supply is a voltage: of the recorded supply, or else the nominal one.

@@ -1,9 +1,7 @@
 //! The encoder's disc sits off centre.
 
 use super::memory::FirstOrder;
-use super::{
-    Available, Descriptor, Effect, Hooks, Path, Scale, Spec, angle_known, one_start, speed_measured,
-};
+use super::{Available, Descriptor, Effect, Hooks, Path, Scale, Spec, angle_known, speed_measured};
 use crate::parameters::Parameter as P;
 use crate::plant::{Sensed, Tick};
 use crate::real::Real;
@@ -15,7 +13,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     path: Path::Sensor,
     what: "the encoder's disc sits off centre, or a resolver's two windings differ: measured speed varies once or twice a turn",
     equation: "y = Om (1 + sum_k ak sin kq + bk cos kq), k = 1, 2, through the stated filter; a, b [1], q shaft angle [rad], of which \
-               the disc shows q + sum_k (bk sin kq - ak cos kq)/k",
+               the disc shows q + sum_k (bk sin kq - ak cos kq)/k; a recorded angle is the disc's (g = 1) or another's (g = 0)",
     signature: "lines at orders 1 and 2 of shaft angle in speed, in proportion to speed; none in thrust",
     confused_with: &["torque_ripple_cogging"],
     separated_by: "a slow creep over full turns, averaged over angle, speed against thrust",
@@ -26,12 +24,13 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     same_as: &[],
     forms: &[&[0, 1], &[2, 3], &[0, 1, 2, 3]],
     parameters,
-    starts: one_start,
+    starts: |_| [1.0, 0.0].map(|disc| vec![0.01, 0.01, 0.01, 0.01, disc]).to_vec(),
     needs,
     build: both!(|values, context| {
         Box::new(Eccentricity {
             first: [values[0], values[1]],
             second: [values[2], values[3]],
+            angle_share: values[4],
             filter_s: context.parameters.get(P::SpeedFilterTimeConstantS),
             tick_s: context.tick_s,
             filter: FirstOrder::new(),
@@ -43,7 +42,8 @@ fn parameters(_: &Scale) -> Vec<Spec> {
     // A disc e off the centre of a track of radius r shows e/r: below 1 % in a mounted encoder, half a millimetre on a
     // magnet of a centimetre.
     let part = |name| Spec::strength(name, "1", 0.01, -0.5, 0.5).sigma(0.05);
-    vec![part("once_sin"), part("once_cos"), part("twice_sin"), part("twice_cos")]
+    let angle = Spec::held("share_in_recorded_angle", "1", 1.0, 0.0, 1.0);
+    vec![part("once_sin"), part("once_cos"), part("twice_sin"), part("twice_cos"), angle]
 }
 
 fn needs(rig: &Rig, available: &Available) -> Result<(), &'static str> {
@@ -54,6 +54,7 @@ fn needs(rig: &Rig, available: &Available) -> Result<(), &'static str> {
 struct Eccentricity<T> {
     first: [T; 2],
     second: [T; 2],
+    angle_share: T,
     filter_s: T,
     tick_s: f64,
     filter: FirstOrder<T>,
@@ -93,7 +94,8 @@ impl<T: Real> Effect<T> for Eccentricity<T> {
 
     fn sense(&mut self, tick: &Tick, sensed: &mut Sensed<T>) {
         let angle = tick.shaft_angle_rad.map_or(sensed.shaft_angle_rad, |(_, end)| self.true_angle(end));
-        let (wave, _) = self.wave(angle);
+        let (wave, further) = self.wave(angle);
+        sensed.shaft_angle_rad += further * self.angle_share;
         sensed.shaft_speed_rad_s +=
             self.filter.step(sensed.true_speed_rad_s * wave, self.filter_s, self.tick_s);
     }
@@ -109,6 +111,7 @@ mod tests {
         let disc = Eccentricity {
             first: [0.2, -0.1],
             second: [0.1, 0.05],
+            angle_share: 1.0,
             filter_s: 0.0,
             tick_s: 0.002,
             filter: FirstOrder::new(),

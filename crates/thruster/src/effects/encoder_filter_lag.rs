@@ -1,6 +1,6 @@
 //! The speed signal is filtered more than stated.
 
-use super::memory::DelayedLag;
+use super::memory::MeanAndLag;
 use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, speed_measured};
 use crate::parameters::Parameter as P;
 use crate::plant::{Sensed, Tick};
@@ -14,8 +14,8 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     id: "encoder_filter_lag",
     path: Path::Sensor,
     what: "measured shaft speed has a filter slower than stated, or one that is not stated at all",
-    equation: "(t1 + dt) y1' = Om - y1 in place of the stated t1, then (1 - s) t2 y' = y1(t - s t2) - y; dt, t2 [s], s \
-               share of t2 that is dead time [1]: 0.4 for a running mean",
+    equation: "(t1 + dt) y1' = Om - y1 in place of the stated t1, then (1 - s) t2 y' = mean(y1 over the last 2 s t2) - y; dt, t2 \
+               [s], s the share of t2 that a running mean makes [1]",
     signature: "shaft speed alone is late and rounded by a fixed time, at all amplitudes; thrust and flow fit",
     confused_with: &[
         "clock_skew",
@@ -41,7 +41,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
             stated: decay(stated_s, tick_s),
             slower: decay(values[0] + stated_s, tick_s),
             memory: None,
-            delay: DelayedLag::new(values[1], values[2], LONGEST_S, tick_s),
+            delay: MeanAndLag::new(values[1], values[2], LONGEST_S, tick_s),
         })
     }),
 };
@@ -50,7 +50,7 @@ fn parameters(_: &Scale) -> Vec<Spec> {
     vec![
         Spec::strength("filter_excess_s", "s", 0.01, 0.0, 1.0).sigma(0.02),
         Spec::strength("second_lag_s", "s", 0.01, 0.0, LONGEST_S).sigma(0.02),
-        Spec::shape("dead_time_share", "1", 0.0, 0.0, 0.8).prior(0.0, 0.3),
+        Spec::shape("running_mean_share", "1", 0.0, 0.0, 1.0).prior(0.5, 0.3),
     ]
 }
 
@@ -65,7 +65,7 @@ struct EncoderFilterLag<T> {
     slower: T,
     /// Last output of the stated filter, and of the one in its place.
     memory: Option<(T, T)>,
-    delay: DelayedLag<T>,
+    delay: MeanAndLag<T>,
 }
 
 impl<T: Real> Effect<T> for EncoderFilterLag<T> {

@@ -1,4 +1,4 @@
-//! What effects remember from tick to tick: a past signal, a first-order lag, and both in a row.
+//! What effects remember from tick to tick: a past signal, a first-order lag, a running mean, and both in a row.
 
 use super::Context;
 use crate::parameters::Parameter as P;
@@ -33,17 +33,26 @@ impl<T: Real> History<T> {
     /// The signal `delay_s` before the newest sample; the two neighbouring ticks are mixed, so
     /// that the answer is continuous in the delay.
     pub fn ago(&self, delay_s: T) -> T {
+        let (whole, part) = self.split(delay_s / self.tick_s);
+        self.back(whole) * (T::ONE - part) + self.back(whole + 1) * part
+    }
+
+    /// Whole ticks and a part of one, as far back as there is room.
+    fn split(&self, ticks: T) -> (usize, T) {
         let last = self.ring.len() - 1;
-        let ticks = (delay_s / self.tick_s).max(T::ZERO).min(T::from(last as f64));
+        let ticks = ticks.max(T::ZERO).min(T::from(last as f64));
         let whole = (ticks.re() as usize).min(last - 1);
-        let part = ticks - whole as f64;
-        let at = |back: usize| self.ring[(self.newest + self.ring.len() - back) % self.ring.len()];
-        at(whole) * (T::ONE - part) + at(whole + 1) * part
+        (whole, ticks - whole as f64)
+    }
+
+    /// The sample so many ticks before the newest.
+    fn back(&self, ticks: usize) -> T {
+        self.ring[(self.newest + self.ring.len() - ticks) % self.ring.len()]
     }
 }
 
 /// Exact first-order lag of a signal that runs straight from sample to sample.
-pub(super) struct FirstOrder<T> {
+pub(crate) struct FirstOrder<T> {
     input: T,
     output: T,
     started: bool,
@@ -125,22 +134,62 @@ impl<T: Real> EncoderAhead<T> {
     }
 }
 
-/// A delay of which a share is dead time and the rest a first-order lag.
-pub(super) struct DelayedLag<T> {
-    dead_time_s: T,
-    past: History<T>,
+/// The mean over a window of a signal that runs straight from sample to sample. Before the first sample the signal
+/// is taken as constant.
+struct RunningMean<T> {
+    window_s: T,
+    signal: History<T>,
+    /// Its integral since the first sample.
+    integral: History<T>,
+}
+
+impl<T: Real> RunningMean<T> {
+    fn new(window_s: T, longest_s: f64, tick_s: f64) -> Self {
+        Self { window_s, signal: History::new(longest_s, tick_s), integral: History::new(longest_s, tick_s) }
+    }
+
+    fn step(&mut self, input: T) -> T {
+        let (tick_s, last) = (self.signal.tick_s, self.signal.ring[self.signal.newest]);
+        if self.signal.empty {
+            // What it was before it was first sampled.
+            let ticks = self.integral.ring.len();
+            self.signal.push(input);
+            (0..ticks).for_each(|k| self.integral.push(input * (k as f64 * tick_s)));
+            return input;
+        }
+        self.signal.push(input);
+        self.integral.push(self.integral.ring[self.integral.newest] + (input + last) * (0.5 * tick_s));
+        let within = self.window_s / tick_s;
+        if within < 1.0 {
+            return input - (input - last) * within * 0.5;
+        }
+        (self.integral.ago(T::ZERO) - self.integral_ago(within)) / self.window_s
+    }
+
+    /// The integral so many ticks ago: a parabola between ticks.
+    fn integral_ago(&self, ticks: T) -> T {
+        let (whole, part) = self.signal.split(ticks);
+        let (newer, older) = (self.signal.back(whole), self.signal.back(whole + 1));
+        self.integral.back(whole) - (newer - (newer - older) * part * 0.5) * part * self.signal.tick_s
+    }
+}
+
+/// A running mean and a first-order lag one after the other, that share a mean delay: the lag alone, the mean alone, and about
+/// half way a filter of second order.
+pub(super) struct MeanAndLag<T> {
+    mean: RunningMean<T>,
     lag_s: T,
     lag: FirstOrder<T>,
     tick_s: f64,
 }
 
-impl<T: Real> DelayedLag<T> {
-    /// Without a past; there is room for delays up to `longest_s`.
-    pub fn new(delay_s: T, dead_share: T, longest_s: f64, tick_s: f64) -> Self {
+impl<T: Real> MeanAndLag<T> {
+    /// Without a past; there is room for delays up to `longest_s`. `mean_share` of the delay is the running mean's, over
+    /// twice as long.
+    pub fn new(delay_s: T, mean_share: T, longest_s: f64, tick_s: f64) -> Self {
         Self {
-            dead_time_s: delay_s * dead_share,
-            past: History::new(longest_s, tick_s),
-            lag_s: delay_s * (-dead_share + 1.0),
+            mean: RunningMean::new(delay_s * mean_share * 2.0, 2.0 * longest_s, tick_s),
+            lag_s: delay_s * (-mean_share + 1.0),
             lag: FirstOrder::new(),
             tick_s,
         }
@@ -148,8 +197,7 @@ impl<T: Real> DelayedLag<T> {
 
     /// The delayed signal at the end of a tick.
     pub fn step(&mut self, input: T) -> T {
-        self.past.push(input);
-        self.lag.step(self.past.ago(self.dead_time_s), self.lag_s, self.tick_s)
+        self.lag.step(self.mean.step(input), self.lag_s, self.tick_s)
     }
 }
 
@@ -189,11 +237,27 @@ mod tests {
         assert!((1999.0 * 0.002 - y - 0.05).abs() < 1e-9);
     }
 
-    /// Whatever its share of dead time, up to the largest delay.
     #[test]
-    fn a_ramp_leaves_a_delayed_lag_behind_by_its_delay() {
-        for (delay_s, share) in [(0.05, 0.0), (0.05, 0.4), (1.0, 0.8)] {
-            let mut delay = DelayedLag::new(delay_s, share, 1.0, 0.002);
+    fn a_running_mean_is_the_mean_over_its_window() {
+        let signal = |k: i32| (0.3 * f64::from(k.max(0))).sin() + 2.0;
+        // 2.4 ticks: the newest one and a half times, and what a straight line gives of the fourth.
+        let mut mean = RunningMean::new(2.4 * 0.002, 0.1, 0.002);
+        let mut short = RunningMean::new(0.5 * 0.002, 0.1, 0.002);
+        let between = |k: i32, part: f64| signal(k) + (signal(k - 1) - signal(k)) * part;
+        for k in 0..100 {
+            let (shown, at_once) = (mean.step(signal(k)), short.step(signal(k)));
+            let two = 0.5 * signal(k) + signal(k - 1) + 0.5 * signal(k - 2);
+            let rest = 0.4 * 0.5 * (signal(k - 2) + between(k - 2, 0.4));
+            assert!((shown - (two + rest) / 2.4).abs() < 1e-12, "{k}");
+            assert!((at_once - 0.5 * (signal(k) + between(k, 0.5))).abs() < 1e-12, "{k}");
+        }
+    }
+
+    /// Whatever the running mean's share, up to the largest delay.
+    #[test]
+    fn a_ramp_leaves_a_mean_and_a_lag_behind_by_their_delay() {
+        for (delay_s, share) in [(0.05, 0.0), (0.05, 0.4), (0.05, 1.0), (1.0, 0.8)] {
+            let mut delay = MeanAndLag::new(delay_s, share, 1.0, 0.002);
             let mut y = 0.0;
             for k in 0..10_000 {
                 y = delay.step(k as f64 * 0.002);

@@ -27,11 +27,13 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     build: both!(build),
 };
 
+/// A stand gives way to thrust: the share is not negative. It rings: what is damped by more passes nothing on larger than it
+/// is, which is a filter's way.
 fn parameters(_: &Scale) -> Vec<Spec> {
     vec![
-        Spec::strength("swinging_share", "1", 0.5, -1.5, 1.5).sigma(0.7),
+        Spec::strength("swinging_share", "1", 0.5, 0.0, 1.5).sigma(0.7),
         Spec::shape("natural_frequency_hz", "Hz", 20.0, 2.0, 200.0).sigma(25.0),
-        Spec::shape("damping_ratio", "1", 0.03, 0.001, 0.9).sigma(0.1),
+        Spec::shape("damping_ratio", "1", 0.03, 0.001, 0.4).sigma(0.1),
     ]
 }
 

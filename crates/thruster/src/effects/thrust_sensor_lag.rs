@@ -1,6 +1,6 @@
 //! The force channel is slower than stated.
 
-use super::memory::DelayedLag;
+use super::memory::MeanAndLag;
 use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, thrust_measured};
 use crate::plant::{Sensed, Tick};
 use crate::real::Real;
@@ -13,8 +13,8 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     id: "thrust_sensor_lag",
     path: Path::Sensor,
     what: "the force channel has a filter slower than stated, or one that is not stated at all",
-    equation: "(1 - s) t y'(t) = T(t - s t) - y, after the stated filter; t the mean delay [s], s the share of it that is dead \
-               time [1]: 0 a first-order lag, 0.4 a running mean",
+    equation: "(1 - s) t y' = mean(T over the last 2 s t) - y, after the stated filter; t the mean delay [s], s the share of it \
+               that a running mean makes [1]: 0 a first-order lag, 0.3 a filter of second order, 1 a running mean",
     signature: "thrust alone is late and rounded by a fixed time, at all amplitudes; shaft speed and flow fit",
     confused_with: &["unsteady_lift_lag", "clock_skew", "stand_resonance"],
     separated_by: "a tap on the stand with the motor off; a chirp at two mean speeds (lift lag shrinks with speed)",
@@ -28,19 +28,19 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     starts: |_| vec![vec![0.003, 0.0], vec![0.03, 0.0], vec![0.1, 0.0]],
     needs: thrust_measured,
     build: both!(|values, context| {
-        Box::new(ThrustSensorLag { delay: DelayedLag::new(values[0], values[1], LONGEST_S, context.tick_s) })
+        Box::new(ThrustSensorLag { delay: MeanAndLag::new(values[0], values[1], LONGEST_S, context.tick_s) })
     }),
 };
 
 fn parameters(_: &Scale) -> Vec<Spec> {
     vec![
         Spec::strength("thrust_lag_s", "s", 0.01, 0.0, LONGEST_S).sigma(0.03),
-        Spec::shape("dead_time_share", "1", 0.0, 0.0, 0.8).prior(0.0, 0.3),
+        Spec::shape("running_mean_share", "1", 0.0, 0.0, 1.0).prior(0.5, 0.3),
     ]
 }
 
 struct ThrustSensorLag<T> {
-    delay: DelayedLag<T>,
+    delay: MeanAndLag<T>,
 }
 
 impl<T: Real> Effect<T> for ThrustSensorLag<T> {

@@ -2,6 +2,7 @@
 //! shaft speed at every instant of the tick.
 
 use super::{Drive, Driven, Plant, SPEED, Tick};
+use crate::effects::FirstOrder;
 use crate::parameters::Parameter as P;
 use crate::real::Real;
 use crate::rig::AmplifierKind;
@@ -21,6 +22,13 @@ pub(super) struct Course<T> {
 }
 
 impl<T: Real> Plant<T> {
+    /// Has the stated lag of the drive act on what is commanded, as where a speed controller ramps its duty, and not on the
+    /// current that follows.
+    pub fn with_lag_on_command(mut self, on: bool) -> Self {
+        self.command_lag = on.then(FirstOrder::new);
+        self
+    }
+
     /// Runs the effects on the drive and lays out a tick under a command, in place of the tick's own.
     #[inline(always)]
     pub(super) fn drive_over(&mut self, tick: &Tick, command: Option<f64>) -> Course<T> {
@@ -37,6 +45,10 @@ impl<T: Real> Plant<T> {
         };
         for i in &self.drive_hooks {
             self.effects[*i].effect.drive(tick, &mut drive);
+        }
+        if let Some(lag) = &mut self.command_lag {
+            drive.command = lag.mean_of_held(drive.command, drive.time_constant_s, self.tick_s);
+            drive.time_constant_s = T::ZERO;
         }
         let commanded = tick.driven == Driven::Command && !tick.released;
         let by_speed = match (tick.driven, self.amplifier) {

@@ -56,6 +56,14 @@ impl<T: Real> Counted<T> {
     }
 }
 
+impl<T: Real> Plant<T> {
+    /// Has the encoder differenced over this many ticks, where a control period is several steps of a simulation.
+    pub fn with_control_period(mut self, ticks: usize) -> Self {
+        self.counted = Counted::over(ticks, self.tick_s);
+        self
+    }
+}
+
 /// The way through one tick or several: where it began, and the shaft's own angle at both ends, rad.
 pub(super) struct Way<T> {
     pub(super) from: Local<T>,

@@ -29,7 +29,7 @@ use rates::Constants;
 use stiff::Slopes;
 use stiffness::Stiff;
 
-use crate::effects::{Context, Descriptor, Effect, flexible_coupling};
+use crate::effects::{Context, Descriptor, Effect, FirstOrder, flexible_coupling};
 use crate::models::ModelName;
 use crate::parameters::{Parameter as P, Parameters};
 use crate::real::Real;
@@ -70,6 +70,8 @@ pub struct Plant<T = f64> {
     used_states: usize,
     constants: Constants<T>,
     decays: Decays<T>,
+    /// Where the stated lag of the drive acts on the command.
+    command_lag: Option<FirstOrder<T>>,
     x: [T; STATES],
     current_a: T,
     time_s: f64,
@@ -209,6 +211,7 @@ impl<T: Real> Plant<T> {
             used_states: next,
             constants: Constants::new(&parameters, rig),
             decays: Decays::new(&parameters, &rig.sensors, tick_s),
+            command_lag: None,
             x: [T::ZERO; STATES],
             current_a: T::ZERO,
             time_s: 0.0,
@@ -230,12 +233,6 @@ impl<T: Real> Plant<T> {
     /// quantum is noise and the response must be smooth in the parameters).
     pub fn with_encoder_quantised(mut self, on: bool) -> Self {
         self.quantise_encoder = on;
-        self
-    }
-
-    /// Has the encoder differenced over this many ticks, where a control period is several steps of a simulation.
-    pub fn with_control_period(mut self, ticks: usize) -> Self {
-        self.counted = Counted::over(ticks, self.tick_s);
         self
     }
 
