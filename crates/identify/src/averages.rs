@@ -136,18 +136,18 @@ mod tests {
     #[test]
     fn a_reading_is_the_mean_over_its_window_late_by_its_delay() {
         let mean = |a: f64, b: f64| (b.powi(3) - a.powi(3)) / (b - a);
-        let shown = average(0.1, 0.02).reading(0.9).mean;
-        assert!((shown - mean(0.78, 0.88)).abs() < 1e-6, "{shown}");
-        let short = average(1e-6, 0.0).reading(0.9).mean;
+        let shown = average(0.1, 0.02).reading(1.0).mean;
+        assert!((shown - mean(0.88, 0.98)).abs() < 1e-6, "{shown}");
+        let short = average(1e-6, 0.1).reading(1.0).mean;
         assert!((short - 3.0 * 0.81).abs() < 1e-5, "{short}");
         assert!(average(0.1, 0.02).past.len() < 250, "what nobody reads is forgotten");
     }
 
     #[test]
     fn its_changes_are_its_derivatives() {
-        let (by, at) = (1e-5, average(0.1, 0.02).reading(0.9));
-        let later = (average(0.1, 0.02 + by).reading(0.9).mean - at.mean) / by;
-        let longer = (average(0.1 + by, 0.02).reading(0.9).mean - at.mean) / by;
+        let (by, at) = (1e-5, average(0.1, 0.02).reading(1.0));
+        let later = (average(0.1, 0.02 + by).reading(1.0).mean - at.mean) / by;
+        let longer = (average(0.1 + by, 0.02).reading(1.0).mean - at.mean) / by;
         assert!((at.by_delay - later).abs() < 1e-2 * later.abs(), "{} {later}", at.by_delay);
         assert!((at.by_window - longer).abs() < 1e-2 * longer.abs(), "{} {longer}", at.by_window);
     }

@@ -139,6 +139,7 @@ mod tests {
     use kort_thruster::rig::Rig;
 
     use super::{Delays, Instant, free};
+    use crate::averages::Averages;
     use crate::data::{Prepared, Response, Series};
     use crate::hypothesis::{Free, Target};
 

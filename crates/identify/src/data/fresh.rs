@@ -5,7 +5,6 @@
 //! interval, which is a lag of physics to any model. Only the row that first shows a sample is one.
 
 use super::Series;
-use crate::spectrum::is_slow;
 
 /// Columns of sensors; what is commanded is meant to hold.
 const SENSED: [&str; 10] = [
@@ -31,6 +30,8 @@ const COUNTS: f64 = 3.0;
 const FINE: f64 = 20.0;
 /// Share of the runs of one value that last longer than a row, from which on a finely resolved sensor repeats itself.
 const REPEATS: f64 = 0.2;
+/// Rows a sample up to which a coarse sensor only stood still now and then.
+const STANDS: f64 = 1.1;
 /// Share of the changes that may follow upon another although each sample lasts several rows: lost rows.
 const LOST: f64 = 0.05;
 
@@ -85,7 +86,7 @@ fn rows_a_sample(column: &[f64]) -> Option<f64> {
     let middle = lengths[lengths.len() / 2];
     let usual: Vec<f64> = lengths.iter().filter(|l| **l <= middle + 1).map(|l| *l as f64).collect();
     // A coarse sensor that now and then shows the same is read at every row all the same.
-    Some(usual.iter().sum::<f64>() / usual.len() as f64).filter(|rows| is_slow(*rows, 1.0))
+    Some(usual.iter().sum::<f64>() / usual.len() as f64).filter(|rows| *rows > STANDS)
 }
 
 /// First rows and lengths of the runs of one value; empty cells end none.
