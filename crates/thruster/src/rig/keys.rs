@@ -94,3 +94,18 @@ pub(super) fn nearest<'a>(word: &str, known: impl Iterator<Item = &'a str> + Clo
         _ => format!("known here: {}", known.collect::<Vec<_>>().join(", ")),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::KEYS;
+
+    #[test]
+    fn the_docs_say_what_every_key_is() {
+        let docs = include_str!("../../../../docs/recordings.md");
+        let rows: Vec<&str> = docs.lines().filter(|line| line.starts_with('|')).collect();
+        for (table, key, ..) in KEYS {
+            let named = rows.iter().any(|row| row.contains(&format!("`{key}`")));
+            assert!(named && docs.contains(&format!("`[{table}]`")), "{table}.{key}");
+        }
+    }
+}
