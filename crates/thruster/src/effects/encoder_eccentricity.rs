@@ -1,8 +1,7 @@
 //! The encoder's disc sits off centre.
 
-use super::memory::FirstOrder;
+use super::memory::EncoderAhead;
 use super::{Available, Descriptor, Effect, Hooks, Path, Scale, Spec, angle_known, speed_measured};
-use crate::parameters::Parameter as P;
 use crate::plant::{Sensed, Tick};
 use crate::real::Real;
 use crate::rig::Rig;
@@ -28,12 +27,9 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     needs,
     build: both!(|values, context| {
         Box::new(Eccentricity {
-            first: [values[0], values[1]],
-            second: [values[2], values[3]],
+            disc: Disc { first: [values[0], values[1]], second: [values[2], values[3]] },
             angle_share: values[4],
-            filter_s: context.parameters.get(P::SpeedFilterTimeConstantS),
-            tick_s: context.tick_s,
-            filter: FirstOrder::new(),
+            encoder: EncoderAhead::new(context),
         })
     }),
 };
@@ -52,15 +48,19 @@ fn needs(rig: &Rig, available: &Available) -> Result<(), &'static str> {
 }
 
 struct Eccentricity<T> {
-    first: [T; 2],
-    second: [T; 2],
+    disc: Disc<T>,
     angle_share: T,
-    filter_s: T,
-    tick_s: f64,
-    filter: FirstOrder<T>,
+    encoder: EncoderAhead<T>,
 }
 
-impl<T: Real> Eccentricity<T> {
+/// Waves of the first and the second order: of sine and of cosine.
+#[derive(Clone, Copy)]
+struct Disc<T> {
+    first: [T; 2],
+    second: [T; 2],
+}
+
+impl<T: Real> Disc<T> {
     /// How much faster the disc seems to turn at an angle, as a share; and by how much it seems to have turned
     /// further, rad.
     fn wave(&self, angle: T) -> (T, T) {
@@ -93,29 +93,20 @@ impl<T: Real> Effect<T> for Eccentricity<T> {
     }
 
     fn sense(&mut self, tick: &Tick, sensed: &mut Sensed<T>) {
-        let angle = tick.shaft_angle_rad.map_or(sensed.shaft_angle_rad, |(_, end)| self.true_angle(end));
-        let (wave, further) = self.wave(angle);
+        let angle = tick.shaft_angle_rad.map_or(sensed.shaft_angle_rad, |(_, end)| self.disc.true_angle(end));
+        let (wave, further) = self.disc.wave(angle);
         sensed.shaft_angle_rad += further * self.angle_share;
-        sensed.shaft_speed_rad_s +=
-            self.filter.step(sensed.true_speed_rad_s * wave, self.filter_s, self.tick_s);
+        sensed.shaft_speed_rad_s += self.encoder.step(further, sensed.true_speed_rad_s * wave);
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::Eccentricity;
-    use crate::effects::memory::FirstOrder;
+    use super::Disc;
 
     #[test]
     fn the_true_angle_is_the_one_at_which_the_disc_shows_the_recorded() {
-        let disc = Eccentricity {
-            first: [0.2, -0.1],
-            second: [0.1, 0.05],
-            angle_share: 1.0,
-            filter_s: 0.0,
-            tick_s: 0.002,
-            filter: FirstOrder::new(),
-        };
+        let disc = Disc { first: [0.2, -0.1], second: [0.1, 0.05] };
         for k in 0..60 {
             let angle: f64 = 0.37 * f64::from(k) - 9.0;
             let shown = angle + disc.wave(angle).1;

@@ -101,10 +101,13 @@ impl<T: Real> FirstOrder<T> {
     }
 }
 
-/// The measuring chain of an encoder that runs ahead of the shaft by an angle of its own: differenced from tick to tick,
+/// The measuring chain of an encoder that runs ahead of the shaft by an angle of its own: differenced over a control period,
 /// then filtered, as the plant does with the shaft's own angle; its rate itself on a rig that states neither.
 pub(super) struct EncoderAhead<T> {
-    last_rad: T,
+    /// How far it was ahead at the ticks of the last period, the oldest in turn.
+    past_rad: Vec<T>,
+    oldest: usize,
+    started: bool,
     speed_rad_s: T,
     /// What a tick leaves of a filter's error; none where nothing is differenced.
     left: Option<T>,
@@ -112,7 +115,7 @@ pub(super) struct EncoderAhead<T> {
 }
 
 impl<T: Real> EncoderAhead<T> {
-    /// Level with the shaft.
+    /// As far ahead as it is at first.
     pub fn new(context: &Context<T>) -> Self {
         let lag_s = context.parameters.get(P::SpeedFilterTimeConstantS);
         let left = if lag_s > 0.0 {
@@ -120,15 +123,31 @@ impl<T: Real> EncoderAhead<T> {
         } else {
             context.rig.sensors.encoder_counts_per_rev.map(|_| T::ZERO)
         };
-        Self { last_rad: T::ZERO, speed_rad_s: T::ZERO, left, tick_s: context.tick_s }
+        // A period may be several steps of a simulation.
+        let period_s = context.rig.sensors.control_rate_hz.map_or(context.tick_s, |rate_hz| 1.0 / rate_hz);
+        let ticks = (period_s / context.tick_s).round().max(1.0) as usize;
+        Self {
+            past_rad: vec![T::ZERO; ticks],
+            oldest: 0,
+            started: false,
+            speed_rad_s: T::ZERO,
+            left,
+            tick_s: context.tick_s,
+        }
     }
 
     /// What is shown on top of the shaft's speed, rad/s, at the end of a tick at which the encoder is so far ahead and
     /// gains so fast.
     pub fn step(&mut self, ahead_rad: T, rate_rad_s: T) -> T {
         let Some(left) = self.left else { return rate_rad_s };
-        let raw = (ahead_rad - self.last_rad) / self.tick_s;
-        self.last_rad = ahead_rad;
+        if !self.started {
+            self.past_rad.fill(ahead_rad);
+            self.started = true;
+        }
+        let ticks = self.past_rad.len();
+        let before_rad = std::mem::replace(&mut self.past_rad[self.oldest], ahead_rad);
+        self.oldest = (self.oldest + 1) % ticks;
+        let raw = (ahead_rad - before_rad) / (self.tick_s * ticks as f64);
         self.speed_rad_s = raw + (self.speed_rad_s - raw) * left;
         self.speed_rad_s
     }
