@@ -29,10 +29,10 @@ pub struct Instant<'a, T> {
 }
 
 impl<T: Real> Instant<'_, T> {
-    /// Rate of change of a response over the step; for a speed that is a bare difference of counts, from its mean over the control period to its end. A rig that states the counts does not say whether
-    /// its drive shows that mean or the speed of an instant: half a period earlier it is exactly that, steps of the command
-    /// included, across which the rate over a step would not tell. Where not every period is logged it is the lesser part of
-    /// what is not known of the instant.
+    /// Rate of change of a response over the step; for a speed that is a bare difference of counts, from its mean over the control
+    /// period to its end. A rig that states the counts does not say whether its drive shows that mean or the speed of an
+    /// instant: half a period earlier it is exactly that, steps of the command included, across which the rate over a step
+    /// would not tell. Where not every period is logged it is the lesser part of what is not known of the instant.
     fn rate(&self, response: Response) -> T {
         if let (Response::ShaftSpeed, true, Some(rate)) =
             (response, self.every_period, self.now.since_mean_rad_s2)

@@ -22,3 +22,52 @@ pub fn row_means(recordings: &[Prepared], series: &[Series]) -> Option<Vec<Prepa
 pub fn words() -> &'static str {
     "current_a is taken for the mean since the row before, as a drive's own log gives it, which fits better than a reading of an instant"
 }
+
+#[cfg(test)]
+mod tests {
+    use kort_thruster::models::ModelName;
+    use kort_thruster::rig::Rig;
+
+    use crate::data::Series;
+    use crate::noise::Criterion;
+    use crate::setup::Setup;
+
+    const RIG: &str = "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = { value = 0.035, tol = 0.3 }\n\
+                       torque_constant_nm_a = 1.0\nviscous_friction_nm_s = { value = 0.3, tol = 0.3 }\n\
+                       [amplifier]\nkind = \"current\"\n";
+
+    /// A motor that rubs, under a current that wanders and jumps and is logged every 20 ms: its mean since the last row, or what it
+    /// is. Whether it is taken for the mean, and whether the report says so.
+    fn taken_for_the_mean(mean: bool) -> (bool, bool) {
+        const DT: f64 = 1e-4;
+        let (mut speed, mut sum) = (0.0_f64, 0.0);
+        let mut columns = [Vec::new(), Vec::new()];
+        for k in 0..300_000_usize {
+            let (t, step) = (k as f64 * DT, k / 4100);
+            let current = 3.0 * ((step * step * 7919) as f64 * 0.37).sin() + 2.0 * (17.0 * t).sin();
+            if k % 200 == 0 {
+                let noise = 0.01 * ((k * k % 9973) as f64 * 0.37).sin();
+                columns[0].push(if mean && k > 0 { sum / 200.0 } else { current });
+                columns[1].push(speed + noise);
+                sum = 0.0;
+            }
+            sum += current;
+            speed += (current - 0.3 * speed) / 0.03 * DT;
+        }
+        let time_s: Vec<f64> = (0..columns[0].len()).map(|k| 0.02 * k as f64).collect();
+        let columns = ["current_a", "shaft_speed_rad_s"].map(String::from).into_iter().zip(columns);
+        let log = Series { name: "log".into(), time_s, columns: columns.collect() };
+        let criterion =
+            Criterion { form_error: 0.01, own_form_error: 0.1, facts_a_band: 10.0, timing_s: 0.001 };
+        let rig = Rig::from_toml(RIG).unwrap();
+        let setup = Setup::new(&[log], &rig, ModelName::Model2, criterion).unwrap();
+        let said = setup.notes.iter().any(|note| note.contains("mean since the row before"));
+        (setup.problem.recordings[0].row_means, said)
+    }
+
+    #[test]
+    fn the_likelier_reading_is_taken_and_said() {
+        assert_eq!(taken_for_the_mean(true), (true, true));
+        assert_eq!(taken_for_the_mean(false), (false, false));
+    }
+}
