@@ -11,8 +11,8 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     id: "encoder_eccentricity",
     path: Path::Sensor,
     what: "the encoder's disc sits off centre, or a resolver's two windings differ: measured speed varies once or twice a turn",
-    equation: "y = Om (1 + sum_k ak sin kq + bk cos kq), k = 1, 2, through the stated filter; a, b [1], q shaft angle [rad], of which \
-               the disc shows q + sum_k (bk sin kq - ak cos kq)/k; a recorded angle is the disc's (g = 1) or another's (g = 0)",
+    equation: "y = Om (1 + sum_k ak sin kq + bk cos kq), k = 1, 2, through the stated filter; a, b [1], q shaft angle [rad], a \
+               recorded angle shows q + g sum_k (bk sin kq - ak cos kq)/k, g = 1 if it is the disc's, 0 if another's",
     signature: "lines at orders 1 and 2 of shaft angle in speed, in proportion to speed; none in thrust",
     confused_with: &["torque_ripple_cogging"],
     separated_by: "a slow creep over full turns, averaged over angle, speed against thrust",

@@ -27,8 +27,8 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     build: both!(build),
 };
 
-/// A stand gives way to thrust: the share is not negative. It rings: what is damped by more passes nothing on larger than it
-/// is, which is a filter's way.
+/// A stand gives way to thrust: the share is not negative. It rings: structures are damped by a few hundredths, and at the bound a
+/// step still overshoots by a quarter; a sensor that hardly overshoots is one with a filter ([`super::thrust_sensor_lag`]).
 fn parameters(_: &Scale) -> Vec<Spec> {
     vec![
         Spec::strength("swinging_share", "1", 0.5, 0.0, 1.5).sigma(0.7),
