@@ -39,12 +39,7 @@ pub fn words(recordings: &[Prepared]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use kort_thruster::models::ModelName;
-    use kort_thruster::rig::Rig;
-
-    use crate::data::Series;
-    use crate::noise::Criterion;
-    use crate::setup::Setup;
+    use crate::readings::tests::read_and_said;
 
     const RIG: &str = "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = 0.01\ntorque_constant_nm_a = 1.0\n\
                        winding_resistance_ohm = 1.0\n[amplifier]\nkind = \"voltage\"\n";
@@ -65,19 +60,9 @@ mod tests {
                 speed += (volts - speed) / 0.01 * (0.01 / fine as f64);
             }
         }
-        let time_s: Vec<f64> = (0..rows).map(|k| 0.01 * k as f64).collect();
-        let columns = vec![
-            ("voltage_cmd_v".into(), time_s.iter().map(|t| voltage(*t)).collect()),
-            ("shaft_speed_rad_s".into(), speeds),
-        ];
-        let criterion =
-            Criterion { form_error: 0.01, own_form_error: 0.1, facts_a_band: 10.0, timing_s: 0.001 };
-        let rig = Rig::from_toml(rig).unwrap();
-        let setup =
-            Setup::new(&[Series { name: "log".into(), time_s, columns }], &rig, ModelName::Model2, criterion)
-                .unwrap();
-        let said = setup.notes.iter().any(|note| note.contains("held from row to row"));
-        (setup.problem.recordings[0].every_command, said)
+        let volts = (0..rows).map(|k| voltage(0.01 * k as f64)).collect();
+        let columns = [("voltage_cmd_v", volts), ("shaft_speed_rad_s", speeds)];
+        read_and_said(rig, 0.01, columns, |read| read.every_command, "held from row to row")
     }
 
     #[test]

@@ -23,12 +23,7 @@ pub fn words() -> &'static str {
 
 #[cfg(test)]
 mod tests {
-    use kort_thruster::models::ModelName;
-    use kort_thruster::rig::Rig;
-
-    use crate::data::Series;
-    use crate::noise::Criterion;
-    use crate::setup::Setup;
+    use crate::readings::tests::read_and_said;
 
     const RIG: &str = "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = { value = 0.03, tol = 0.3 }\n\
                        torque_constant_nm_a = { value = 1.0, tol = 0.1 }\nwinding_resistance_ohm = 1.0\n\
@@ -54,15 +49,9 @@ mod tests {
             current = if ramped { flows } else { current + (flows - current) / 0.02 * DT };
             speed += current / 0.03 * DT;
         }
-        let time_s: Vec<f64> = (0..columns[0].len()).map(|k| 0.005 * k as f64).collect();
-        let columns = ["voltage_cmd_v", "shaft_speed_rad_s"].map(String::from).into_iter().zip(columns);
-        let criterion =
-            Criterion { form_error: 0.01, own_form_error: 0.1, facts_a_band: 10.0, timing_s: 0.001 };
-        let rig = Rig::from_toml(RIG).unwrap();
-        let log = Series { name: "log".into(), time_s, columns: columns.collect() };
-        let setup = Setup::new(&[log], &rig, ModelName::Model2, criterion).unwrap();
-        let said = setup.notes.iter().any(|note| note.contains("lag of the voltage"));
-        (setup.problem.recordings[0].lag_on_command, said)
+        let [driver, speeds] = columns;
+        let columns = [("voltage_cmd_v", driver), ("shaft_speed_rad_s", speeds)];
+        read_and_said(RIG, 0.005, columns, |read| read.lag_on_command, "lag of the voltage")
     }
 
     #[test]

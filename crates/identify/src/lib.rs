@@ -20,6 +20,7 @@ mod lag_on_command;
 pub mod noise;
 mod over_the_top;
 mod quadratic;
+mod readings;
 mod refuse;
 mod rest;
 pub mod sampling;

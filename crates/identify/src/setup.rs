@@ -7,14 +7,11 @@ use kort_thruster::parameters::Parameters;
 use kort_thruster::rig::Rig;
 
 use crate::checks;
-use crate::data::{
-    DataError, Driving, Prepared, Series, counted_angle, fresh, loaded, possible_drivers, row_means, spread,
-};
+use crate::data::{DataError, Driving, Prepared, Series, counted_angle, fresh, possible_drivers, spread};
 use crate::excerpt;
-use crate::held;
 use crate::hypothesis::{Hypothesis, Inputs, UNSTATED_TOL, nothing_stated};
-use crate::lag_on_command::{self, lag_on_command};
 use crate::noise::Criterion;
+use crate::readings;
 use crate::refuse;
 use crate::simulate::Problem;
 use crate::spectrum::median_interval;
@@ -131,36 +128,8 @@ impl<'a> Setup<'a> {
             let baseline = Hypothesis::baseline(model, rig, prescribed, inputs).with_sampling(&recordings);
             (Problem::new(model, rig, recordings, masked.clone(), criterion), baseline)
         };
-        // What the rig leaves open of how its columns are to be read: the reading stays under which the baseline is likelier.
-        let mut read = (compared(recordings.clone()), recordings);
-        let likelier = |(read, recordings): &mut ((Problem<'a>, Hypothesis), Vec<Prepared>),
-                        others: Vec<Prepared>,
-                        odds| {
-            let other = compared(others.clone());
-            let better = fits_better(&other, read, odds);
-            if better {
-                (*read, *recordings) = (other, others);
-            }
-            better
-        };
-        let mut load = None;
-        for sign in loaded::SIGNS {
-            let Some(loaded) = loaded::loaded(&read.1, &series, rig, sign) else { break };
-            if likelier(&mut read, loaded, 1.0) {
-                load = Some(loaded::words(sign));
-            }
-        }
-        notes.extend(load);
-        if held::held(&read.1, rig).is_some_and(|held| likelier(&mut read, held, 1.0)) {
-            notes.push(held::words(&read.1));
-        }
-        if row_means::row_means(&read.1, &series).is_some_and(|means| likelier(&mut read, means, PLAINLY)) {
-            notes.push(row_means::words().into());
-        }
-        if lag_on_command(&read.1, rig).is_some_and(|lagging| likelier(&mut read, lagging, PLAINLY)) {
-            notes.push(lag_on_command::words().into());
-        }
-        let ((mut problem, mut baseline), _) = read;
+        let (mut problem, mut baseline, words) = readings::likeliest(recordings, &series, rig, &compared);
+        notes.extend(words);
         if let Some(led) = problem.led(&baseline) {
             (problem, baseline) = compared(led.recordings);
             baseline.start = led.values;
@@ -178,18 +147,6 @@ impl<'a> Setup<'a> {
         }
         Ok(Self { series, problem, baseline, notes, thin })
     }
-}
-
-/// Steps of a fit of the baseline under one reading: enough for stated numbers that are honestly rough.
-const STEPS: usize = 8;
-/// Odds beyond which a reading takes the place of the one that the docs say: twenty to one.
-const PLAINLY: f64 = 20.0;
-
-/// Whether the baseline does better on one problem than on another, by these odds.
-fn fits_better(one: &(Problem, Hypothesis), other: &(Problem, Hypothesis), odds: f64) -> bool {
-    let cost =
-        |(problem, baseline): &(Problem, Hypothesis)| problem.settle_from_stated(baseline, STEPS).cost();
-    cost(one) + 2.0 * odds.ln() < cost(other)
 }
 
 /// Of the columns that the model has no use for, the one that follows best what the stated rig leaves: the

@@ -25,12 +25,7 @@ pub fn words() -> &'static str {
 
 #[cfg(test)]
 mod tests {
-    use kort_thruster::models::ModelName;
-    use kort_thruster::rig::Rig;
-
-    use crate::data::Series;
-    use crate::noise::Criterion;
-    use crate::setup::Setup;
+    use crate::readings::tests::read_and_said;
 
     const RIG: &str = "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = { value = 0.035, tol = 0.3 }\n\
                        torque_constant_nm_a = 1.0\nviscous_friction_nm_s = { value = 0.3, tol = 0.3 }\n\
@@ -54,15 +49,9 @@ mod tests {
             sum += current;
             speed += (current - 0.3 * speed) / 0.03 * DT;
         }
-        let time_s: Vec<f64> = (0..columns[0].len()).map(|k| 0.02 * k as f64).collect();
-        let columns = ["current_a", "shaft_speed_rad_s"].map(String::from).into_iter().zip(columns);
-        let log = Series { name: "log".into(), time_s, columns: columns.collect() };
-        let criterion =
-            Criterion { form_error: 0.01, own_form_error: 0.1, facts_a_band: 10.0, timing_s: 0.001 };
-        let rig = Rig::from_toml(RIG).unwrap();
-        let setup = Setup::new(&[log], &rig, ModelName::Model2, criterion).unwrap();
-        let said = setup.notes.iter().any(|note| note.contains("mean since the row before"));
-        (setup.problem.recordings[0].row_means, said)
+        let [driver, speeds] = columns;
+        let columns = [("current_a", driver), ("shaft_speed_rad_s", speeds)];
+        read_and_said(RIG, 0.02, columns, |read| read.row_means, "mean since the row before")
     }
 
     #[test]
