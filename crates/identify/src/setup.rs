@@ -128,7 +128,7 @@ impl<'a> Setup<'a> {
             let baseline = Hypothesis::baseline(model, rig, prescribed, inputs).with_sampling(&recordings);
             (Problem::new(model, rig, recordings, masked.clone(), criterion), baseline)
         };
-        let (mut problem, mut baseline, words) = readings::likeliest(recordings, &series, rig, &compared);
+        let (mut problem, mut baseline, words) = readings::likeliest(recordings, &series, rig, compared);
         notes.extend(words);
         if let Some(led) = problem.led(&baseline) {
             (problem, baseline) = compared(led.recordings);
