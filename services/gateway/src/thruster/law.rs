@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use kort_control::{EstimatorKind, ObserverKind};
 use kort_proto::events::EventKind;
-use kort_proto::messages::{PARAMETERS, Parameter, Process, RequestKind};
+use kort_proto::messages::{ControllerState, PARAMETERS, Parameter, Process, RequestKind};
 use kort_proto::text::Text;
 
 use super::{Thruster, finite, request};
@@ -95,8 +95,8 @@ impl Thruster {
             *slot = Parameter { name: Text::new(name), value: *value, ..Parameter::default() };
         }
         self.ask(message, &[Process::Controller], Kind::Refused).await?;
-        let law = wanted.controller.clone().unwrap_or(now.controller);
-        self.settle(|heard, now| heard.controller(now).is_some_and(|state| state.law.as_str() == law)).await;
+        // The answer tells what is in force: not before it is heard of.
+        self.settle(|heard, now| heard.controller(now).is_some_and(|state| follows(state, wanted))).await;
         let parts = [
             ("controller", wanted.controller.as_deref()),
             ("observer", wanted.observer.as_deref()),
@@ -108,4 +108,19 @@ impl Thruster {
         self.did(who, lease, EventKind::ControllerChanged, &format!("set {}", changed.join(", ")));
         Ok(())
     }
+}
+
+/// Whether a controller runs what was wanted of it.
+fn follows(state: &ControllerState, wanted: &ControllerRequest) -> bool {
+    let parts = [
+        (&state.law, &wanted.controller),
+        (&state.observer, &wanted.observer),
+        (&state.estimator, &wanted.estimator),
+    ];
+    let set = |(name, value): (&String, &f64)| {
+        let mut table = state.law_parameters.iter(state.law_parameter_count);
+        table.any(|p| p.name.as_str() == name && p.value == *value)
+    };
+    parts.into_iter().all(|(runs, wanted)| wanted.as_ref().is_none_or(|wanted| runs.as_str() == wanted))
+        && wanted.parameters.iter().all(set)
 }
