@@ -61,7 +61,7 @@ pub fn diagnose(
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<Diagnosis, DataError> {
     let constants = Constants::built_in();
-    let Setup { series, problem, mut baseline, mut notes, thin } =
+    let Setup { series, problem, mut baseline, mut notes, thin, .. } =
         Setup::of_stretches(series, rig, options.model, constants.criterion)?;
     for effect in &options.with {
         let values = baseline.start.clone();

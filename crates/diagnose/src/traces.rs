@@ -14,6 +14,8 @@ pub struct Traces {
 pub struct Trace {
     /// Recording's name.
     pub recording: String,
+    /// What drives the model, where it is a recording's second experiment.
+    pub under: Option<&'static str>,
     /// Column.
     pub channel: &'static str,
     /// Time of each sample, s.
@@ -45,6 +47,7 @@ pub fn traces(problem: &Problem, before: &Stack, after: &Stack, speed: &[Vec<f64
             };
             channels.push(Trace {
                 recording: recording.name.clone(),
+                under: recording.second.then(|| recording.driving.column()),
                 channel: channel.response.name(),
                 time_s: channel.rows[from..].iter().map(|k| recording.time_s[*k]).collect(),
                 measured: channel.values[from..].to_vec(),

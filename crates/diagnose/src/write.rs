@@ -273,10 +273,10 @@ impl<'a, 'p> Writer<'a, 'p> {
         let report = Report {
             schema: "kort.diagnosis/2".into(),
             kort_version: env!("CARGO_PKG_VERSION").into(),
-            recordings: self.series.iter().map(|s| s.name.clone()).collect(),
+            recordings: problem.recorded().map(|r| r.name.clone()).collect(),
             rig: self.rig.name.clone(),
             seed: options.seed,
-            seconds: problem.recordings.iter().map(kort_identify::data::Prepared::duration_s).sum(),
+            seconds: problem.recorded().map(kort_identify::data::Prepared::duration_s).sum(),
             verdict: decision.verdict,
             summary,
             baseline,

@@ -15,7 +15,6 @@ use nalgebra::DMatrix;
 use rand::{Rng, SeedableRng};
 use serde::Serialize;
 
-use crate::checks;
 use crate::data::{DataError, Prepared, Series};
 use crate::fit::Fit;
 use crate::heldout::held_out_rows;
@@ -139,7 +138,7 @@ pub fn identify(
     options: &Options,
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<FitReport, DataError> {
-    let Setup { mut problem, mut baseline, mut notes, thin, .. } =
+    let Setup { mut problem, mut baseline, flagged, mut notes, thin, .. } =
         Setup::new(series, rig, options.model, options.criterion)?;
     notes.extend(thin);
     let typical = problem.scale.torque_n_m / problem.scale.shaft_speed_rad_s;
@@ -152,8 +151,8 @@ pub fn identify(
     let moving: Vec<bool> = problem.recordings.iter().map(|r| r.start[0] != 0.0).collect();
     if moving.contains(&true) {
         let mut masked = problem.masked.clone();
-        for ((rows, one), _) in masked.iter_mut().zip(series).zip(&moving).filter(|(_, m)| **m) {
-            *rows = checks::check(one, rig).masked;
+        for ((rows, flagged), _) in masked.iter_mut().zip(flagged).zip(&moving).filter(|(_, m)| **m) {
+            *rows = flagged;
         }
         problem = Problem::new(problem.model, rig, problem.recordings, masked, problem.criterion);
     }
@@ -199,7 +198,7 @@ pub fn identify(
         rig: rig.name.clone(),
         model: options.model.name().into(),
         seed: options.seed,
-        seconds: problem.recordings.iter().map(Prepared::duration_s).sum(),
+        seconds: problem.recorded().map(Prepared::duration_s).sum(),
         channels: scores::channels(problem, &held, &train_residual, &full, &floor),
         not_identifiable: not_identifiable(problem, &best),
         correlations: correlations(&best, &problem.covariance(&best)),
@@ -209,6 +208,7 @@ pub fn identify(
             .recordings
             .iter()
             .zip(&moving)
+            .filter(|(r, _)| !r.second)
             .map(|(r, moving)| InitialState {
                 recording: r.name.clone(),
                 shaft_speed_rad_s: r.start[0],

@@ -1,5 +1,6 @@
 //! Recordings of one rig made ready to compare with a model: what `fit` and `diagnose` start from.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use kort_thruster::models::ModelName;
@@ -7,6 +8,7 @@ use kort_thruster::parameters::Parameters;
 use kort_thruster::rig::Rig;
 
 use crate::checks;
+use crate::data::experiments::{self, Experiment, experiments};
 use crate::data::{DataError, Driving, Prepared, Series, counted_angle, fresh, possible_drivers, spread};
 use crate::excerpt;
 use crate::hypothesis::{Hypothesis, Inputs, UNSTATED_TOL, nothing_stated};
@@ -18,12 +20,14 @@ use crate::spectrum::median_interval;
 
 /// A problem ready to fit.
 pub struct Setup<'a> {
-    /// What is compared: the recordings, or the stretches of them that were chosen.
+    /// What is compared: the recordings, or the stretches of them that were chosen; one of a speed drive may stand as two.
     pub series: Vec<Series>,
     /// The problem.
     pub problem: Problem<'a>,
     /// The baseline with its free numbers.
     pub baseline: Hypothesis,
+    /// Rows that the checks flag, by recording of the problem.
+    pub flagged: Vec<Vec<bool>>,
     /// Words from the checks.
     pub notes: Vec<String>,
     /// Why the recordings cannot tell anything, if so.
@@ -50,8 +54,9 @@ impl<'a> Setup<'a> {
         let parts: Vec<Series> =
             series.iter().zip(&rows).map(|(one, rows)| excerpt::excerpt(one, rows)).collect();
         let mut setup = Self::prepare(&parts, rig, model, criterion)?;
-        for (one, prepared) in series.iter().zip(&mut setup.problem.recordings) {
-            prepared.lay_means(one);
+        let whole = experiments(series, rig, model == ModelName::Model3);
+        for (one, prepared) in whole.iter().zip(&mut setup.problem.recordings) {
+            prepared.lay_means(&one.read);
         }
         let words = series.iter().zip(&rows).map(|(one, rows)| excerpt::words(one, rows));
         setup.notes.splice(0..0, words.chain(series.iter().filter_map(checks::pauses)));
@@ -79,18 +84,24 @@ impl<'a> Setup<'a> {
         model: ModelName,
         criterion: Criterion,
     ) -> Result<Self, DataError> {
-        let recorded = series;
-        let (series, repeated): (Vec<Series>, Vec<Option<String>>) = recorded.iter().map(fresh).unzip();
-        let recordings: Vec<Prepared> = series
-            .iter()
-            .map(|s| Prepared::new(s, rig, model == ModelName::Model3))
-            .collect::<Result<_, _>>()?;
+        let speed_driven = model == ModelName::Model3;
+        let experiments = experiments(series, rig, speed_driven);
+        let of_two = experiments::words(series, &experiments);
+        let (series, repeated): (Vec<Series>, Vec<Option<String>>) =
+            experiments.iter().map(|one| fresh(&one.read)).unzip();
+        let prepared = |(read, one): (&Series, &Experiment)| {
+            Ok(Prepared { second: one.second, ..Prepared::new(read, rig, speed_driven)? })
+        };
+        let recordings: Vec<Prepared> =
+            series.iter().zip(&experiments).map(prepared).collect::<Result<_, DataError>>()?;
         let (mut notes, mut masked): (Vec<String>, Vec<_>) =
-            (repeated.into_iter().flatten().collect(), Vec::new());
-        for (one, prepared) in recorded.iter().zip(&recordings) {
-            let checked = checks::check(one, rig);
+            (repeated.into_iter().flatten().chain(of_two).collect(), Vec::new());
+        let mut flagged = Vec::new();
+        for (one, prepared) in experiments.iter().zip(&recordings) {
+            let checked = checks::check(one.recorded, rig);
             notes.extend(checked.notes);
-            let mut rows = checked.masked;
+            let mut rows = checked.masked.clone();
+            flagged.push(checked.masked);
             if prepared.start[0] != 0.0 {
                 // The state before the first row is not known: let it settle.
                 let until = prepared.time_s[0] + (0.1 * prepared.duration_s()).min(2.0);
@@ -138,14 +149,17 @@ impl<'a> Setup<'a> {
             notes.extend(hidden.words(&problem.recordings));
             problem = problem.without(&hidden.rows);
         }
-        notes.extend(problem.recordings.iter().filter_map(Prepared::hidden_between_rows));
+        notes.extend(problem.recorded().filter_map(Prepared::hidden_between_rows));
         if let Some(name) = telling_column(&series, &problem, &baseline) {
             let sizes = spread(&series, &name);
             for (one, recording) in series.iter().zip(&mut problem.recordings) {
                 recording.lay_extra(&name, one.column(&name).unwrap_or(&[]), sizes);
             }
         }
-        Ok(Self { series, problem, baseline, notes, thin })
+        // What two experiments of one recording have in common is said once.
+        let mut said = BTreeSet::new();
+        notes.retain(|note| said.insert(note.clone()));
+        Ok(Self { series, problem, baseline, flagged, notes, thin })
     }
 }
 

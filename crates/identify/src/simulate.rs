@@ -72,6 +72,11 @@ impl<'a> Problem<'a> {
         problem
     }
 
+    /// The recordings, each once, though it be two experiments.
+    pub fn recorded(&self) -> impl Iterator<Item = &Prepared> {
+        self.recordings.iter().filter(|r| !r.second)
+    }
+
     /// The problem without some rows: its training part.
     pub fn without(&self, held: &[Vec<bool>]) -> Self {
         let mut masked = self.masked.clone();

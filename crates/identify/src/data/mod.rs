@@ -12,6 +12,7 @@ mod command;
 mod counted;
 mod driving;
 mod error;
+pub mod experiments;
 mod fill;
 mod fresh;
 mod grain;
@@ -180,6 +181,8 @@ pub struct Prepared {
     pub row_means: bool,
     /// Whether the drive's stated lag is taken to act on the command, not on the current that follows.
     pub lag_on_command: bool,
+    /// Whether it is the second experiment of a recording that stands before it.
+    pub second: bool,
 }
 
 /// Whether a rig shows a response. Of a speed drive's current nothing is modelled. A dry shaft has no water to feel; its
@@ -200,7 +203,8 @@ pub const OBSERVER_RAD_S: f64 = std::f64::consts::TAU;
 /// voltage does, within a few tenths of a second; a pendulum hangs. A dry shaft under a current integrates, and
 /// drifts; a pendulum that passes its top falls on either side.
 fn returns(series: &Series, rig: &Rig, driving: Driving) -> bool {
-    if driving == Driving::Speed || rig.amplifier.kind == AmplifierKind::Speed {
+    let commanded = matches!(driving, Driving::Command(_));
+    if driving == Driving::Speed || commanded && rig.amplifier.kind == AmplifierKind::Speed {
         return true;
     }
     if let Load::Pendulum { .. } = rig.load {
@@ -303,6 +307,7 @@ impl Prepared {
             observer_rad_s: if returns(series, rig, driving) { 0.0 } else { OBSERVER_RAD_S },
             row_means: false,
             lag_on_command: false,
+            second: false,
         };
         if let Driving::Command("duty_cmd") = driving {
             // A duty of the supply is a voltage: of the recorded supply, or else the nominal one.

@@ -17,19 +17,17 @@ pub fn scale(all: &[Prepared], rig: &Rig) -> Scale {
     };
     let stated = kort_thruster::parameters::Parameters::stated(rig);
     let kt = rig.motor.torque_constant_nm_a.value;
-    let command = all.iter().flat_map(|p| &p.command).fold(0.0_f64, |m, c| m.max(c.abs()));
+    let command = largest(asked(all));
+    let under = |name: &str| largest(all.iter().filter(|p| p.driving.column() == name));
     let (ct, cq) = if rig.propeller.is_some() { stated.bollard_coefficients() } else { (0.0, 0.0) };
-    let driven_by = |name: &str| all.iter().any(|p| p.driving.column() == name);
-    let current =
-        if driven_by("current_cmd_a") || driven_by("current_a") { command } else { full(Response::Current) };
+    let driving = under("current_cmd_a").max(under("current_a"));
+    let current = if driving > 0.0 { driving } else { full(Response::Current) };
     let mut speed = full(Response::ShaftSpeed);
     if speed == 0.0 {
         // The rate of an angle that is recorded alone.
         speed = full(Response::ShaftAngle);
     }
-    if driven_by("shaft_speed_rad_s") || driven_by("speed_cmd_rad_s") {
-        speed = speed.max(command);
-    }
+    speed = speed.max(under("shaft_speed_rad_s")).max(under("speed_cmd_rad_s"));
     if speed == 0.0 && cq > 0.0 {
         speed = (kt * current / cq).sqrt();
     }
@@ -74,6 +72,24 @@ pub fn scale(all: &[Prepared], rig: &Rig) -> Scale {
     }
 }
 
+/// The recordings under a command, or all where nobody asked for anything: a speed drive's current may drive beside its
+/// command.
+fn asked(all: &[Prepared]) -> impl Iterator<Item = &Prepared> {
+    let commanded = |p: &Prepared| matches!(p.driving, Driving::Command(_));
+    let nobody = !all.iter().any(commanded);
+    all.iter().filter(move |p| nobody || commanded(p))
+}
+
+/// The largest size of what drives these.
+fn largest<'a>(these: impl Iterator<Item = &'a Prepared>) -> f64 {
+    these.flat_map(|p| &p.command).fold(0.0_f64, |m, c| m.max(c.abs()))
+}
+
+/// Whether the torque on the shaft is given: by a recorded current or power.
+fn torque_given(recording: &Prepared) -> bool {
+    matches!(recording.driving, Driving::Current | Driving::Power)
+}
+
 /// Whether every recording holds the shaft angle, or a speed that it was counted from.
 fn angle_known(all: &[Prepared]) -> bool {
     all.iter().all(|p| p.stimulus.ticks.iter().any(|t| t.shaft_angle_rad.is_some()))
@@ -95,7 +111,7 @@ fn goes_astern(all: &[Prepared], speed_rad_s: f64, command: f64) -> bool {
         .iter()
         .flat_map(|p| p.channels.iter().filter(|c| c.response == Response::ShaftSpeed))
         .flat_map(|channel| &channel.values);
-    let commands = all.iter().flat_map(|p| &p.command);
+    let commands = asked(all).flat_map(|p| &p.command);
     speeds.copied().any(|v| v < -TRIFLE * speed_rad_s) || commands.copied().any(|c| c < -TRIFLE * command)
 }
 
@@ -122,7 +138,8 @@ pub fn available(model: ModelName, series: &[Series], all: &[Prepared]) -> Avail
     Available {
         columns,
         shaft_prescribed: all.iter().all(|p| p.driving == Driving::Speed),
-        current_prescribed: all.iter().all(|p| matches!(p.driving, Driving::Current | Driving::Power)),
+        current_prescribed: all.iter().all(torque_given),
+        torque_given: all.iter().any(torque_given),
         axial_flow_modelled: !matches!(model, ModelName::Model0 | ModelName::Model1),
         speed_unsigned: series.iter().any(crate::checks::is_unsigned_speed),
         supply_sag_share: series

@@ -11,6 +11,8 @@ pub struct Available {
     pub shaft_prescribed: bool,
     /// The current is prescribed (a recorded current or electrical power drives the model).
     pub current_prescribed: bool,
+    /// Of one recording at least, where of others a command may.
+    pub torque_given: bool,
     /// The baseline model has the axial flow as a state.
     pub axial_flow_modelled: bool,
     /// Only the size of the shaft speed was recorded: it is never negative although the drive reverses.
@@ -46,7 +48,7 @@ pub fn wet(rig: &Rig, _: &Available) -> Result<(), &'static str> {
 pub fn free_shaft(rig: &Rig, available: &Available) -> Result<(), &'static str> {
     if available.shaft_prescribed {
         Err("the recorded shaft speed drives the model, so the shaft's torque balance is not seen")
-    } else if rig.amplifier.kind == AmplifierKind::Speed && !available.current_prescribed {
+    } else if rig.amplifier.kind == AmplifierKind::Speed && !available.torque_given {
         Err(
             "a speed drive holds the shaft and its current is not recorded, so the torque balance is not seen",
         )

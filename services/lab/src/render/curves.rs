@@ -35,7 +35,11 @@ pub fn all(diagnosis: &Diagnosis) -> Markup {
             @if several && drawn.len() < report.recordings.len() { " The first " (drawn.len()) " recordings are drawn." }
         }
         @for trace in diagnosis.traces.channels.iter().filter(|t| drawn.contains(&t.recording)) {
-            h3 { (trace.channel) @if several { " " span class="soft" { (trace.recording) } } }
+            h3 {
+                (trace.channel)
+                @if let Some(column) = trace.under { " under " (column) }
+                @if several { " " span class="soft" { (trace.recording) } }
+            }
             (channel(trace, found, if several { &[] } else { &spans }))
         }
     }
@@ -172,6 +176,7 @@ mod tests {
         let wrong = |t: &f64| if (6.0..7.0).contains(t) { 1.0 } else { 0.0 };
         Trace {
             recording: "r".into(),
+            under: None,
             channel: "thrust_n",
             measured: time_s.iter().map(wrong).collect(),
             baseline: vec![0.0; 1000],
