@@ -45,7 +45,7 @@ pub struct PosteriorConstants {
     pub temper: f64,
     /// What the temper grows to as a share of what the likeliest set costs less than the baseline.
     pub form_share: f64,
-    /// Odds against the likeliest set by the square of the number of its effects.
+    /// Odds against the likeliest set by the number of its effects.
     pub surprise: f64,
     /// Factor on a name in a set that needs a nameless term: the world then holds what the catalogue does not.
     pub beside_unknown: f64,

@@ -16,10 +16,9 @@ pub struct Explanation {
 }
 
 /// How far a set of so many effects may be believed if it is the likeliest by far. What was not fitted may be right
-/// instead, and the more effects a set has, the more of them make up for each other's equations: the odds against it grow
-/// as the square of their number.
+/// in the place of each: the odds against it grow as their number.
 pub fn trusted(effects: usize, surprise: f64) -> f64 {
-    1.0 / (1.0 + surprise * (effects as f64).powi(2))
+    1.0 / (1.0 + surprise * effects as f64)
 }
 
 /// How far costs count as odds where the likeliest set costs so much less than the baseline. No form is exact, so costs
@@ -114,7 +113,7 @@ mod tests {
     fn an_effect_in_every_likely_set_is_as_sure_as_all_of_them() {
         let costs = vec![(vec!["a", "b"], 0.0), (vec!["a", "c"], 1.0), (vec!["a"], 60.0)];
         let all = posterior(costs, 3.0, 0.03);
-        assert!((presence(&all, "a", 0.7) - 1.0 / 1.12).abs() < 1e-3, "as two may be trusted");
+        assert!((presence(&all, "a", 0.7) - 1.0 / 1.06).abs() < 1e-3, "as two may be trusted");
         assert!(presence(&all, "b", 0.7) > presence(&all, "c", 0.7));
     }
 }

@@ -9,13 +9,17 @@ use super::{Driving, Prepared, Series};
 
 /// The recordings with measured currents as means over their rows, where such a current drives.
 pub fn row_means(recordings: &[Prepared], series: &[Series]) -> Option<Vec<Prepared>> {
+    let measured = |recording: &Prepared| recording.driving == Driving::Current;
     let each = recordings.iter().zip(series).map(|(recording, one)| {
-        let current = one.column(recording.driving.column());
-        let current = current.filter(|_| recording.driving == Driving::Current)?;
-        // A step within a row is in its mean; there is none to place.
-        Some(Prepared { row_means: true, command: filled(current), edges: Vec::new(), ..recording.clone() })
+        match one.column(recording.driving.column()).filter(|_| measured(recording)) {
+            // A step within a row is in its mean; there is none to place.
+            Some(current) => {
+                Prepared { row_means: true, command: filled(current), edges: Vec::new(), ..recording.clone() }
+            }
+            None => recording.clone(),
+        }
     });
-    each.collect()
+    recordings.iter().any(measured).then(|| each.collect())
 }
 
 /// What was taken for true.

@@ -101,6 +101,51 @@ impl<T: Real> FirstOrder<T> {
     }
 }
 
+/// Exact answer of a lightly damped filter of second order, `x''/wn^2 + 2 z x'/wn + x = u`, to a signal that runs straight
+/// from sample to sample.
+pub(super) struct SecondOrder<T> {
+    /// By how much a ramp's answer trails it: `2 z/wn`.
+    behind_s: T,
+    tick_s: f64,
+    /// Free swing over one tick: e(t), e'(t) from e, e' at its start.
+    free: [[T; 2]; 2],
+    input: T,
+    /// Position and its rate.
+    swing: Option<[T; 2]>,
+}
+
+impl<T: Real> SecondOrder<T> {
+    /// Without a past; `time_s` is 1/wn, the damping ratio below 1.
+    pub fn new(time_s: T, damping_ratio: T, tick_s: f64) -> Self {
+        let (wn, z) = (T::ONE / time_s, damping_ratio);
+        let (decay, damped) = (z * wn, wn * (T::ONE - z * z).sqrt());
+        let ((sin, cos), fall) = ((damped * tick_s).sin_cos(), (-decay * tick_s).exp());
+        Self {
+            behind_s: z * 2.0 / wn,
+            tick_s,
+            free: [
+                [fall * (cos + decay / damped * sin), fall * sin / damped],
+                [-fall * wn * wn / damped * sin, fall * (cos - decay / damped * sin)],
+            ],
+            input: T::ZERO,
+            swing: None,
+        }
+    }
+
+    /// Position and rate at the end of a tick: the swing about the forced answer to a ramp.
+    pub fn step(&mut self, input: T) -> [T; 2] {
+        let started = self.swing.is_some();
+        let [position, rate] = self.swing.unwrap_or([input, T::ZERO]);
+        let before = if started { self.input } else { input };
+        let slope = (input - before) / self.tick_s;
+        let (e, de) = (position - (before - self.behind_s * slope), rate - slope);
+        let [[a, b], [c, d]] = self.free;
+        let swing = [input - self.behind_s * slope + a * e + b * de, slope + c * e + d * de];
+        (self.input, self.swing) = (input, Some(swing));
+        swing
+    }
+}
+
 /// The measuring chain of an encoder that runs ahead of the shaft by an angle of its own: differenced over a control period,
 /// then filtered, as the plant does with the shaft's own angle; its rate itself on a rig that states neither.
 pub(super) struct EncoderAhead<T> {
@@ -223,6 +268,17 @@ impl<T: Real> MeanAndLag<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_second_order_swings_over_by_what_its_damping_leaves() {
+        let (time_s, z) = (0.02, 0.3_f64);
+        let mut swing = SecondOrder::new(time_s, z, 0.0005);
+        swing.step(0.0);
+        let largest = (0..2000).map(|_| swing.step(1.0)[0]).fold(0.0, f64::max);
+        let over = (-std::f64::consts::PI * z / (1.0 - z * z).sqrt()).exp();
+        assert!((largest - 1.0 - over).abs() < 1e-3, "{largest}");
+        assert!((swing.step(1.0)[0] - 1.0).abs() < 1e-6);
+    }
 
     #[test]
     fn history_interpolates_between_ticks() {

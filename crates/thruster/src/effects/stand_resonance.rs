@@ -1,5 +1,6 @@
 //! The stand swings and the force sensor sees it.
 
+use super::memory::SecondOrder;
 use super::{Context, Descriptor, Effect, Hooks, Path, Scale, Spec, thrust_measured};
 use crate::plant::{Sensed, Tick};
 use crate::real::Real;
@@ -46,31 +47,17 @@ fn starts(_: &Scale) -> Vec<Vec<f64>> {
 }
 
 fn build<T: Real>(values: &[T], context: &Context<T>) -> Box<dyn Effect<T>> {
-    let (wn, z, dt) = (values[1] * std::f64::consts::TAU, values[2], context.tick_s);
-    let (decay, damped) = (z * wn, wn * (T::ONE - z * z).sqrt());
-    let ((sin, cos), fall) = ((damped * dt).sin_cos(), (-decay * dt).exp());
+    let natural_rad_s = values[1] * std::f64::consts::TAU;
     Box::new(StandResonance {
         share: values[0],
-        behind_s: z * 2.0 / wn,
-        tick_s: dt,
-        // Free swing over one tick: e(t), e'(t) from e, e' at its start.
-        free: [
-            [fall * (cos + decay / damped * sin), fall * sin / damped],
-            [-fall * wn * wn / damped * sin, fall * (cos - decay / damped * sin)],
-        ],
-        thrust_n: T::ZERO,
-        swing: None,
+        swing: SecondOrder::new(T::ONE / natural_rad_s, values[2], context.tick_s),
     })
 }
 
 struct StandResonance<T> {
     share: T,
-    behind_s: T,
-    tick_s: f64,
-    free: [[T; 2]; 2],
-    thrust_n: T,
-    /// Position (as thrust, N) and its rate.
-    swing: Option<[T; 2]>,
+    /// The swinging mass's position, as thrust in N.
+    swing: SecondOrder<T>,
 }
 
 impl<T: Real> Effect<T> for StandResonance<T> {
@@ -78,18 +65,9 @@ impl<T: Real> Effect<T> for StandResonance<T> {
         Hooks::SENSE
     }
 
-    /// Exact for a thrust that runs straight over the tick: the swing about the forced answer to
-    /// a ramp, which trails the ramp by `2 z/wn`.
     fn sense(&mut self, _: &Tick, sensed: &mut Sensed<T>) {
         let thrust = sensed.thrust_n;
-        let [position, rate] = self.swing.unwrap_or([thrust, T::ZERO]);
-        let slope = if self.swing.is_some() { (thrust - self.thrust_n) / self.tick_s } else { T::ZERO };
-        let before = if self.swing.is_some() { self.thrust_n } else { thrust };
-        let (e, de) = (position - (before - self.behind_s * slope), rate - slope);
-        let [[a, b], [c, d]] = self.free;
-        let position = thrust - self.behind_s * slope + a * e + b * de;
-        self.swing = Some([position, slope + c * e + d * de]);
-        self.thrust_n = thrust;
+        let [position, _] = self.swing.step(thrust);
         sensed.thrust_n = thrust + self.share * (position - thrust);
     }
 }

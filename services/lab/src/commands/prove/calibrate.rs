@@ -62,7 +62,7 @@ fn print_trust(results: &[(Scored, Answer, Value)]) {
         eprintln!("{surprise:21}  {}", Law::ALL.map(of).join("  "));
     }
     let (law, surprise) = trust::best(&all);
-    eprintln!("best {surprise} {}, in use {in_use} {}", law.name(), Law::Square.name());
+    eprintln!("best {surprise} {}, in use {in_use} {}", law.name(), Law::Number.name());
 }
 
 /// The temper that these cases ask for, and what it is worth on folds left out.
