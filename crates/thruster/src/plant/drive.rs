@@ -61,8 +61,7 @@ impl<T: Real> Plant<T> {
             AmplifierKind::Speed if commanded => {
                 let (now, tau) = (self.x[SPEED], drive.time_constant_s);
                 let left = if tau > 0.0 { (T::from(-self.tick_s) / tau).exp() } else { T::ZERO };
-                let wanted = drive.command + (now - drive.command) * left;
-                Some((now, self.within_the_current(wanted, drive.current_limit_a)))
+                Some((now, drive.command + (now - drive.command) * left))
             }
             _ => tick.driven_speed().map(|(a, b)| (T::from(a), T::from(b))),
         };
@@ -73,15 +72,6 @@ impl<T: Real> Plant<T> {
         let mut course = Course { drive, measured_a, by_speed, current_a: [T::ZERO; 2], speed_rad_s };
         self.lay_out(tick, &mut course);
         course
-    }
-
-    /// The speed that a speed drive comes to within the tick: its current is limited, and what the water takes at the tick's
-    /// start is taken first.
-    #[inline(always)]
-    fn within_the_current(&self, wanted_rad_s: T, limit_a: T) -> T {
-        let (now, at_no_current) = (self.x[SPEED], self.last_rates[0][SPEED] * self.tick_s);
-        let most = self.constants.torque_constant_nm_a * limit_a * self.tick_s / self.constants.inertia_kg_m2;
-        wanted_rad_s.clamp(now + (at_no_current - most), now + (at_no_current + most))
     }
 
     /// The currents of a tick, where no speed is needed for them.
