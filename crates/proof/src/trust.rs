@@ -96,7 +96,7 @@ pub fn counted(all: &[Stated]) -> Vec<(usize, usize, usize)> {
 pub fn best(all: &[Stated]) -> (Law, f64) {
     let tried = Law::ALL.into_iter().flat_map(|law| SURPRISES.map(|surprise| (law, surprise)));
     let worth = |(law, surprise): &(Law, f64)| score(all, |names| law.trust(names, *surprise));
-    tried.max_by(|a, b| worth(a).total_cmp(&worth(b))).unwrap_or((Law::Square, SURPRISES[0]))
+    tried.max_by(|a, b| worth(a).total_cmp(&worth(b))).unwrap_or((Law::Number, SURPRISES[0]))
 }
 
 #[cfg(test)]
