@@ -54,6 +54,8 @@ if command -v python3 >/dev/null; then
   fetching=$!
 fi
 
+# Nothing is built a second time here.
+export CARGO_INCREMENTAL=0
 say "cargo test --workspace"
 cargo test --workspace --no-fail-fast
 

@@ -1,7 +1,7 @@
 //! The diagnosis: prepare, search, decide, check on held-out data, and write the report.
 
 use kort_identify::data::{DataError, Series, available};
-use kort_identify::hypothesis::Member;
+use kort_identify::hypothesis::{Hypothesis, Member};
 use kort_identify::setup::Setup;
 use kort_thruster::effects::{self, Available, Descriptor};
 use kort_thruster::models::ModelName;
@@ -61,14 +61,27 @@ pub fn diagnose(
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<Diagnosis, DataError> {
     let constants = Constants::built_in();
-    let Setup { series, problem, mut baseline, mut notes, thin, .. } =
-        Setup::of_stretches(series, rig, options.model, constants.criterion)?;
+    let mut setup = Setup::of_stretches(series, rig, options.model, constants.criterion)?;
+    let pushed = setup.pushed();
+    let held = rig.clone().exact_in(&pushed);
+    let rig = if pushed.is_empty() { rig } else { &held };
+    if !pushed.is_empty() {
+        setup = Setup::of_stretches(series, rig, options.model, constants.criterion)?;
+        setup.notes.push(format!(
+            "the recordings push {} of the rig's [[effects]] to the edge of what is stated: it is held at its stated value, and what is there instead is looked for",
+            pushed.join(", ")
+        ));
+    }
+    let Setup { series, problem, mut baseline, mut notes, thin, .. } = setup;
     for effect in &options.with {
+        if baseline.has(effect.id) {
+            continue;
+        }
         let values = baseline.start.clone();
         baseline = baseline.with(&values, Member::new(effect, &problem.scale), &problem.scale);
     }
     let offered = available(options.model, &series, &problem.recordings);
-    let candidates = candidates(rig, &offered, &options.with);
+    let candidates = candidates(rig, &offered, &baseline);
     let mut search = Search::new(&problem, candidates, &constants);
     let best = search.run(&baseline, progress);
     if search.fits[&Set::new()].broke_down() {
@@ -113,9 +126,8 @@ fn explanations(search: &Search, constants: &Constants) -> (Vec<Explanation>, bo
     (of(costs.into_iter().filter(|(set, _)| !set.is_empty()).collect()), true)
 }
 
-/// Effects that can act here.
-fn candidates(rig: &Rig, offered: &Available, known: &[&'static Descriptor]) -> Vec<&'static Descriptor> {
-    let free =
-        |e: &&'static Descriptor| (e.needs)(rig, offered).is_ok() && !known.iter().any(|k| k.id == e.id);
-    effects::ALL.iter().copied().filter(free).collect()
+/// Effects that can act here and are no part of the baseline.
+fn candidates(rig: &Rig, offered: &Available, baseline: &Hypothesis) -> Vec<&'static Descriptor> {
+    let more = |e: &&'static Descriptor| (e.needs)(rig, offered).is_ok() && !baseline.has(e.id);
+    effects::ALL.iter().copied().filter(more).collect()
 }

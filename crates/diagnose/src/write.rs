@@ -253,7 +253,7 @@ impl<'a, 'p> Writer<'a, 'p> {
         let std_baseline = problem.standard_errors(self.baseline);
         let baseline = Baseline {
             model: options.model.name().into(),
-            parameters: parameters(self.baseline, &std_baseline, None),
+            parameters: scores::stated_parameters(self.baseline, &std_baseline),
             channels: scores::channels(problem, &self.held, &baseline_trained, &baseline_full, &self.floor),
         };
         let next_experiment = experiment::next(self.search, &decision, &self.best, self.rig);

@@ -6,10 +6,10 @@
 
 use std::sync::Arc;
 
-use kort_thruster::effects::{Descriptor, Scale, Stretch};
+use kort_thruster::effects::{Descriptor, Scale, Spec, Stretch};
 use kort_thruster::models::ModelName;
 use kort_thruster::parameters::{Parameter as P, Parameters};
-use kort_thruster::rig::{Quantity, Rig};
+use kort_thruster::rig::{KnownEffect, Quantity, Rig};
 use nalgebra::DMatrix;
 
 use crate::data::{Prepared, Response};
@@ -90,6 +90,8 @@ pub struct Member {
     pub held: Vec<usize>,
     /// Prior standard deviations over the catalogue's, for what changes freely with time.
     pub liveliness: f64,
+    /// What the rig states of its values, where it is known to be there; else empty.
+    pub stated: Vec<Quantity>,
 }
 
 impl Member {
@@ -101,7 +103,38 @@ impl Member {
             held: (0..specs.len()).filter(|j| specs[*j].held || specs[*j].low == specs[*j].high).collect(),
             values: specs.iter().map(|s| s.start).collect(),
             liveliness: 1.0,
+            stated: Vec::new(),
         }
+    }
+
+    /// An effect that the rig is known to have, free within what is stated of it; none where all of it is stated as exact.
+    pub fn known(known: &KnownEffect) -> Option<Self> {
+        let stated: Vec<Quantity> = known.parameters.iter().map(|(_, quantity)| *quantity).collect();
+        let held: Vec<usize> = (0..stated.len()).filter(|j| stated[*j].sigma() == 0.0).collect();
+        let some_free = held.len() < stated.len();
+        let values = known.values().collect();
+        let member = |effect| Self { effect, values, held, liveliness: 1.0, stated };
+        known.descriptor().filter(|_| some_free).map(member)
+    }
+
+    /// One of its values as a free number of a hypothesis in which it has this place.
+    fn free(&self, slot: usize, value: usize, spec: &Spec) -> Free {
+        let catalogue = Free {
+            target: Target::Effect(slot, value),
+            name: spec.name,
+            unit: spec.unit,
+            stated: false,
+            mean: spec.mean,
+            sigma: if spec.acts.is_some() { spec.sigma * self.liveliness } else { spec.sigma },
+            low: spec.low,
+            high: spec.high,
+            acts: spec.acts,
+        };
+        let Some(quantity) = self.stated.get(value) else { return catalogue };
+        let (low, high) = reach(quantity);
+        // How large it may be the rig says; which sign it has, the equation.
+        let low = if spec.low >= 0.0 { low.max(0.02 * quantity.value) } else { low };
+        Free { stated: true, mean: quantity.value, sigma: quantity.sigma(), low, high, ..catalogue }
     }
 
     /// The same from other values.
@@ -222,6 +255,12 @@ fn stated(rig: &Rig, parameter: P, values: &Parameters) -> Option<Quantity> {
     }
 }
 
+/// From where to where a stated number may move.
+fn reach(stated: &Quantity) -> (f64, f64) {
+    let reach = 2.0 * REACH * stated.sigma();
+    (stated.value - reach, stated.value + reach)
+}
+
 /// True when the rig gives no tolerance for any parameter: then coefficients are taken as
 /// uncertain by [`UNSTATED_TOL`], and the report says so.
 pub fn nothing_stated(rig: &Rig) -> bool {
@@ -250,12 +289,10 @@ impl Hypothesis {
             if unstated && coefficient(parameter) && quantity.tol.is_none() {
                 quantity.tol = Some(UNSTATED_TOL);
             }
-            let Some(tol) = quantity.tol else { continue };
-            if quantity.value == 0.0 || !quantity.value.is_finite() {
+            if quantity.sigma() == 0.0 || !quantity.value.is_finite() {
                 continue;
             }
-            let reach = REACH * tol * quantity.value.abs();
-            let low = quantity.value - reach;
+            let (low, high) = reach(&quantity);
             free.push(Free {
                 target: Target::Base(parameter),
                 name: parameter.name(),
@@ -264,7 +301,7 @@ impl Hypothesis {
                 mean: quantity.value,
                 sigma: quantity.sigma(),
                 low: if parameter.positive() { low.max(0.02 * quantity.value) } else { low },
-                high: quantity.value + reach,
+                high,
                 acts: None,
             });
             start.push(quantity.value);
@@ -295,6 +332,17 @@ impl Hypothesis {
         std::iter::once(stated.clone()).chain(off_by_one).collect()
     }
 
+    /// With the effects that the rig is known to have, free within what is stated of each.
+    pub fn with_known(self, rig: &Rig, scale: &Scale) -> Self {
+        let more = |hypothesis: Self, member| hypothesis.with(&hypothesis.start, member, scale);
+        rig.effects.iter().filter_map(Member::known).fold(self, more)
+    }
+
+    /// Whether an effect is a member.
+    pub fn has(&self, effect: &str) -> bool {
+        self.effects.iter().any(|m| m.effect.id == effect)
+    }
+
     /// With the instants free at which these recordings' channels were sampled.
     pub fn with_sampling(mut self, recordings: &[Prepared]) -> Self {
         for free in crate::sampling::free(recordings) {
@@ -309,23 +357,12 @@ impl Hypothesis {
         let mut larger = self.clone();
         larger.start = values.to_vec();
         let slot = larger.effects.len();
-        for (j, spec) in (member.effect.parameters)(scale).into_iter().enumerate() {
-            if member.held.contains(&j) {
-                continue;
+        for (j, spec) in (member.effect.parameters)(scale).iter().enumerate() {
+            if !member.held.contains(&j) {
+                let free = member.free(slot, j, spec);
+                larger.start.push(member.values[j].clamp(free.low, free.high));
+                larger.free.push(free);
             }
-            let sigma = if spec.acts.is_some() { spec.sigma * member.liveliness } else { spec.sigma };
-            larger.free.push(Free {
-                target: Target::Effect(slot, j),
-                name: spec.name,
-                unit: spec.unit,
-                stated: false,
-                mean: spec.mean,
-                sigma,
-                low: spec.low,
-                high: spec.high,
-                acts: spec.acts,
-            });
-            larger.start.push(member.values[j].clamp(spec.low, spec.high));
         }
         larger.effects.push(member);
         larger

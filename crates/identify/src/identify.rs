@@ -144,6 +144,9 @@ pub fn identify(
     let typical = problem.scale.torque_n_m / problem.scale.shaft_speed_rad_s;
     open_friction(&mut baseline, rig, options.open_friction, typical);
     for effect in &options.with {
+        if baseline.has(effect.id) {
+            continue;
+        }
         let values = baseline.start.clone();
         baseline = baseline.with(&values, Member::new(effect, &problem.scale), &problem.scale);
     }

@@ -85,6 +85,15 @@ pub fn parameters(fit: &Fit, std_errors: &[f64], effect: Option<usize>) -> Vec<P
         .collect()
 }
 
+/// What the rig states and a fit changed: the baseline's parameters, and those of effects that the rig is known to have.
+pub fn stated_parameters(fit: &Fit, std_errors: &[f64]) -> Vec<ParameterReport> {
+    let known = (0..fit.hypothesis.effects.len()).filter(|k| !fit.hypothesis.effects[*k].stated.is_empty());
+    std::iter::once(None)
+        .chain(known.map(Some))
+        .flat_map(|effect| parameters(fit, std_errors, effect))
+        .collect()
+}
+
 /// Values of an effect that are not fitted and without which those that are mean nothing: the order of a ripple, the
 /// command at which a curve ends; and that which is there or not.
 fn taken_as_given(member: &Member) -> Vec<ParameterReport> {

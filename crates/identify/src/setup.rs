@@ -11,12 +11,15 @@ use crate::checks;
 use crate::data::experiments::{self, Experiment, experiments};
 use crate::data::{DataError, Driving, Prepared, Series, counted_angle, fresh, possible_drivers, spread};
 use crate::excerpt;
-use crate::hypothesis::{Hypothesis, Inputs, UNSTATED_TOL, nothing_stated};
+use crate::hypothesis::{Free, Hypothesis, Inputs, Target, UNSTATED_TOL, nothing_stated};
 use crate::noise::Criterion;
 use crate::readings;
 use crate::refuse;
 use crate::simulate::Problem;
 use crate::spectrum::median_interval;
+
+/// Most steps of the fit that tells whether known effects are as stated.
+const STEPS: usize = 24;
 
 /// A problem ready to fit.
 pub struct Setup<'a> {
@@ -137,7 +140,9 @@ impl<'a> Setup<'a> {
             recordings.iter_mut().for_each(|r| r.mark_smooth(model, rig, &stated));
             let inputs = Arc::new(Inputs::late(&recordings));
             let baseline = Hypothesis::baseline(model, rig, prescribed, inputs).with_sampling(&recordings);
-            (Problem::new(model, rig, recordings, masked.clone(), criterion), baseline)
+            let problem = Problem::new(model, rig, recordings, masked.clone(), criterion);
+            let baseline = baseline.with_known(rig, &problem.scale);
+            (problem, baseline)
         };
         let (mut problem, mut baseline, words) = readings::likeliest(recordings, &series, rig, compared);
         notes.extend(words);
@@ -160,6 +165,21 @@ impl<'a> Setup<'a> {
         let mut said = BTreeSet::new();
         notes.retain(|note| said.insert(note.clone()));
         Ok(Self { series, problem, baseline, flagged, notes, thin })
+    }
+}
+
+impl Setup<'_> {
+    /// Effects that the rig is known to have of which the recordings want more or less than the rig's tolerance allows.
+    pub fn pushed(&self) -> Vec<&'static str> {
+        if self.baseline.effects.is_empty() {
+            return Vec::new();
+        }
+        let fit = self.problem.settle_from_stated(&self.baseline, STEPS);
+        let at_edge = |(free, value): (&Free, &f64)| match free.target {
+            Target::Effect(slot, _) if free.at_bound(*value) => Some(fit.hypothesis.effects[slot].effect.id),
+            _ => None,
+        };
+        fit.hypothesis.free.iter().zip(&fit.values).filter_map(at_edge).collect()
     }
 }
 

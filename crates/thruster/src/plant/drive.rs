@@ -1,7 +1,7 @@
 //! The drive within a tick: from the command, through the effects on it, to a motor current or an imposed
 //! shaft speed at every instant of the tick.
 
-use super::{Drive, Driven, Plant, SPEED, Tick};
+use super::{Balance, Drive, Driven, Plant, Rub, SPEED, STATES, Tick};
 use crate::effects::FirstOrder;
 use crate::parameters::Parameter as P;
 use crate::real::Real;
@@ -19,6 +19,29 @@ pub(super) struct Course<T> {
     current_a: [T; 2],
     /// Shaft speed at start and end, rad/s, where it is imposed.
     pub(super) speed_rad_s: Option<(T, T)>,
+    /// A speed drive whose current falls short of what its set-point takes.
+    pub(super) at_limit: Option<AtLimit<T>>,
+}
+
+/// A speed drive at its current limit: its shaft is left to that current, and goes no further than the set-point.
+#[derive(Clone, Copy)]
+pub(super) struct AtLimit<T> {
+    /// The limit, A: positive where it drives ahead.
+    current_a: T,
+    /// Where the shaft would be at the tick's end if the current were there, rad/s.
+    wanted_rad_s: T,
+}
+
+impl<T: Real> AtLimit<T> {
+    /// A speed that this current came to, or the one wanted where it came past that.
+    #[inline(always)]
+    pub(super) fn no_further(&self, speed_rad_s: T) -> T {
+        if self.current_a > T::ZERO {
+            speed_rad_s.min(self.wanted_rad_s)
+        } else {
+            speed_rad_s.max(self.wanted_rad_s)
+        }
+    }
 }
 
 impl<T: Real> Plant<T> {
@@ -57,21 +80,42 @@ impl<T: Real> Plant<T> {
             (_, AmplifierKind::Current) => commanded && drive.voltage_limited,
             (_, AmplifierKind::Speed) => false,
         };
-        let speed_rad_s = match self.amplifier {
+        let (speed_rad_s, at_limit) = match self.amplifier {
             AmplifierKind::Speed if commanded => {
                 let (now, tau) = (self.x[SPEED], drive.time_constant_s);
                 let left = if tau > 0.0 { (T::from(-self.tick_s) / tau).exp() } else { T::ZERO };
-                Some((now, drive.command + (now - drive.command) * left))
+                let wanted = drive.command + (now - drive.command) * left;
+                let at_limit = self.at_limit(tick, wanted, drive.current_limit_a);
+                (at_limit.is_none().then_some((now, wanted)), at_limit)
             }
-            _ => tick.driven_speed().map(|(a, b)| (T::from(a), T::from(b))),
+            _ => (tick.driven_speed().map(|(a, b)| (T::from(a), T::from(b))), None),
         };
         let measured_a = match tick.driven {
             Driven::Current(a, b) => Some(command.map_or((a, b), |mean| (mean, mean))),
             _ => None,
         };
-        let mut course = Course { drive, measured_a, by_speed, current_a: [T::ZERO; 2], speed_rad_s };
+        let mut course =
+            Course { drive, measured_a, by_speed, current_a: [T::ZERO; 2], speed_rad_s, at_limit };
         self.lay_out(tick, &mut course);
         course
+    }
+
+    /// Whether a speed drive's current brings its shaft to a speed within the tick. What water, load and dry friction take at
+    /// the tick's start is taken first.
+    fn at_limit(&self, tick: &Tick, wanted_rad_s: T, limit_a: T) -> Option<AtLimit<T>> {
+        if !limit_a.re().is_finite() {
+            return None;
+        }
+        let now = self.x[SPEED];
+        let mut balance = Balance::default();
+        let at = self.local_at(&self.x, T::ZERO, 0.0, tick);
+        let unpowered = self.rates::<true, true, STATES>(&self.x, &at, &mut balance)[SPEED];
+        let short = (wanted_rad_s - now) / self.tick_s - unpowered;
+        let rub = Rub::of(&balance).slow(now, T::from(self.tick_s)) - now;
+        let short_a =
+            (short - rub / self.tick_s) * balance.inertia_kg_m2 / self.constants.torque_constant_nm_a;
+        let current_a = short_a.clamp(-limit_a, limit_a);
+        (current_a != short_a).then_some(AtLimit { current_a, wanted_rad_s })
     }
 
     /// The currents of a tick, where no speed is needed for them.
@@ -144,6 +188,10 @@ impl<T: Real> Plant<T> {
         if let Driven::Power(a, b) = tick.driven {
             return self.current_of_power(a + (b - a) * part, drive.resistance_ohm, speed_rad_s);
         }
+        // A speed drive's shaft follows the command through the lag, and no current is modelled, but at its limit.
+        if self.amplifier == AmplifierKind::Speed {
+            return course.at_limit.map_or(T::ZERO, |limit| limit.current_a);
+        }
         let lagging = drive.time_constant_s > 0.0;
         if lagging && part == 0.0 {
             return self.current_a;
@@ -156,8 +204,7 @@ impl<T: Real> Plant<T> {
             AmplifierKind::Current => drive.command,
             // (10)-(12) with the inductance neglected; the lag then stands for L/R and the stage.
             AmplifierKind::Voltage => (drive.command - back_emf_v) / r,
-            // A speed drive's shaft follows the command through the lag; no current is modelled.
-            AmplifierKind::Speed => return T::ZERO,
+            AmplifierKind::Speed => T::ZERO,
         };
         let mut target = target.clamp(-drive.current_limit_a, drive.current_limit_a);
         if drive.voltage_limited {

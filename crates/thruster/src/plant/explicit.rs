@@ -40,6 +40,7 @@ impl<T: Real> Plant<T> {
         let goes = self.last_rates[0][SPEED].re().abs() + self.last_rub.largest();
         self.foretold::<HOOKED>(tick, drive, &begin)
             && self.slow
+            && drive.at_limit.is_none()
             && !self.quantise_encoder
             && !self.brisk
             && (!HOOKED
@@ -131,6 +132,9 @@ impl<T: Real> Plant<T> {
         };
         // Over the whole step, the mean of start and end.
         settle(&mut x, rub.mean(rub_of(&balance)), 1.0);
+        if let Some(limit) = drive.at_limit {
+            x[SPEED] = limit.no_further(x[SPEED]);
+        }
         let end = self.local_at(&x, self.current_at(last, &drive, 1.0, x[SPEED]), 1.0, last);
         let rates = end_rates.unwrap_or_else(|| self.rates::<HOOKED, BLADE, N>(&x, &end, &mut balance));
         for i in 0..N {

@@ -112,9 +112,12 @@ impl<T: Real> Plant<T> {
         &mut self,
         tick: &Tick,
         drive: &Course<T>,
-        x: [T; N],
+        mut x: [T; N],
         balance: &mut Balance<T>,
     ) {
+        if let Some(limit) = drive.at_limit {
+            x[SPEED] = limit.no_further(x[SPEED]);
+        }
         let current = self.current_at(tick, drive, 1.0, x[SPEED]);
         let end = self.local_at(&x, current, 1.0, tick);
         self.rates::<true, true, N>(&x, &end, balance);

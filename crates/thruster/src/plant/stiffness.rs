@@ -129,7 +129,7 @@ fn top_speed_rad_s(rig: &Rig, p: &Parameters) -> f64 {
     let by_supply = rig.amplifier.supply_v.map_or(f64::INFINITY, |v| v / kt);
     let (_, load_nm_s2) = p.bollard_coefficients();
     let by_current = match rig.amplifier.kind {
-        // Its speed is as commanded, whatever that takes.
+        // Its speed may be driven beyond what its current holds.
         AmplifierKind::Speed => f64::INFINITY,
         _ => (kt * rig.amplifier.current_limit_a / load_nm_s2.max(1e-12)).sqrt(),
     };

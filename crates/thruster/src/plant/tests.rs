@@ -187,3 +187,33 @@ fn one_step_a_calm_tick_leads_where_many_do() {
     assert!(off(799) < 1e-7 && off(1599) < 1e-7, "settled: {} and {}", off(799), off(1599));
     assert!(few[700] > 0.1, "it turns: {}", few[700]);
 }
+
+#[test]
+fn a_speed_drive_brings_its_shaft_no_faster_than_its_current_can() {
+    let rig = |limit: &str| {
+        let text = format!(
+            "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = 0.02\ntorque_constant_nm_a = 1.0\n\
+             [load]\nkind = \"fan\"\nfan_coefficient_nm_s2 = 4e-4\n[amplifier]\nkind = \"speed\"\ntime_constant_s = 0.02\n{limit}"
+        );
+        Rig::from_toml(&text).expect("a rig")
+    };
+    let speed_after = |limit: &str, seconds: f64| {
+        let rig = rig(limit);
+        let mut plant: Plant = Plant::new(ModelName::Model2, &rig, &Parameters::stated(&rig), &[], 1e-3);
+        for k in 0..(seconds * 1e3) as u32 {
+            plant.step(&Tick { time_s: f64::from(k) * 1e-3, command: 60.0, ..Tick::default() });
+        }
+        plant.truth().shaft_speed_rad_s
+    };
+    // 2 A through 1 N m/A on 0.02 kg m^2, against a fan that takes all of it at 70.7 rad/s: Om = 70.7 tanh(100 t/70.7).
+    let most = |t: f64| 70.711 * (100.0 * t / 70.711).tanh();
+    for t in [0.1, 0.4] {
+        let speed = speed_after("current_limit_a = 2.0", t);
+        assert!((speed / most(t) - 1.0).abs() < 0.01, "{speed} at {t} s, {}", most(t));
+    }
+    assert!((speed_after("current_limit_a = 2.0", 3.0) - 60.0).abs() < 0.1, "it gets there");
+    assert!(
+        (speed_after("", 0.1) / (60.0 * (1.0 - (-5.0_f64).exp())) - 1.0).abs() < 0.01,
+        "no limit is stated"
+    );
+}

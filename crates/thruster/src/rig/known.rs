@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::keys::{nearest, value_error};
 use super::read::quantity;
-use super::{Quantity, RigError};
+use super::{Quantity, Rig, RigError};
 use crate::effects::{self, Descriptor, Scale, Spec};
 
 /// Most effects a rig may state, so that their states find room in a plant beside those that a fit tries.
@@ -33,6 +33,15 @@ impl KnownEffect {
     /// A value by its name; zero if it has none of that name.
     pub fn value(&self, name: &str) -> f64 {
         self.parameters.iter().find(|(n, _)| *n == name).map_or(0.0, |(_, quantity)| quantity.value)
+    }
+}
+
+impl Rig {
+    /// The same rig, with some of the effects that it is known to have stated as exact.
+    pub fn exact_in(mut self, effects: &[&str]) -> Self {
+        let some = self.effects.iter_mut().filter(|known| effects.contains(&known.effect));
+        some.flat_map(|known| &mut known.parameters).for_each(|(_, quantity)| quantity.tol = None);
+        self
     }
 }
 
