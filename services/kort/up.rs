@@ -33,9 +33,8 @@ const STARTS_PER_GENERATION: u32 = 3;
 const GENERATIONS: u32 = 3;
 /// A look that comes later than this: the whole machine stood still, and nobody is to blame.
 const STOOD_STILL: Duration = Duration::from_millis(500);
-/// How things stand is written down this often while a drive is armed: a service that is killed as a whole tells its
-/// successor by that when it was stopped, and at what thrust.
-const NOTE_EVERY: Duration = Duration::from_millis(100);
+/// How things stand is written down this often while a drive is armed.
+const NOTE_EVERY: Duration = Duration::from_secs(1);
 /// How long a thruster may take to come to rest before its drive is switched off, and after.
 const REST_WITHIN: Duration = Duration::from_millis(2500);
 const COAST_WITHIN: Duration = Duration::from_secs(3);
@@ -137,17 +136,16 @@ impl Service {
                     shaft_speed_rad_s: watch.stood.shaft_speed_rad_s,
                 };
                 let event = Event::now(EventKind::ProcessEnded, Some(watch.id()), "supervisor", words);
-                let event = event.before(before);
-                self.scribe.event(match watch.stood.heard.clone() {
-                    Some(heard) => event.since(heard),
-                    None => event,
-                });
+                self.scribe.event(event.before(before));
             }
+        }
+        for at in 0..self.roles.len() {
+            self.start(at)?;
+        }
+        for watch in &mut self.watches {
             watch.servo_ended();
         }
-        // Before the gateway looks there for what stands latched.
-        self.write_down();
-        (0..self.roles.len()).try_for_each(|at| self.start(at))
+        Ok(())
     }
 
     /// Starts one process, with what its predecessor left.
@@ -239,7 +237,11 @@ impl Service {
                 }
                 // The last samples still lie in shared memory.
                 watch.look(self.owner.deployment());
-                if let Some(before) = watch.stopped_with() {
+                if watch.stood.armed {
+                    let before = Before {
+                        thrust_n: watch.stood.thrust_n,
+                        shaft_speed_rad_s: watch.stood.shaft_speed_rad_s,
+                    };
                     let words = format!("{words}, while armed");
                     let event = Event::now(EventKind::ProcessEnded, Some(watch.id()), "supervisor", words);
                     self.scribe.event(event.before(before));
@@ -299,7 +301,7 @@ impl Service {
         Ok(())
     }
 
-    /// Notes how things stand where that changed, and again and again while a drive is armed.
+    /// Notes how things stand where that changed, and each second while a drive is armed.
     fn write_down(&mut self) {
         let restarts = self.roles.iter().map(|role| Restarts {
             process: role.name.to_owned(),

@@ -12,8 +12,6 @@ use super::role::Heritage;
 
 /// Ports that cannot be opened are tried again this often.
 const REOPEN_EVERY: Duration = Duration::from_millis(100);
-/// A stop that is no older came of the end of the process that ended.
-const STOPPED_JUST_NOW: Duration = Duration::from_secs(1);
 /// Thrust that counts as none, share of the largest.
 const THRUST_SMALL: f64 = 0.03;
 /// Shaft speed that counts as none, share of the largest.
@@ -101,18 +99,15 @@ impl Watch {
                 self.stood.driven = Some(Before { thrust_n, shaft_speed_rad_s });
             }
         }
-        if beats.servo {
-            self.stood.heard = Some(Stood::time(SystemTime::now()));
-        }
         beats.gateway = ports.setpoint.latest().is_some();
         if beats.servo || beats.controller {
-            self.note_latched(None);
+            self.note_latched();
         }
         beats
     }
 
-    /// Notes when each latched fault came, now if not `at` another time, and forgets those that were cleared.
-    fn note_latched(&mut self, at: Option<&str>) {
+    /// Notes when each latched fault came, and forgets those that were cleared.
+    fn note_latched(&mut self) {
         let faults = self.stood.servo_faults | self.stood.controller_faults;
         let latched = &mut self.stood.latched;
         latched.retain(|known| Fault::in_set(faults).any(|fault| fault.code() == known.code));
@@ -121,7 +116,7 @@ impl Watch {
                 let stopped = Some(&self.tripped).filter(|trip| trip.at_ns != 0);
                 latched.push(Latched {
                     code: fault.code(),
-                    since: at.map_or_else(|| Stood::time(SystemTime::now()), str::to_owned),
+                    since: humantime::format_rfc3339_micros(SystemTime::now()).to_string(),
                     before: (self.stood.driven.filter(|_| fault.is_ramped()))
                         .or(stopped.map(|trip| Before::of(trip.thrust_n, trip.shaft_speed_rad_s))),
                 });
@@ -134,7 +129,7 @@ impl Watch {
         match role {
             "servo" if self.stood.armed => Heritage {
                 latched: self.stood.servo_faults | Fault::ServoRestarted.bit(),
-                tripped: self.last_word(),
+                tripped: self.stop_of_now(),
             },
             "servo" => Heritage { latched: self.stood.servo_faults, tripped: self.tripped },
             "controller" => Heritage { latched: self.stood.controller_faults, tripped: Trip::default() },
@@ -142,44 +137,20 @@ impl Watch {
         }
     }
 
-    /// The servo has ended: its successor starts disarmed. The stop is as old as the servo's last word: where the whole
-    /// service died, that is long before anybody is told.
+    /// The servo has ended: its successor starts disarmed.
     pub fn servo_ended(&mut self) {
         if self.stood.armed {
-            self.tripped = self.last_word();
+            self.tripped = self.stop_of_now();
             self.stood.servo_faults |= Fault::ServoRestarted.bit();
-            let heard = self.stood.heard.clone();
-            self.note_latched(heard.as_deref());
+            self.note_latched();
         }
         self.stood.armed = false;
     }
 
-    /// What the thruster did just before a process of it ended: it was armed still, or that end has just stopped it.
-    pub fn stopped_with(&self) -> Option<Before> {
-        let last = Before { thrust_n: self.stood.thrust_n, shaft_speed_rad_s: self.stood.shaft_speed_rad_s };
-        let faults = self.stood.servo_faults | self.stood.controller_faults;
-        let ended = [Fault::ServoRestarted, Fault::ControllerRestarted, Fault::GatewayLost]
-            .iter()
-            .any(|fault| faults & fault.bit() != 0);
-        let just_now = monotonic_ns().saturating_sub(self.tripped.at_ns) < STOPPED_JUST_NOW.as_nanos() as u64;
-        if self.stood.armed {
-            Some(last)
-        } else if ended && just_now {
-            let ramped = self.stood.driven.filter(|_| faults & Fault::GatewayLost.bit() != 0);
-            Some(ramped.unwrap_or(Before::of(self.tripped.thrust_n, self.tripped.shaft_speed_rad_s)))
-        } else {
-            None
-        }
-    }
-
-    /// What the thruster did when it was last heard, as a stop of then.
-    fn last_word(&self) -> Trip {
-        let heard = self.stood.heard.as_deref().and_then(|time| humantime::parse_rfc3339(time).ok());
-        let ago = heard.and_then(|time| SystemTime::now().duration_since(time).ok()).unwrap_or_default();
-        let ago_ns = u64::try_from(ago.as_nanos()).unwrap_or(u64::MAX);
+    /// What the thruster did when it was last heard, as a stop of this instant.
+    fn stop_of_now(&self) -> Trip {
         Trip {
-            // Zero says that there was no stop; the machine itself may have been started since.
-            at_ns: monotonic_ns().saturating_sub(ago_ns).max(1),
+            at_ns: monotonic_ns(),
             thrust_n: self.stood.thrust_n.unwrap_or(f64::NAN),
             shaft_speed_rad_s: self.stood.shaft_speed_rad_s.unwrap_or(f64::NAN),
             drive: f64::NAN,
