@@ -27,9 +27,8 @@ pub struct Decision {
     pub term: Option<&'static str>,
 }
 
-/// A rival stands near a name from this share of its probability on: odds of ten to one part them, where evidence is called
-/// strong (Jeffreys 1961, appendix B; Kass & Raftery 1995).
-pub(crate) const NEAR: f64 = 0.1;
+/// A rival stands near a name from this share of its probability on: odds of five to one part them.
+pub(crate) const NEAR: f64 = 0.2;
 /// From this probability on, among all that was fitted, a name is believed.
 const BELIEVED: f64 = 0.7;
 /// A remainder below this share of what was to be explained is of no practical size.
