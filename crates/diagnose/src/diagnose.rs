@@ -1,7 +1,7 @@
 //! The diagnosis: prepare, search, decide, check on held-out data, and write the report.
 
 use kort_identify::data::{DataError, Series, available};
-use kort_identify::hypothesis::{Hypothesis, Member};
+use kort_identify::hypothesis::Hypothesis;
 use kort_identify::setup::Setup;
 use kort_thruster::effects::{self, Available, Descriptor};
 use kort_thruster::models::ModelName;
@@ -72,14 +72,8 @@ pub fn diagnose(
             pushed.join(", ")
         ));
     }
-    let Setup { series, problem, mut baseline, mut notes, thin, .. } = setup;
-    for effect in &options.with {
-        if baseline.has(effect.id) {
-            continue;
-        }
-        let values = baseline.start.clone();
-        baseline = baseline.with(&values, Member::new(effect, &problem.scale), &problem.scale);
-    }
+    let Setup { series, problem, baseline, mut notes, thin, .. } = setup;
+    let baseline = baseline.with_present(&options.with, &problem.scale);
     let offered = available(options.model, &series, &problem.recordings);
     let candidates = candidates(rig, &offered, &baseline);
     let mut search = Search::new(&problem, candidates, &constants);

@@ -111,10 +111,8 @@ impl Member {
     pub fn known(known: &KnownEffect) -> Option<Self> {
         let stated: Vec<Quantity> = known.parameters.iter().map(|(_, quantity)| *quantity).collect();
         let held: Vec<usize> = (0..stated.len()).filter(|j| stated[*j].sigma() == 0.0).collect();
-        let some_free = held.len() < stated.len();
-        let values = known.values().collect();
-        let member = |effect| Self { effect, values, held, liveliness: 1.0, stated };
-        known.descriptor().filter(|_| some_free).map(member)
+        let effect = known.descriptor().filter(|_| held.len() < stated.len())?;
+        Some(Self { effect, values: known.values().collect(), held, liveliness: 1.0, stated })
     }
 
     /// One of its values as a free number of a hypothesis in which it has this place.
@@ -131,9 +129,8 @@ impl Member {
             acts: spec.acts,
         };
         let Some(quantity) = self.stated.get(value) else { return catalogue };
-        let (low, high) = reach(quantity);
         // How large it may be the rig says; which sign it has, the equation.
-        let low = if spec.low >= 0.0 { low.max(0.02 * quantity.value) } else { low };
+        let (low, high) = reach(quantity, spec.low >= 0.0);
         Free { stated: true, mean: quantity.value, sigma: quantity.sigma(), low, high, ..catalogue }
     }
 
@@ -255,10 +252,11 @@ fn stated(rig: &Rig, parameter: P, values: &Parameters) -> Option<Quantity> {
     }
 }
 
-/// From where to where a stated number may move.
-fn reach(stated: &Quantity) -> (f64, f64) {
+/// From where to where a stated number may move; one that cannot be negative stays above zero.
+fn reach(stated: &Quantity, positive: bool) -> (f64, f64) {
     let reach = 2.0 * REACH * stated.sigma();
-    (stated.value - reach, stated.value + reach)
+    let low = stated.value - reach;
+    (if positive { low.max(0.02 * stated.value) } else { low }, stated.value + reach)
 }
 
 /// True when the rig gives no tolerance for any parameter: then coefficients are taken as
@@ -292,7 +290,7 @@ impl Hypothesis {
             if quantity.sigma() == 0.0 || !quantity.value.is_finite() {
                 continue;
             }
-            let (low, high) = reach(&quantity);
+            let (low, high) = reach(&quantity, parameter.positive());
             free.push(Free {
                 target: Target::Base(parameter),
                 name: parameter.name(),
@@ -300,7 +298,7 @@ impl Hypothesis {
                 stated: true,
                 mean: quantity.value,
                 sigma: quantity.sigma(),
-                low: if parameter.positive() { low.max(0.02 * quantity.value) } else { low },
+                low,
                 high,
                 acts: None,
             });
@@ -336,6 +334,12 @@ impl Hypothesis {
     pub fn with_known(self, rig: &Rig, scale: &Scale) -> Self {
         let more = |hypothesis: Self, member| hypothesis.with(&hypothesis.start, member, scale);
         rig.effects.iter().filter_map(Member::known).fold(self, more)
+    }
+
+    /// With effects taken as present, all free; those that the rig is known to have are there already.
+    pub fn with_present(&self, effects: &[&'static Descriptor], scale: &Scale) -> Self {
+        let more = effects.iter().filter(|e| !self.has(e.id)).map(|effect| Member::new(effect, scale));
+        more.fold(self.clone(), |hypothesis, member| hypothesis.with(&hypothesis.start, member, scale))
     }
 
     /// Whether an effect is a member.

@@ -18,7 +18,7 @@ use serde::Serialize;
 use crate::data::{DataError, Prepared, Series};
 use crate::fit::Fit;
 use crate::heldout::held_out_rows;
-use crate::hypothesis::{Free, Hypothesis, Member, Target};
+use crate::hypothesis::{Free, Hypothesis, Target};
 use crate::identifiable::{NotIdentifiable, not_identifiable};
 use crate::noise::Criterion;
 use crate::scores::{self, ChannelReport, ParameterReport, parameters};
@@ -143,13 +143,7 @@ pub fn identify(
     notes.extend(thin);
     let typical = problem.scale.torque_n_m / problem.scale.shaft_speed_rad_s;
     open_friction(&mut baseline, rig, options.open_friction, typical);
-    for effect in &options.with {
-        if baseline.has(effect.id) {
-            continue;
-        }
-        let values = baseline.start.clone();
-        baseline = baseline.with(&values, Member::new(effect, &problem.scale), &problem.scale);
-    }
+    baseline = baseline.with_present(&options.with, &problem.scale);
     // Estimated initial states take the place of a run-in that is left out.
     let moving: Vec<bool> = problem.recordings.iter().map(|r| r.start[0] != 0.0).collect();
     if moving.contains(&true) {

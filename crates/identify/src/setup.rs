@@ -179,7 +179,10 @@ impl Setup<'_> {
             Target::Effect(slot, _) if free.at_bound(*value) => Some(fit.hypothesis.effects[slot].effect.id),
             _ => None,
         };
-        fit.hypothesis.free.iter().zip(&fit.values).filter_map(at_edge).collect()
+        // Of an effect several numbers may stand there.
+        let effects: BTreeSet<&str> =
+            fit.hypothesis.free.iter().zip(&fit.values).filter_map(at_edge).collect();
+        effects.into_iter().collect()
     }
 }
 

@@ -204,6 +204,7 @@ impl<T: Real> Plant<T> {
             AmplifierKind::Current => drive.command,
             // (10)-(12) with the inductance neglected; the lag then stands for L/R and the stage.
             AmplifierKind::Voltage => (drive.command - back_emf_v) / r,
+            // Told above.
             AmplifierKind::Speed => T::ZERO,
         };
         let mut target = target.clamp(-drive.current_limit_a, drive.current_limit_a);
