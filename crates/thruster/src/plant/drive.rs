@@ -32,6 +32,15 @@ pub(super) struct AtLimit<T> {
     wanted_rad_s: T,
 }
 
+impl<T: Real> Course<T> {
+    /// The current to show: a speed drive's own is not modelled, and at its limit alone it would tell of a drive that gives
+    /// nothing else.
+    #[inline(always)]
+    pub(super) fn shown_a(&self, current_a: T) -> T {
+        if self.at_limit.is_some() { T::ZERO } else { current_a }
+    }
+}
+
 impl<T: Real> AtLimit<T> {
     /// A speed that this current came to, or the one wanted where it came past that.
     #[inline(always)]

@@ -135,7 +135,7 @@ impl<T: Real> Plant<T> {
         if let Some(limit) = drive.at_limit {
             x[SPEED] = limit.no_further(x[SPEED]);
         }
-        let end = self.local_at(&x, self.current_at(last, &drive, 1.0, x[SPEED]), 1.0, last);
+        let mut end = self.local_at(&x, self.current_at(last, &drive, 1.0, x[SPEED]), 1.0, last);
         let rates = end_rates.unwrap_or_else(|| self.rates::<HOOKED, BLADE, N>(&x, &end, &mut balance));
         for i in 0..N {
             (self.last_rates[0][i], self.last_rates[1][i]) = (rates[i], k1[i]);
@@ -143,6 +143,7 @@ impl<T: Real> Plant<T> {
         self.last_rub = rub_of(&balance);
         self.last_span_s = span_s;
         self.moving = true;
+        end.current_a = drive.shown_a(end.current_a);
         self.arrive(ticks, &x, end, &balance);
     }
 }

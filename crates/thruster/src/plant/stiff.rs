@@ -119,9 +119,10 @@ impl<T: Real> Plant<T> {
             x[SPEED] = limit.no_further(x[SPEED]);
         }
         let current = self.current_at(tick, drive, 1.0, x[SPEED]);
-        let end = self.local_at(&x, current, 1.0, tick);
+        let mut end = self.local_at(&x, current, 1.0, tick);
         self.rates::<true, true, N>(&x, &end, balance);
         self.moving = false;
+        end.current_a = drive.shown_a(end.current_a);
         self.arrive(std::slice::from_ref(tick), &x, end, balance);
     }
 

@@ -202,6 +202,7 @@ fn a_speed_drive_brings_its_shaft_no_faster_than_its_current_can() {
         let mut plant: Plant = Plant::new(ModelName::Model2, &rig, &Parameters::stated(&rig), &[], 1e-3);
         for k in 0..(seconds * 1e3) as u32 {
             plant.step(&Tick { time_s: f64::from(k) * 1e-3, command: 60.0, ..Tick::default() });
+            assert_eq!(plant.truth().current_a, 0.0, "its current is not modelled");
         }
         plant.truth().shaft_speed_rad_s
     };
