@@ -124,6 +124,8 @@ impl Chart {
     fn draw_svg(&self, svg: &mut String, b: [f64; 4]) -> Result<(), Box<dyn std::error::Error>> {
         let height = if self.height == 0 { 300 } else { self.height };
         let root = SVGBackend::with_string(svg, (WIDTH, height)).into_drawing_area();
+        // Ticks are sums of their step: what rounding leaves of zero is zero.
+        let tick = |span: f64| move |v: &f64| super::number(if v.abs() < 1e-9 * span { 0.0 } else { *v });
         let mut chart = ChartBuilder::on(&root)
             .margin(8)
             .x_label_area_size(42)
@@ -138,8 +140,8 @@ impl Chart {
             .axis_desc_style(("sans-serif", 15))
             .x_desc(&self.x)
             .y_desc(&self.y)
-            .x_label_formatter(&|v| super::number(*v))
-            .y_label_formatter(&|v| super::number(*v))
+            .x_label_formatter(&tick(b[1] - b[0]))
+            .y_label_formatter(&tick(b[3] - b[2]))
             .draw()?;
         let shade = RGBColor(0xd5, 0x5e, 0x00).mix(0.12).filled();
         chart.draw_series(
@@ -268,6 +270,19 @@ mod tests {
         let thin = runs(&points);
         assert!(thin[0].len() <= 2 * LINE_POINTS);
         assert!(thin[0].iter().any(|p| p.1 == 7.0));
+    }
+
+    #[test]
+    fn a_tick_at_zero_says_zero() {
+        let chart = Chart::new("residual", "time [s]", "residual of current [A]").with(Series::new(
+            "",
+            Mark::Line,
+            &[0.0, 25.0],
+            &[-0.1173, 0.1127],
+        ));
+        let mut svg = String::new();
+        chart.draw_svg(&mut svg, chart.bounds().unwrap()).unwrap();
+        assert!(svg.contains("0.05") && !svg.contains("e-1"), "{svg}");
     }
 
     #[test]

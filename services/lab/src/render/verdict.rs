@@ -58,10 +58,12 @@ pub fn gain(heldout: &HeldOut) -> String {
 pub fn moved(p: &ParameterReport, rig: &Rig) -> String {
     let Some(stated) = p.stated.filter(|s| *s != 0.0) else { return "-".into() };
     let percent = format!("{:+.1} %", 100.0 * (p.value / stated - 1.0));
+    let known = || rig.effects.iter().flat_map(|known| &known.parameters).find(|(name, _)| *name == p.name);
     let quantity = Parameter::ALL
         .into_iter()
         .find(|q| q.name() == p.name)
         .and_then(|q| Parameters::quantity(rig, q))
+        .or_else(|| known().map(|(_, quantity)| *quantity))
         .filter(|q| q.sigma() > 0.0);
     match quantity {
         Some(q) => format!("{percent} ({:.1} sigma)", ((p.value - stated) / q.sigma()).abs()),
