@@ -1,7 +1,6 @@
 //! The event log: who armed, took over, commanded and switched, what tripped and what restarted. One JSON
 //! object a line, appended by the gateway and the supervisor alike, and rotated.
 
-use std::collections::BTreeMap;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
 use std::os::unix::fs::OpenOptionsExt;
@@ -13,11 +12,19 @@ use rustix::fs::{FlockOperation, flock};
 use serde::{Deserialize, Serialize};
 
 use crate::faults::Fault;
+use crate::ours;
+
+mod standing;
+
+pub use standing::Standing;
 
 /// A file that grew beyond this is put aside, bytes.
 const FILE_BYTES_MAX: u64 = 1 << 20;
 /// Files that are kept, the present one among them.
 const FILES: usize = 5;
+
+/// A link that somebody laid where the log goes on would have us write elsewhere.
+const NO_LINK: i32 = rustix::fs::OFlags::NOFOLLOW.bits().cast_signed();
 
 /// Tries for the lock, 2 ms apart.
 const LOCK_TRIES: u32 = 10;
@@ -147,42 +154,6 @@ impl Before {
     }
 }
 
-/// How the faults came that stand now, by the events of a log: of each thruster those since it was last cleared, for before
-/// that the log speaks of an earlier time. However much is told later, they stand.
-#[derive(Debug, Default)]
-pub struct Standing(BTreeMap<String, (u64, Vec<Event>)>);
-
-impl Standing {
-    /// Takes an event into account; in what order they come does not matter.
-    pub fn take(&mut self, event: &Event) {
-        let Some(thruster) = &event.thruster else { return };
-        let (cleared, latched) = self.0.entry(thruster.clone()).or_default();
-        if event.kind == EventKind::FaultsCleared {
-            *cleared = event.id.max(*cleared);
-            latched.retain(|known| known.id > *cleared);
-        } else if event.kind.latches() && event.id > *cleared {
-            latched.retain(|known| known.fault != event.fault || known.id >= event.id);
-            if latched.iter().all(|known| known.fault != event.fault) {
-                latched.push(event.clone());
-            }
-        }
-    }
-
-    /// How a fault of a thruster came; none if it does not stand.
-    pub fn of(&self, thruster: &str, fault: Fault) -> Option<&Event> {
-        let (_, latched) = self.0.get(thruster)?;
-        latched.iter().find(|event| event.fault == Some(fault.code()))
-    }
-}
-
-impl<'a> FromIterator<&'a Event> for Standing {
-    fn from_iter<T: IntoIterator<Item = &'a Event>>(log: T) -> Self {
-        let mut standing = Self::default();
-        log.into_iter().for_each(|event| standing.take(event));
-        standing
-    }
-}
-
 impl Event {
     /// An event of now.
     pub fn now(kind: EventKind, thruster: Option<&str>, who: &str, detail: impl Into<String>) -> Self {
@@ -238,7 +209,7 @@ impl EventLog {
     /// # Errors
     /// The folder cannot be made.
     pub fn open(folder: &Path) -> io::Result<Self> {
-        fs::create_dir_all(folder)?;
+        ours::make_folder(folder)?;
         Ok(Self { folder: folder.to_owned() })
     }
 
@@ -254,6 +225,7 @@ impl EventLog {
             .truncate(false)
             .write(true)
             .mode(0o640)
+            .custom_flags(NO_LINK)
             .open(self.folder.join(".lock"))?;
         // The lock keeps two from rotating at once. One who holds it may be stopped: nobody waits for ever, and a
         // line in one piece is appended whole in any case.
@@ -268,18 +240,21 @@ impl EventLog {
                 let _ = fs::rename(self.file(n - 1), self.file(n));
             }
         }
-        let mut file: File = OpenOptions::new().create(true).append(true).mode(0o640).open(self.file(0))?;
+        let mut options = OpenOptions::new();
+        options.create(true).append(true).mode(0o640).custom_flags(NO_LINK);
+        let mut file: File = options.open(self.file(0))?;
         file.write_all(&line)
     }
 
     /// Every event that is kept, oldest first; lines that cannot be read are left out.
     pub fn read(&self) -> Vec<Event> {
+        // The newest file first: one that is put aside meanwhile is met twice then, and never missed.
         let mut events: Vec<Event> = (0..FILES)
-            .rev()
             .filter_map(|n| fs::read(self.file(n)).ok())
             .flat_map(|text| parse(&text).collect::<Vec<_>>())
             .collect();
         events.sort_by_key(|event| event.id);
+        events.dedup();
         events
     }
 
@@ -358,19 +333,17 @@ mod tests {
     }
 
     #[test]
-    fn what_is_cleared_stands_no_more_whatever_comes_out_of_turn() {
-        let tripped = || Event::now(EventKind::Tripped, Some("t1"), "servo", "").fault(Fault::ServoLost);
-        let (first, second) = (tripped(), tripped());
-        let cleared = Event::now(EventKind::FaultsCleared, Some("t1"), "bench", "");
-        let third = tripped();
-        let standing: Standing = [&second, &first].into_iter().collect();
-        assert_eq!(standing.of("t1", Fault::ServoLost), Some(&second), "the last of them");
-        assert_eq!(standing.of("t2", Fault::ServoLost), None);
-        assert_eq!(standing.of("t1", Fault::GatewayLost), None);
-        let standing: Standing = [&cleared, &first, &second].into_iter().collect();
-        assert_eq!(standing.of("t1", Fault::ServoLost), None);
-        let standing: Standing = [&first, &third, &cleared].into_iter().collect();
-        assert_eq!(standing.of("t1", Fault::ServoLost), Some(&third));
+    fn a_link_in_the_place_of_the_log_is_not_written_through() {
+        let folder = tempfile::tempdir().unwrap();
+        let log = EventLog::open(&folder.path().join("events")).unwrap();
+        let theirs = folder.path().join("theirs");
+        fs::write(&theirs, "whole").unwrap();
+        std::os::unix::fs::symlink(&theirs, log.file(0)).unwrap();
+        assert!(log.append(&event("first")).is_err());
+        assert_eq!(fs::read_to_string(&theirs).unwrap(), "whole");
+        fs::remove_file(log.file(0)).unwrap();
+        log.append(&event("first")).unwrap();
+        assert_eq!(log.read().len(), 1);
     }
 
     #[test]

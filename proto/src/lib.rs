@@ -15,6 +15,8 @@ pub mod faults;
 pub mod limits;
 pub mod messages;
 pub mod names;
+#[cfg(feature = "events")]
+pub mod ours;
 #[cfg(feature = "config")]
 pub mod revision;
 pub mod signals;

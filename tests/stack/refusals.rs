@@ -164,6 +164,28 @@ fn what_stands_in_the_way_of_a_start_is_said_once() {
     assert!(words.contains("at most 35 bytes") && !words.contains("panicked"), "{words}");
 }
 
+/// Each folder that is written to is tried before anything is started: one message, and nothing is promised.
+#[test]
+fn a_folder_that_cannot_be_written_to_is_said_once() {
+    let site = Site::new();
+    let blocked = site.folder.path().join("blocked");
+    std::fs::write(&blocked, "").unwrap();
+    let text = std::fs::read_to_string(site.config()).unwrap();
+    // A file in its way; and a folder in which nobody, root neither, makes a file.
+    for folder in [blocked.join("x"), "/proc/self/fd".into()] {
+        for key in ["recordings", "diagnoses", "calibrations"] {
+            let kept: Vec<_> = text.lines().filter(|line| !line.starts_with(key)).collect();
+            std::fs::write(site.config(), kept.join("\n")).unwrap();
+            site.add("[gateway]", &format!("{key} = {folder:?}"));
+            let up = run(&mut site.command("up"));
+            let words = String::from_utf8_lossy(&up.stderr);
+            assert!(!up.status.success() && up.stdout.is_empty(), "no console is promised: {words}");
+            assert_eq!(words.matches(&format!("error: gateway.{key} = ")).count(), 1, "{words}");
+            assert!(words.contains("hint:") && words.lines().count() < 4, "{words}");
+        }
+    }
+}
+
 #[test]
 fn a_wrong_configuration_is_refused_with_the_nearest_key() {
     let site = Site::new();

@@ -124,3 +124,60 @@ fn nothing_in_shared_memory_can_be_opened_by_others() {
         }
     });
 }
+
+/// What is believed (tokens) and what is written on and on (events, rigs) lies in nobody else's hands, folder and file.
+#[test]
+fn what_another_user_could_write_is_neither_believed_nor_gone_on_with() {
+    let site = Site::new();
+    let state = site.folder.path().join("state");
+    let text = fs::read_to_string(site.config()).unwrap();
+    let ours = format!("{}/", site.folder.path().display());
+    let theirs = format!(
+        "rigs = \"{0}/rigs\"\nevents = \"{0}/events\"\ntokens = \"{0}/tokens.toml\"\n",
+        state.display()
+    );
+    let kept =
+        text.lines().filter(|l| !l.starts_with("events") && !l.starts_with("tokens")).collect::<Vec<_>>();
+    let text = kept.join("\n").replace("[gateway]\n", &format!("[gateway]\n{theirs}"));
+    fs::write(site.config(), &text).unwrap();
+    let mode = |path: &Path, mode| fs::set_permissions(path, Permissions::from_mode(mode)).unwrap();
+    let refused = |path: &Path, why: &str| {
+        let out = run(&mut site.command("up"));
+        let words = String::from_utf8_lossy(&out.stderr);
+        assert!(!out.status.success() && out.stdout.is_empty(), "{words}");
+        for part in [path.to_str().unwrap(), why, "hint:", "chmod go-w"] {
+            assert!(words.contains(part), "{part} is not in {words}");
+        }
+        assert_eq!(words.matches("error:").count(), 1, "one message: {words}");
+    };
+    let tokens = state.join("tokens.toml");
+    fs::create_dir(&state).unwrap();
+    fs::write(&tokens, "").unwrap();
+    mode(&tokens, 0o666);
+    refused(&tokens, "may be written by others (mode 666)");
+    mode(&tokens, 0o600);
+    mode(&state, 0o777);
+    refused(&state, "may replace what is in it (mode 777)");
+    mode(&state, 0o755);
+    for folder in ["events", "rigs"].map(|name| state.join(name)) {
+        fs::create_dir(&folder).unwrap();
+        mode(&folder, 0o777);
+        refused(&folder, "may be written by others");
+        mode(&folder, 0o755);
+    }
+    if rustix::process::geteuid().is_root() {
+        for path in [&state, &tokens, &state.join("events")] {
+            chown(path, Some(STRANGER), Some(STRANGER)).unwrap();
+            refused(path, "user 65534");
+            chown(path, Some(0), Some(0)).unwrap();
+        }
+    }
+    // A key of TLS that others may write is theirs.
+    let certificate = rcgen::generate_simple_self_signed(["localhost".to_owned()]).unwrap();
+    let [cert, key] = ["cert.pem", "key.pem"].map(|name| site.folder.path().join(name));
+    fs::write(&cert, certificate.cert.pem()).unwrap();
+    fs::write(&key, certificate.signing_key.serialize_pem()).unwrap();
+    mode(&key, 0o666);
+    site.add("[gateway]", &format!("tls = {{ certificate = \"{ours}cert.pem\", key = \"{ours}key.pem\" }}"));
+    refused(&key, "may be written by others (mode 666)");
+}

@@ -113,3 +113,9 @@ impl TransportError {
         super::files::none_left().unwrap_or_else(refused)
     }
 }
+
+impl From<crate::ours::Foreign> for TransportError {
+    fn from(crate::ours::Foreign { path, why }: crate::ours::Foreign) -> Self {
+        Self::Foreign { path, why }
+    }
+}

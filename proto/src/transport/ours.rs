@@ -1,4 +1,4 @@
-//! Files and folders that other users of the machine can reach: what they laid there is neither believed nor written to.
+//! What of a deployment other users of the machine can reach, see [`crate::ours`].
 
 use std::fs;
 use std::io::Write;
@@ -6,41 +6,16 @@ use std::os::unix::fs::{MetadataExt, OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 
 use super::error::TransportError;
+use crate::ours;
 
-/// A file or folder of the deployment, if it is there already, must be this user's, and nobody else may write it.
+/// As [`ours::ours_alone`].
 pub(super) fn ours_alone(path: &Path) -> Result<(), TransportError> {
-    let Ok(about) = fs::symlink_metadata(path) else { return Ok(()) };
-    let foreign = |why: String| Err(TransportError::Foreign { path: path.to_path_buf(), why });
-    if about.file_type().is_symlink() {
-        return foreign("is a link".into());
-    }
-    let me = rustix::process::getuid().as_raw();
-    if about.uid() != me {
-        return foreign(format!("belongs to user {}, this is user {me}", about.uid()));
-    }
-    if about.mode() & 0o022 != 0 {
-        return foreign(format!("may be written by others (mode {:o})", about.mode() & 0o7777));
-    }
-    Ok(())
+    Ok(ours::ours_alone(path)?)
 }
 
-/// The folder that holds root and lock: where others may write, they must not be able to replace what is ours.
+/// As [`ours::nobody_else_may_replace`].
 pub(super) fn nobody_else_may_replace(folder: &Path) -> Result<(), TransportError> {
-    let Ok(about) = fs::metadata(folder) else { return Ok(()) };
-    let others_write = about.mode() & 0o002 != 0;
-    let sticky = about.mode() & 0o1000 != 0;
-    let owner = about.uid();
-    let me = rustix::process::getuid().as_raw();
-    if (others_write && !sticky) || (owner != me && owner != 0) {
-        return Err(TransportError::Foreign {
-            path: folder.to_path_buf(),
-            why: format!(
-                "user {owner} or others may replace what is in it (mode {:o})",
-                about.mode() & 0o7777
-            ),
-        });
-    }
-    Ok(())
+    Ok(ours::nobody_else_may_replace(folder)?)
 }
 
 /// Makes what is ours in a folder of everybody's, under a prefix of ours, this user's alone. iceoryx2 opens one of its

@@ -1,9 +1,13 @@
 //! Could a gateway start? Asked before anything else is started, and by `kort check`.
 
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use kort_control::known::uses;
 use kort_proto::config::Config;
+use kort_proto::ours::{Foreign, in_our_hands, make_folder};
 use kort_thruster::rig::Rig;
 
 use crate::error::GatewayError;
@@ -14,22 +18,58 @@ use crate::token::Tokens;
 /// Could a gateway start with this configuration? Says so before anything else is started.
 ///
 /// # Errors
-/// If the address is taken or the folder of the recordings cannot be made.
+/// If the address is taken, a folder cannot be made or written to, or somebody else could have written what is believed.
 pub fn check(settings: &Settings) -> Result<(), GatewayError> {
-    let (bind, folder) = (settings.bind, settings.recordings.clone());
+    let bind = settings.bind;
     let listener = std::net::TcpListener::bind(bind).map_err(|error| GatewayError::Bind { bind, error })?;
     if let Some(bind) = settings.foxglove {
         std::net::TcpListener::bind(bind).map_err(|error| GatewayError::Foxglove { bind, error })?;
     }
     drop(listener);
-    std::fs::create_dir_all(&folder).map_err(|error| GatewayError::Recordings { folder, error })?;
-    let events = settings.events.clone();
-    std::fs::create_dir_all(&events).map_err(|error| GatewayError::Events { folder: events, error })?;
-    let rigs = settings.rigs.clone();
-    std::fs::create_dir_all(&rigs).map_err(|error| GatewayError::Rigs { folder: rigs, error })?;
+    ours(settings)?;
+    type Refused = fn(PathBuf, io::Error) -> GatewayError;
+    let folders: [(&PathBuf, Refused); 5] = [
+        (&settings.recordings, |folder, error| GatewayError::Recordings { folder, error }),
+        (&settings.events, |folder, error| GatewayError::Events { folder, error }),
+        (&settings.rigs, |folder, error| GatewayError::Rigs { folder, error }),
+        (&settings.diagnoses, |folder, error| GatewayError::Diagnoses { folder, error }),
+        (&settings.calibrations, |folder, error| GatewayError::Calibrations { folder, error }),
+    ];
+    for (folder, refused) in folders {
+        can_write(folder).map_err(|error| refused(folder.clone(), error))?;
+    }
     tokens(settings)?;
     certificate(settings)?;
     Ok(())
+}
+
+/// Is what the gateway believes, and where it writes what is believed later, in nobody else's hands? Asked before any of it
+/// is read or made.
+///
+/// # Errors
+/// [`GatewayError::Foreign`] names the first that is not.
+pub(crate) fn ours(settings: &Settings) -> Result<(), GatewayError> {
+    let key = settings.tls.as_ref().map(|keys| ("tls.key", &keys.key));
+    let believed = [("tokens", &settings.tokens), ("events", &settings.events), ("rigs", &settings.rigs)];
+    for (key, path) in believed.into_iter().chain(key) {
+        in_our_hands(path).map_err(|Foreign { path, why }| GatewayError::Foreign { key, path, why })?;
+    }
+    Ok(())
+}
+
+/// Makes a folder and a file in it, which is gone again: a folder that is there may be one that nothing can be written to.
+/// A full disk is no reason not to start: what it does not take is told when it is refused.
+fn can_write(folder: &Path) -> io::Result<()> {
+    make_folder(folder)?;
+    let file = folder.join(format!(".kort-writes-{}", std::process::id()));
+    match fs::OpenOptions::new().write(true).create_new(true).open(&file) {
+        Err(error) if matches!(error.kind(), io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded) => {
+            Ok(())
+        }
+        // Of one of the same number that was killed in between.
+        Err(error) if error.kind() == io::ErrorKind::AlreadyExists => fs::remove_file(&file),
+        made => made.and_then(|_| fs::remove_file(&file)),
+    }
 }
 
 /// What is wrong with this configuration for a gateway: reads all that it reads, and touches no address. Each names
@@ -82,4 +122,22 @@ pub(crate) fn certificate(settings: &Settings) -> Result<Option<Arc<Certificate>
     }
     names.extend(settings.hosts.iter().cloned());
     Ok(Some(Arc::new(Certificate::open(keys, names)?)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_is_tried_and_left_as_it_was() {
+        let folder = tempfile::tempdir().unwrap();
+        let state = folder.path().join("state/events");
+        can_write(&state).unwrap();
+        assert_eq!(fs::read_dir(&state).unwrap().count(), 0);
+        let blocked = folder.path().join("blocked");
+        fs::write(&blocked, "").unwrap();
+        assert!(can_write(&blocked).is_err() && can_write(&blocked.join("x")).is_err());
+        // Nobody, root neither, makes a file there.
+        assert!(can_write(Path::new("/proc/self")).is_err());
+    }
 }

@@ -67,6 +67,21 @@ pub enum GatewayError {
         /// The system's words.
         error: std::io::Error,
     },
+    /// Somebody else could have written what is to be believed, or could replace what is written.
+    #[error(
+        "gateway.{key}: {}: {why}\nhint: whoever can write there could make tokens of their own or forge what happened; \
+         see what lies there, then give it to this user and take the right to write from others (chown, chmod go-w), or \
+         name another in kort.toml",
+        path.display()
+    )]
+    Foreign {
+        /// The key that names it.
+        key: &'static str,
+        /// The file or folder.
+        path: PathBuf,
+        /// What is wrong with it.
+        why: String,
+    },
     /// Tokens are asked for, and there is none.
     #[error(
         "{why}, and {} holds no token\nhint: kort token new NAME --role viewer|pilot|admin makes one",

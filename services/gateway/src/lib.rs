@@ -307,6 +307,7 @@ async fn serve(
 ) -> Result<(), GatewayError> {
     let bind = settings.bind;
     let listener = serve::listen(bind).map_err(|error| GatewayError::Bind { bind, error })?;
+    check::ours(&settings)?;
     let certificate = certificate(&settings)?;
     let gate = Gate::new(bind, &settings.hosts, tokens(&settings)?, settings.asks_for_tokens());
     let connections = Arc::new(Connections::new(serve::caps(settings.behind_tls_proxy)));

@@ -7,6 +7,7 @@ use std::path::Path;
 use std::sync::{Arc, Mutex};
 use std::time::SystemTime;
 
+use kort_proto::ours::{in_our_hands, make_folder};
 use thiserror::Error;
 use tokio_rustls::rustls::ServerConfig;
 use tokio_rustls::rustls::crypto::ring;
@@ -90,6 +91,7 @@ fn load(keys: &Tls) -> Result<ServerConfig, TlsError> {
     if chain.is_empty() {
         return Err(TlsError::new(&keys.certificate, "holds no certificate"));
     }
+    in_our_hands(&keys.key).map_err(|foreign| TlsError::new(&foreign.path, foreign.why))?;
     let key = PrivateKeyDer::from_pem_file(&keys.key).map_err(|error| TlsError::new(&keys.key, error))?;
     let mut config = ServerConfig::builder_with_provider(Arc::new(ring::default_provider()))
         .with_safe_default_protocol_versions()
@@ -108,7 +110,7 @@ fn make(keys: &Tls, names: Vec<String>) -> Result<(), TlsError> {
     {
         let write = || {
             if let Some(folder) = file.parent().filter(|folder| !folder.as_os_str().is_empty()) {
-                fs::create_dir_all(folder)?;
+                make_folder(folder)?;
             }
             let mut out = fs::OpenOptions::new().create_new(true).write(true).mode(mode).open(file)?;
             out.write_all(text.as_bytes())

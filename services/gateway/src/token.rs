@@ -4,13 +4,14 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::Write;
-use std::os::unix::fs::OpenOptionsExt;
+use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 use std::time::SystemTime;
 
 use argon2::password_hash::{PasswordHash, PasswordHasher, PasswordVerifier, SaltString};
 use argon2::{Algorithm, Argon2, Params, Version};
+use kort_proto::ours::{Foreign, in_our_hands, make_folder};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use subtle::ConstantTimeEq;
@@ -79,6 +80,9 @@ struct Entry {
     hash: String,
 }
 
+/// What to do where somebody else could have written the file.
+const FOREIGN: &str = "whoever can write there could make a token of their own; see what lies there, then give it to this user and take the right to write from others (chown, chmod go-w), or name another file with gateway.tokens in kort.toml";
+
 /// The argon2id parameters that OWASP names for little memory: 19 MiB, two passes.
 fn argon2() -> Argon2<'static> {
     let params = Params::new(19_456, 2, 1, None).unwrap_or_default();
@@ -92,6 +96,9 @@ impl Book {
             why,
             hint: "`kort token new NAME --role pilot` writes this file; it must belong to the user of the service",
         };
+        if let Err(Foreign { path, why }) = in_our_hands(file) {
+            return Err(TokenError { file: path, why, hint: FOREIGN });
+        }
         let text = match fs::read_to_string(file) {
             Ok(text) => text,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Book::default()),
@@ -146,7 +153,7 @@ pub fn make(file: &Path, name: &str, role: Role) -> Result<String, TokenError> {
 /// Whole or not at all, and for this user's eyes only.
 fn write(file: &Path, book: &Book) -> std::io::Result<()> {
     if let Some(folder) = file.parent().filter(|folder| !folder.as_os_str().is_empty()) {
-        fs::create_dir_all(folder)?;
+        make_folder(folder)?;
     }
     let draft = file.with_extension("draft");
     let _ = fs::remove_file(&draft);
@@ -166,7 +173,7 @@ pub struct Tokens {
 
 #[derive(Debug, Default)]
 struct Known {
-    stamp: Option<(SystemTime, u64)>,
+    stamp: Option<Stamp>,
     book: Book,
     /// SHA-256 of tokens that argon2 has accepted: it need not be asked for each request.
     accepted: Vec<([u8; 32], Identity)>,
@@ -244,14 +251,18 @@ impl Tokens {
     }
 }
 
-fn stamp(file: &Path) -> Option<(SystemTime, u64)> {
+/// Content, and whose it is: time of change, size, owner and mode.
+type Stamp = (SystemTime, u64, u32, u32);
+
+fn stamp(file: &Path) -> Option<Stamp> {
     let about = fs::metadata(file).ok()?;
-    Some((about.modified().ok()?, about.len()))
+    Some((about.modified().ok()?, about.len(), about.uid(), about.mode()))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::os::unix::fs::PermissionsExt;
 
     #[test]
     fn a_token_is_known_by_its_secret_and_only_its_hash_is_kept() {
@@ -275,6 +286,10 @@ mod tests {
         }
         assert!(make(&file, "bridge", Role::Admin).unwrap_err().to_string().contains("already"));
         assert!(make(&file, "a b", Role::Admin).unwrap_err().to_string().contains("hint:"));
+        // What others may write is believed no more, the moment they may.
+        fs::set_permissions(&file, fs::Permissions::from_mode(0o666)).unwrap();
+        assert!(Tokens::open(&file).unwrap_err().to_string().contains("mode 666"));
+        fs::set_permissions(&file, fs::Permissions::from_mode(0o600)).unwrap();
         fs::write(&file, "").unwrap();
         assert_eq!(tokens.remembered(&token), None, "revoked without a restart");
         assert!(!tokens.stands(&bridge), "and whoever is in by it is out");
