@@ -215,3 +215,27 @@ fn a_recording_ends_at_its_time_and_leaves_space_to_others() {
     assert!(refused.text().contains("free_bytes_min"), "{}", refused.text());
     assert_eq!(send(port, "GET", "/v1/recordings", &[], b"").json(), json!([]), "nothing is left of it");
 }
+
+/// A recording that cannot begin leaves nothing behind: its name is free once there is space.
+#[test]
+fn a_recording_that_a_full_disk_refuses_does_not_keep_its_name() {
+    use rustix::process::{Pid, Resource, Rlimit, getrlimit, prlimit};
+    common::in_real_time(|| {
+        let stack = Stack::start();
+        let port = stack.site.port;
+        let gateway = i32::try_from(stack.process_of("gateway")).ok().and_then(Pid::from_raw);
+        let usual = getrlimit(Resource::Fsize);
+        let start = || send(port, "POST", "/v1/recordings", &[JSON], br#"{"name": "dive"}"#);
+        // Files may not grow beyond what the head of a recording needs: to whoever writes, a full disk.
+        prlimit(gateway, Resource::Fsize, Rlimit { current: Some(1024), ..usual.clone() }).unwrap();
+        let refused = start();
+        prlimit(gateway, Resource::Fsize, usual.clone()).unwrap();
+        assert!(matches!(refused.status, 500 | 507), "{}", refused.text());
+        let file = stack.site.folder.path().join("recordings/dive.mcap");
+        assert!(!file.exists(), "nothing is left of it");
+        assert_eq!(send(port, "GET", "/v1/recordings", &[], b"").json(), json!([]));
+        let begun = start();
+        assert_eq!(begun.status, 201, "{}", begun.text());
+        assert_eq!(send(port, "DELETE", "/v1/recordings/dive", &[], b"").status, 200);
+    });
+}

@@ -305,10 +305,14 @@ fn create(folder: &Path, info: &RecordingInfo, subject: &Subject, began: SystemT
         .map(|(name, value)| (name.to_owned(), value.to_owned())),
     );
     let path = folder.join(format!("{}.{ENDING}", info.name));
-    let mut file = Mcap::live(&info.thruster, &columns, about, origin_ns, File::create_new(path)?)?;
-    file.flush()?;
-    write_info(folder, info)?;
-    Ok(file)
+    let begin = |file| {
+        let mut file = Mcap::live(&info.thruster, &columns, about, origin_ns, file)?;
+        file.flush()?;
+        write_info(folder, info)?;
+        Ok(file)
+    };
+    // What does not begin leaves nothing: the list would not tell of it, and its name would be taken.
+    begin(File::create_new(&path)?).inspect_err(|_: &io::Error| drop(std::fs::remove_file(&path)))
 }
 
 /// A recording leaves some space to others.
