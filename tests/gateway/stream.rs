@@ -109,6 +109,29 @@ fn who_breaks_the_protocol_is_closed_with_a_reason_and_who_loses_the_lease_is_to
     });
 }
 
+/// Who closes is answered by a close of the same code, not by the end of the connection.
+#[test]
+fn a_close_is_answered() {
+    let stack = Stack::start();
+    let url = format!("ws://127.0.0.1:{}/v1/thrusters/t1/stream?hz=20", stack.site.port);
+    let (mut socket, _) = tungstenite::connect(&url).unwrap();
+    while !socket.read().unwrap().is_text() {}
+    let frame = tungstenite::protocol::CloseFrame { code: 1000.into(), reason: "".into() };
+    socket.close(Some(frame)).unwrap();
+    let answer = loop {
+        match socket.read() {
+            Ok(Message::Close(frame)) => break frame.map(|frame| u16::from(frame.code)),
+            Ok(_) => (),
+            Err(error) => panic!("the connection ends without an answer: {error}"),
+        }
+    };
+    assert_eq!(answer, Some(1000));
+    assert!(
+        matches!(socket.read(), Err(tungstenite::Error::ConnectionClosed)),
+        "and then the connection ends"
+    );
+}
+
 /// A reader that paused goes on with what is, not with what was: what lay on the way to it when it paused is a quarter of
 /// a second of states and no more, whatever the rate and wherever between two pings it stopped.
 #[test]

@@ -148,6 +148,7 @@ impl Session {
                 biased;
                 _ = stop.changed() => close(1001, "the gateway stops"),
                 received = socket.recv() => match received {
+                    Some(Ok(Message::Close(_))) => return answered(socket).await,
                     Some(Ok(received)) => match self.received(received).await {
                         Some(answer) => answer,
                         None => continue,
@@ -215,9 +216,8 @@ impl Session {
                 }
                 None
             }
-            Message::Ping(_) => None,
+            Message::Ping(_) | Message::Close(_) => None,
             Message::Binary(_) => Some(close(1003, "commands are JSON in text messages")),
-            Message::Close(_) => Some(Message::Close(None)),
         }
     }
 
@@ -248,6 +248,12 @@ impl Session {
         self.lease = Some(lease);
         Ok(None)
     }
+}
+
+/// A client's close is answered by the library, which sends its answer as long as it is asked for more.
+async fn answered(mut socket: WebSocket) {
+    let ended = async { while let Some(Ok(_)) = socket.recv().await {} };
+    let _ = tokio::time::timeout(SEND_WITHIN, ended).await;
 }
 
 const EXAMPLE: &str = r#"send {"setpoint": {"thrust_n": 25.0}, "lease_id": "…"}, or {"stop": true}"#;
