@@ -18,12 +18,20 @@ use crate::thruster::lock;
 /// A peer that takes nothing for this long is gone: its connection ends.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(15);
 
+/// What counts as one peer: of IPv6 a whole subnet, for a host has as many addresses there as it likes.
+pub fn subnet(peer: IpAddr) -> u128 {
+    match peer.to_canonical() {
+        IpAddr::V4(address) => address.to_ipv6_mapped().into(),
+        IpAddr::V6(address) => u128::from(address) >> 64,
+    }
+}
+
 /// How many connections there may be.
 #[derive(Clone, Copy, Debug)]
 pub struct Caps {
     /// In all.
     pub total: usize,
-    /// From one address.
+    /// From one peer: an address, of IPv6 a subnet.
     pub per_peer: usize,
     /// Beyond `total`, for stop and disarm alone.
     pub reserve: usize,
@@ -85,10 +93,11 @@ impl Connections {
     pub fn admit(&self, peer: IpAddr) -> Option<Arc<Slot>> {
         let mut open = lock(&self.open);
         let (kept_back, of_all): (Vec<&Arc<Slot>>, _) = open.iter().partition(|slot| slot.reserved);
-        let of_peer = of_all.iter().filter(|slot| slot.peer == peer).count();
+        let theirs = |slot: &Slot| subnet(slot.peer) == subnet(peer);
+        let of_peer = of_all.iter().filter(|slot| theirs(slot)).count();
         let full = of_peer >= self.caps.per_peer || of_all.len() >= self.caps.total;
         let idlest = |of: &[&Arc<Slot>]| {
-            let candidates = of.iter().filter(|slot| of_peer < self.caps.per_peer || slot.peer == peer);
+            let candidates = of.iter().filter(|slot| of_peer < self.caps.per_peer || theirs(slot));
             let waiting = candidates.map(|slot| (slot.idle_since_ms.load(Ordering::Relaxed), slot.number));
             waiting.filter(|(since_ms, _)| *since_ms > 0).min().map(|(_, number)| number)
         };
@@ -236,6 +245,18 @@ mod tests {
         }
         assert!(table.admit(PEERS[0]).is_none());
         assert_eq!(table.counts(), (6, 1, 0));
+    }
+
+    #[test]
+    fn a_host_with_many_addresses_of_its_subnet_is_one_peer() {
+        let table = table();
+        let address = |host: u128| IpAddr::from((0x2001_0db8_u128 << 96 | host).to_be_bytes());
+        for host in 1..=4 {
+            table.admit(address(host)).unwrap().busy();
+        }
+        assert!(table.admit(address(5)).unwrap().reserved, "its fifth, from its fifth address");
+        let neighbour = IpAddr::from((0x2001_0db8_u128 << 96 | 1 << 64).to_be_bytes());
+        assert!(!table.admit(neighbour).unwrap().reserved, "the next subnet is another peer");
     }
 
     /// Connections that only stop are no way around the caps: who takes the place of one may only stop too.

@@ -11,6 +11,7 @@ use axum::response::Response;
 use tokio::sync::Semaphore;
 
 use crate::App;
+use crate::connections::subnet;
 use crate::hosts::Hosts;
 use crate::problem::{Kind, Problem};
 use crate::serve::{Peer, Reserved};
@@ -28,10 +29,7 @@ struct Lanes(Mutex<HashMap<Option<u128>, Weak<Semaphore>>>);
 impl Lanes {
     /// The lane of a peer; of IPv6 a whole subnet, for a host has as many addresses there as it likes.
     fn of(&self, peer: Option<IpAddr>) -> Arc<Semaphore> {
-        let subnet = peer.map(|peer| match peer.to_canonical() {
-            IpAddr::V4(address) => address.to_ipv6_mapped().into(),
-            IpAddr::V6(address) => u128::from(address) >> 64,
-        });
+        let subnet = peer.map(subnet);
         let mut lanes = lock(&self.0);
         if let Some(lane) = lanes.get(&subnet).and_then(Weak::upgrade) {
             return lane;
@@ -49,21 +47,28 @@ pub struct Gate {
     hosts: Hosts,
     tokens: Tokens,
     required: bool,
-    /// Argon2 is heavy on purpose: one at a time, so that wrong tokens cannot take the machine.
+    /// Those that stop, and all others.
+    stops: Queue,
+    others: Queue,
+}
+
+/// Who waits for argon2, which is heavy on purpose: one at a time, so that wrong tokens cannot take the machine.
+#[derive(Debug)]
+struct Queue {
     work: Semaphore,
     lanes: Lanes,
+}
+
+impl Queue {
+    fn new() -> Queue {
+        Queue { work: Semaphore::new(1), lanes: Lanes::default() }
+    }
 }
 
 impl Gate {
     /// A gate for an address.
     pub fn new(bind: SocketAddr, hosts: &[String], tokens: Tokens, required: bool) -> Gate {
-        Gate {
-            hosts: Hosts::new(bind, hosts),
-            tokens,
-            required,
-            work: Semaphore::new(1),
-            lanes: Lanes::default(),
-        }
+        Gate { hosts: Hosts::new(bind, hosts), tokens, required, stops: Queue::new(), others: Queue::new() }
     }
 
     /// Is what somebody was let in by still in force?
@@ -77,6 +82,7 @@ impl Gate {
         app: &Arc<App>,
         headers: &HeaderMap,
         peer: Option<IpAddr>,
+        stops: bool,
     ) -> Result<Identity, Problem> {
         let Some(token) = shown(headers)? else {
             if self.required {
@@ -88,9 +94,11 @@ impl Gate {
         if let Some(identity) = self.tokens.remembered(&token) {
             return Ok(identity);
         }
-        let lane = self.lanes.of(peer);
+        // However many wait with something else, from wherever: a stop does not stand behind them.
+        let queue = if stops { &self.stops } else { &self.others };
+        let lane = queue.lanes.of(peer);
         let _first_of_its_lane = lane.acquire().await;
-        let _one_at_a_time = self.work.acquire().await;
+        let _one_at_a_time = queue.work.acquire().await;
         // Accepted while this one waited, on another connection.
         if let Some(identity) = self.tokens.remembered(&token) {
             return Ok(identity);
@@ -131,6 +139,11 @@ pub fn is_open(path: &str) -> bool {
     matches!(path, "/" | "/healthz" | "/readyz" | "/openapi.json" | "/docs") || path.starts_with("/docs/")
 }
 
+/// Does this bring a thruster to zero?
+fn stops(path: &str) -> bool {
+    path == "/v1/stop" || path.ends_with("/disarm")
+}
+
 /// The least role that may do this; none where anybody may.
 fn needed(method: &Method, path: &str) -> Option<Role> {
     match *method {
@@ -151,8 +164,7 @@ pub async fn check(
     let gate = app.gate();
     gate.hosts.check(request.uri(), request.headers())?;
     let path = request.uri().path();
-    if request.extensions().get::<Reserved>().is_some() && !(path == "/v1/stop" || path.ends_with("/disarm"))
-    {
+    if request.extensions().get::<Reserved>().is_some() && !stops(path) {
         return Err(Problem::new(
             Kind::Overloaded,
             "every connection is taken; this one is kept for stop and disarm",
@@ -161,7 +173,7 @@ pub async fn check(
     }
     if let Some(role) = needed(request.method(), path) {
         let peer = request.extensions().get::<Peer>().map(|Peer(address)| *address);
-        let identity = gate.identify(&app, request.headers(), peer).await?;
+        let identity = gate.identify(&app, request.headers(), peer, stops(path)).await?;
         if identity.role < role {
             return Err(Problem::new(
                 Kind::RoleTooLow,
