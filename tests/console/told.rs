@@ -121,3 +121,29 @@ fn links_carry_the_token() {
         supervisor.wait().unwrap();
     });
 }
+
+/// What is old is not shown as now, nothing is commanded by it, and a stop that nobody confirms says so.
+#[test]
+fn a_frozen_gateway_is_seen_within_a_second() {
+    common::in_real_time(|| {
+        let mut stack = Stack::start();
+        let Some(mut page) = Browser::open(&format!("http://127.0.0.1:{}/", stack.site.port)) else { return };
+        page.until("document.readyState === 'complete' && typeof state !== 'undefined'");
+        page.until(&text_is("link", "live"));
+        stack.thrust(40.0, 60_000);
+        page.until("state.armed");
+        let gateway = stack.process_of("gateway");
+        common::kill(gateway, "STOP");
+        page.until("document.body.classList.contains('stale')");
+        page.until(&text_is("link", "s old"));
+        assert_eq!(page.eval("document.getElementById('send').disabled"), json!(true));
+        assert_eq!(page.eval("document.getElementById('stop').disabled"), json!(false));
+        page.eval("document.getElementById('stop').click()");
+        page.until(&text_is("stop-text", "NOT CONFIRMED"));
+        // The supervisor puts another gateway in the place of the one that hangs. What that one shows ends the alarm, and
+        // nothing older does.
+        page.until("!document.body.classList.contains('stale') && !state.armed");
+        page.until(&text_is("stop-text", "Disarmed: the live state says so"));
+        assert_eq!(page.eval("document.getElementById('stop-text').className"), json!("good"));
+    });
+}

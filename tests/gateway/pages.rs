@@ -78,7 +78,15 @@ fn the_openapi_document_names_every_route_and_each_answers() {
                 );
             }
         }
-        assert_eq!(send(port, "GET", "/docs/", &[], b"").status, 200);
+        let docs = send(port, "GET", "/docs/", &[], b"");
+        assert_eq!(docs.status, 200);
+        for page in [docs, send(port, "GET", "/", &[], b"")] {
+            assert!(
+                page.head.contains("frame-ancestors 'none'"),
+                "no other page may frame it: {}",
+                page.head
+            );
+        }
         assert_eq!(send(port, "GET", "/docs/swagger-ui-bundle.js", &[], b"").status, 200);
     });
 }

@@ -109,6 +109,7 @@ function show() {
   const age_s = state ? (performance.now() - heard_ms) / 1000 + (state.age_s ?? 0) : null;
   chip("link", fresh ? "live" : age_s === null ? "no link" : `values are ${age_s.toFixed(1)} s old`, fresh ? "good" : "bad");
   document.body.classList.toggle("stale", !fresh);
+  if (fresh) seenDisarmed();
   $("send").disabled = !fresh || !lease || !state.armed;
   $("zero-button").disabled = !fresh;
   if (state) {
@@ -191,18 +192,27 @@ click("arm", async () => { await call("POST", `${base()}/arm`); log("armed"); })
 const disarm = async () => { await call("POST", `${base()}/disarm`); log("disarmed"); };
 click("disarm", disarm);
 // STOP goes out by every way there is, and says whether a servo confirmed it.
-let stopping = null;
+let stopping = null, unconfirmed_ms = null;
 function stopConfirmed(by) {
   if (!stopping) return;
   clearTimeout(stopping); stopping = null;
   $("stop-text").className = "good"; $("stop-text").textContent = "Stopped: confirmed.";
   log(`stop confirmed by ${by}`);
 }
+// A stop that nobody confirmed is an alarm until every thruster is seen disarmed, in a state that came after it.
+function seenDisarmed() {
+  if (unconfirmed_ms === null) return;
+  const seen = fleet.size ? [...fleet.values()] : [{ state, heard_ms }];
+  if (!seen.every((one) => one.state && !one.state.armed && one.heard_ms > unconfirmed_ms && one.state.age_s !== null && one.state.age_s < STALE_MS / 1000)) return;
+  unconfirmed_ms = null;
+  $("stop-text").className = "good"; $("stop-text").textContent = "Disarmed: the live state says so. The stop itself was not confirmed.";
+  log("the live state says disarmed; the stop was not confirmed");
+}
 function stopAll() {
-  clearTimeout(stopping);
+  clearTimeout(stopping); unconfirmed_ms = null;
   $("stop-text").className = "bad"; $("stop-text").textContent = "Stop sent, not confirmed yet.";
   stopping = setTimeout(() => {
-    stopping = null;
+    stopping = null; unconfirmed_ms = performance.now();
     $("stop-text").textContent = "STOP IS NOT CONFIRMED: the gateway or a servo does not answer. Cut the supply if the shaft turns.";
     log("stop is not confirmed", true);
   }, 1500);
@@ -281,7 +291,7 @@ $("controller-file").addEventListener("change", async () => {
 // Event log ------------------------------------------------------------------------------------------------
 let lastEvent = 0;
 async function loadEvents() {
-  const events = await call("GET", `/v1/events?since=${lastEvent}&limit=100`);
+  const events = await call("GET", `/v1/events?limit=100${lastEvent ? `&since=${lastEvent}` : ""}`); // the newest first, then those after them
   for (const event of events) {
     lastEvent = event.id;
     const item = document.createElement("li");

@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use axum::Router;
 use axum::extract::State;
-use axum::http::header;
-use axum::response::IntoResponse;
+use axum::http::{HeaderValue, header};
+use axum::middleware::map_response;
+use axum::response::{IntoResponse, Response};
 use utoipa_axum::{router::OpenApiRouter, routes};
 use utoipa_swagger_ui::{Config, SwaggerUi};
 
@@ -25,5 +26,13 @@ async fn document(State(app): State<Arc<App>>) -> impl IntoResponse {
 /// Swagger UI, its files built in: no outside request.
 pub fn pages() -> Router<Arc<App>> {
     let config = Config::from("/openapi.json").validator_url("none").try_it_out_enabled(true);
-    SwaggerUi::new("/docs").config(config).into()
+    Router::from(SwaggerUi::new("/docs").config(config)).layer(map_response(unframed))
+}
+
+/// It sends commands with whatever token is entered: no other page may show it as its own.
+async fn unframed(mut response: Response) -> Response {
+    let headers = response.headers_mut();
+    headers.insert(header::CONTENT_SECURITY_POLICY, HeaderValue::from_static("frame-ancestors 'none'"));
+    headers.insert(header::X_FRAME_OPTIONS, HeaderValue::from_static("DENY"));
+    response
 }
