@@ -5,6 +5,7 @@ mod commands;
 #[path = "../common/mod.rs"]
 mod common;
 mod errors;
+mod events;
 mod followed;
 mod foxglove;
 mod kept;

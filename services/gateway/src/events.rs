@@ -1,6 +1,6 @@
 //! The event log as the gateway keeps it: a thread of its own writes, and reads what the supervisor wrote too.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
@@ -26,6 +26,8 @@ pub struct Events {
     outbox: SyncSender<Event>,
     waiting: AtomicU64,
     known: Mutex<Known>,
+    /// The files, read by one at a time.
+    files: Mutex<EventLog>,
     recorder: Arc<Recorder>,
 }
 
@@ -34,6 +36,8 @@ pub struct Events {
 struct Known {
     /// The newest, in the order of ids.
     newest: VecDeque<Event>,
+    /// The id of the newest that had to go: what came later is all at hand.
+    gone: u64,
     /// However long ago they came.
     standing: Standing,
 }
@@ -44,7 +48,13 @@ impl Events {
         let log = EventLog::open(folder)?;
         let (outbox, inbox) = sync_channel(QUEUE);
         let waiting = AtomicU64::new(0);
-        let events = Arc::new(Events { outbox, waiting, known: Mutex::default(), recorder });
+        let events = Arc::new(Events {
+            outbox,
+            waiting,
+            known: Mutex::default(),
+            files: Mutex::new(log.clone()),
+            recorder,
+        });
         // What is known comes first: faults that stand there need not be told again.
         let mark = log.end();
         events.learn(log.read());
@@ -80,12 +90,30 @@ impl Events {
         self.note(Event::now(kind, thruster, who, detail));
     }
 
-    /// Events after this one, oldest first, at most `most` of the newest.
-    pub fn since(&self, id: u64, most: usize) -> Vec<Event> {
-        let known = lock(&self.known);
-        let newer = known.newest.iter().filter(|event| event.id > id);
-        let skip = newer.clone().count().saturating_sub(most);
-        newer.skip(skip).cloned().collect()
+    /// The newest events, at most so many, oldest first.
+    pub fn newest(&self, most: usize) -> Vec<Event> {
+        let newest = &lock(&self.known).newest;
+        newest.iter().skip(newest.len().saturating_sub(most)).cloned().collect()
+    }
+
+    /// The first events after this one, at most so many, oldest first: who asks again from the last of them misses none that
+    /// the log still holds. Reads the files where what is at hand does not go back so far.
+    pub fn after(&self, id: u64, most: usize) -> Vec<Event> {
+        let at_hand = || {
+            let known = lock(&self.known);
+            let newer = known.newest.iter().skip(known.newest.partition_point(|event| event.id <= id));
+            (known.gone <= id, newer.take(most).cloned().collect::<Vec<_>>())
+        };
+        let (all, newer) = at_hand();
+        if all {
+            return newer;
+        }
+        let kept = lock(&self.files).read();
+        let kept = kept.into_iter().filter(|event| event.id > id);
+        // What was noted this moment may not be on the disk yet.
+        let both: BTreeMap<u64, Event> =
+            newer.into_iter().chain(kept).map(|event| (event.id, event)).collect();
+        both.into_values().take(most).collect()
     }
 
     /// How a fault of a thruster came that stands now; none if it was cleared since.
@@ -95,7 +123,7 @@ impl Events {
 
     /// Takes over what is new, in the order of ids.
     fn learn(&self, events: Vec<Event>) {
-        let Known { newest, standing } = &mut *lock(&self.known);
+        let Known { newest, gone, standing } = &mut *lock(&self.known);
         for event in events {
             standing.take(&event);
             let place = newest.partition_point(|known| known.id < event.id);
@@ -107,7 +135,7 @@ impl Events {
             self.recorder.note(&event);
             newest.insert(place, event);
             if newest.len() > AT_HAND {
-                newest.pop_front();
+                *gone = newest.pop_front().map_or(*gone, |event| event.id.max(*gone));
             }
         }
     }
@@ -157,11 +185,39 @@ mod tests {
         for _ in 0..=AT_HAND {
             events.learn(vec![Event::now(EventKind::Commanded, Some("t1"), "bench", "")]);
         }
-        assert!(events.since(0, usize::MAX).iter().all(|event| event.id > tripped.id), "long past");
+        assert!(events.newest(usize::MAX).iter().all(|event| event.id > tripped.id), "long past");
         assert_eq!(events.latched("t1", Fault::ServoLost), Some(tripped.clone()));
         events.learn(vec![tripped.clone()]);
-        assert_eq!(events.since(0, usize::MAX).len(), AT_HAND, "what is read anew is not told anew");
+        assert_eq!(events.newest(usize::MAX).len(), AT_HAND, "what is read anew is not told anew");
         events.tell(EventKind::FaultsCleared, Some("t1"), "bench", "");
         assert_eq!(events.latched("t1", Fault::ServoLost), None);
+    }
+
+    #[test]
+    fn who_asks_on_from_the_last_it_knows_misses_none_that_is_on_the_disk() {
+        let folder = tempfile::tempdir().unwrap();
+        let recorder = Recorder::open(&folder.path().join("recordings"), RecordingLimits::default()).unwrap();
+        let log = EventLog::open(&folder.path().join("events")).unwrap();
+        let written: Vec<Event> = (0..AT_HAND + 200)
+            .map(|n| Event::now(EventKind::LeaseTaken, Some("t1"), "bench", n.to_string()))
+            .collect();
+        let lines: Vec<String> = written.iter().map(|event| serde_json::to_string(event).unwrap()).collect();
+        std::fs::write(folder.path().join("events/events.jsonl"), lines.join("\n") + "\n").unwrap();
+        let events = Events::start(&folder.path().join("events"), Arc::new(recorder)).unwrap();
+        assert_eq!(log.read().len(), written.len());
+        assert_eq!(events.newest(2), written[written.len() - 2..]);
+        let (mut last, mut told) = (0, Vec::new());
+        loop {
+            let next = events.after(last, 1000);
+            let Some(newest) = next.last() else { break };
+            last = newest.id;
+            told.extend(next);
+        }
+        assert_eq!(told, written);
+        assert_eq!(
+            events.after(written[AT_HAND].id, 3),
+            written[AT_HAND + 1..AT_HAND + 4],
+            "from what is at hand"
+        );
     }
 }

@@ -1,0 +1,45 @@
+//! The event log as a client follows it.
+
+use kort_proto::events::{Event, EventKind, EventLog};
+use kort_proto::faults::Fault;
+
+use crate::asking::send;
+use crate::common::{self, Site, Stack};
+
+/// Who asks on from the last event it knows is told the next ones, not the newest: nothing is lost in between. Without a
+/// place to begin it is told the newest.
+#[test]
+fn a_client_that_asks_on_from_the_last_it_knows_misses_none() {
+    common::in_real_time(|| {
+        let site = Site::new();
+        let log = EventLog::open(&site.folder.path().join("events")).unwrap();
+        let old = Event::now(EventKind::FaultInherited, Some("t1"), "supervisor", "old")
+            .fault(Fault::ServoLost)
+            .since("2026-01-01T12:00:00.000000Z".into());
+        log.append(&old).unwrap();
+        let written: Vec<String> = (0..30).map(|n| format!("event {n}")).collect();
+        for words in &written {
+            log.append(&Event::now(EventKind::LeaseTaken, Some("t1"), "bench", words)).unwrap();
+        }
+        let stack = Stack::start_at(site);
+        let events = |query: &str| {
+            let answer = send(stack.site.port, "GET", &format!("/v1/events?{query}"), &[], b"");
+            assert_eq!(answer.status, 200, "{query}: {}", answer.text());
+            answer.json().as_array().unwrap().clone()
+        };
+        let first = &events("since=0&limit=1")[0];
+        assert_eq!(
+            (&first["detail"], &first["since"]),
+            (&"old".into(), &"2026-01-01T12:00:00.000000Z".into())
+        );
+        let (mut last, mut told) = (old.id, Vec::new());
+        while told.len() < written.len() {
+            let next = events(&format!("since={last}&limit=7"));
+            last = next.last().expect("more of them")["id"].as_u64().unwrap();
+            told.extend(next.iter().map(|event| event["detail"].as_str().unwrap().to_owned()));
+        }
+        assert_eq!(told[..written.len()], written);
+        let newest = events("limit=1")[0]["id"].as_u64().unwrap();
+        assert!(newest >= last, "without a place to begin the newest are told");
+    });
+}
