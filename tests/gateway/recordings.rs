@@ -227,9 +227,9 @@ fn a_recording_that_a_full_disk_refuses_does_not_keep_its_name() {
         let usual = getrlimit(Resource::Fsize);
         let start = || send(port, "POST", "/v1/recordings", &[JSON], br#"{"name": "dive"}"#);
         // Files may not grow beyond what the head of a recording needs: to whoever writes, a full disk.
-        prlimit(gateway, Resource::Fsize, Rlimit { current: Some(1024), ..usual.clone() }).unwrap();
+        prlimit(gateway, Resource::Fsize, Rlimit { current: Some(1024), ..usual }).unwrap();
         let refused = start();
-        prlimit(gateway, Resource::Fsize, usual.clone()).unwrap();
+        prlimit(gateway, Resource::Fsize, usual).unwrap();
         assert!(matches!(refused.status, 500 | 507), "{}", refused.text());
         let file = stack.site.folder.path().join("recordings/dive.mcap");
         assert!(!file.exists(), "nothing is left of it");
