@@ -38,10 +38,11 @@ else
   wait "$kort"
 fi
 ls -ld /var/lib/kort/*
+test -e /run/kort/shm.watched   # what stood latched is there for the next start
 
 say "removed, then purged"
 apt-get remove -y -qq kort
 test ! -e /usr/bin/kort && test -e /etc/kort/kort.toml && test -d /var/lib/kort
 apt-get purge -y -qq kort
-test ! -e /etc/kort && test ! -e /var/lib/kort
+test ! -e /etc/kort && test ! -e /var/lib/kort && test ! -e /run/kort
 echo "nothing is left but the user"

@@ -32,9 +32,11 @@ pub enum Fault {
     OverTemperature = 11,
     /// The servo's loop stood still longer than the command time-out.
     LoopStalled = 12,
-    /// Another controller process began to command while armed.
+    /// The controller ended, or another process began to command, while armed; or one that had faults latched was replaced by
+    /// one that knows nothing of them.
     ControllerRestarted = 13,
-    /// The servo ended while armed; its successor latches this at its start.
+    /// The servo ended while armed: latched by itself where it was told to end, at its start by the successor of one that was
+    /// killed.
     ServoRestarted = 14,
     /// The drive does not answer: unplugged, without power, or its answers are unreadable.
     DriveLost = 15,
@@ -152,7 +154,9 @@ impl Fault {
             Self::SupplyOutOfRange => "the supply voltage left its band: check battery, cable and charger",
             Self::OverTemperature => "the motor is too hot: let it cool, check cooling and load",
             Self::LoopStalled => "the servo's loop stood still: the machine is overloaded or was suspended",
-            Self::ControllerRestarted => "the controller was replaced while armed: arm again",
+            Self::ControllerRestarted => {
+                "the controller ended or was replaced: see the event log, then clear and arm again"
+            }
             Self::ServoRestarted => {
                 "the servo ended while armed (killed, hung or the whole service died): see the event log, then clear and arm again"
             }

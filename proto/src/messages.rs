@@ -105,9 +105,16 @@ message! { "kort.Command",
         speed_cmd_rad_s: f64,
         /// [`DriveKind`]
         kind: u32,
-        /// Non-zero: stop, zero output and disarm now.
+        /// Non-zero: stop, zero output and disarm now; [`Command::ENDS`] where that is because the controller itself ends.
         stop: u32,
     }
+}
+
+impl Command {
+    /// The `stop` of a controller that has nothing to command, for a lease that ended or a fault.
+    pub const STOPS: u32 = 1;
+    /// The `stop` of a controller that is told to end: nobody asked the drive to.
+    pub const ENDS: u32 = 2;
 }
 
 message! { "kort.Trip",

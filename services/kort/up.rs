@@ -15,7 +15,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use kort_proto::config::Config;
-use kort_proto::events::{Before, Event, EventKind, EventLog};
+use kort_proto::events::{Event, EventKind, EventLog};
 use kort_proto::messages::RequestKind;
 use kort_proto::transport::{Deployment, Owner, Restarts, Watched};
 use tracing::{info, warn};
@@ -33,8 +33,9 @@ const STARTS_PER_GENERATION: u32 = 3;
 const GENERATIONS: u32 = 3;
 /// A look that comes later than this: the whole machine stood still, and nobody is to blame.
 const STOOD_STILL: Duration = Duration::from_millis(500);
-/// How things stand is written down this often while a drive is armed.
-const NOTE_EVERY: Duration = Duration::from_secs(1);
+/// How things stand is written down this often while a drive is armed: a service that is killed as a whole tells its
+/// successor by that when it was stopped, and at what thrust.
+const NOTE_EVERY: Duration = Duration::from_millis(100);
 /// How long a thruster may take to come to rest before its drive is switched off, and after.
 const REST_WITHIN: Duration = Duration::from_millis(2500);
 const COAST_WITHIN: Duration = Duration::from_secs(3);
@@ -131,27 +132,21 @@ impl Service {
             if watch.stood.armed {
                 let words = format!("the service ended while {} was armed, at {}", watch.id(), watch.words());
                 warn!("{words}");
-                let before = Before {
-                    thrust_n: watch.stood.thrust_n,
-                    shaft_speed_rad_s: watch.stood.shaft_speed_rad_s,
-                };
                 let event = Event::now(EventKind::ProcessEnded, Some(watch.id()), "supervisor", words);
-                self.scribe.event(event.before(before));
+                let (since, before) = (watch.stood.heard.clone(), watch.driven_till_now());
+                self.scribe.event(Event { since, before, ..event });
             }
-        }
-        for at in 0..self.roles.len() {
-            self.start(at)?;
-        }
-        for watch in &mut self.watches {
             watch.servo_ended();
         }
-        Ok(())
+        // Before the gateway looks there for what stands latched.
+        self.write_down();
+        (0..self.roles.len()).try_for_each(|at| self.start(at))
     }
 
     /// Starts one process, with what its predecessor left.
     fn start(&mut self, at: usize) -> Result<(), UpError> {
         let Some(role) = self.roles.get_mut(at) else { return Ok(()) };
-        let of_role = self.watches.iter().find(|watch| role.thruster.as_deref() == Some(watch.id()));
+        let of_role = self.watches.iter_mut().find(|watch| role.thruster.as_deref() == Some(watch.id()));
         let heritage = of_role.map(|watch| watch.heritage(role.name)).unwrap_or_default();
         role.start(&self.program, self.config.as_deref(), self.owner.deployment().root(), heritage)?;
         let (name, thruster) = (role.name, role.thruster.clone());
@@ -237,11 +232,7 @@ impl Service {
                 }
                 // The last samples still lie in shared memory.
                 watch.look(self.owner.deployment());
-                if watch.stood.armed {
-                    let before = Before {
-                        thrust_n: watch.stood.thrust_n,
-                        shaft_speed_rad_s: watch.stood.shaft_speed_rad_s,
-                    };
+                if let Some(before) = watch.driven_till_now() {
                     let words = format!("{words}, while armed");
                     let event = Event::now(EventKind::ProcessEnded, Some(watch.id()), "supervisor", words);
                     self.scribe.event(event.before(before));
@@ -291,17 +282,11 @@ impl Service {
             }
             self.roles[at].restarts += 1;
             self.start(at)?;
-            let Role { name, thruster, .. } = &self.roles[at];
-            if *name == "servo"
-                && let Some(watch) = self.watches.iter_mut().find(|w| Some(w.id()) == thruster.as_deref())
-            {
-                watch.servo_ended();
-            }
         }
         Ok(())
     }
 
-    /// Notes how things stand where that changed, and each second while a drive is armed.
+    /// Notes how things stand where that changed, and again and again while a drive is armed.
     fn write_down(&mut self) {
         let restarts = self.roles.iter().map(|role| Restarts {
             process: role.name.to_owned(),

@@ -4,12 +4,13 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod inherited;
+mod lone;
 mod refusals;
 mod shown;
 mod strangers;
 mod system;
 
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 use common::{PERIOD_NS, Site, Stack, alive, at_zero, children, kill, wait};
 use kort_proto::faults::Fault;
@@ -154,16 +155,31 @@ fn a_service_that_died_while_armed_says_so_when_it_comes_back() {
     common::in_real_time(|| {
         let mut stack = Stack::start();
         stack.thrust(80.0, LEASE_MS);
+        // What is told is how it was then, not how it was a second before.
         std::thread::sleep(Duration::from_millis(1200));
+        stack.expect("PUT", "/setpoint", Some(serde_json::json!({ "thrust_n": 30.0 })));
+        stack.watch().until("the lower thrust", |t| t.signals.thrust_n < 40.0);
+        std::thread::sleep(Duration::from_millis(200));
+        let killed = SystemTime::now();
         kill(stack.supervisor.id(), "KILL");
         stack.supervisor.wait().unwrap();
+        std::thread::sleep(Duration::from_secs(1));
         stack.supervisor = stack.site.spawn("up");
         let fault = wait("the fault", || {
             // When it was, the gateway reads after the fault itself.
             let faults = stack.state()?["faults"].as_array()?.clone();
             faults.into_iter().find(|f| f["name"] == "servo_restarted" && !f["since"].is_null())
         });
-        assert!(fault["since"].is_string(), "{fault}");
+        let since = humantime::parse_rfc3339(fault["since"].as_str().unwrap()).unwrap();
+        let apart = since.duration_since(killed).unwrap_or_else(|earlier| earlier.duration());
+        assert!(apart < Duration::from_millis(500), "{fault}, killed {killed:?}");
+        assert!(fault["before"]["thrust_n"].as_f64().is_some_and(|n| n < 50.0), "{fault}");
+        let events = stack.get("/v1/events").unwrap();
+        let died = |event: &&serde_json::Value| {
+            event["detail"].as_str().is_some_and(|d| d.contains("the service ended"))
+        };
+        let died = events.as_array().unwrap().iter().find(died).expect("the end of the service");
+        assert_eq!(died["since"], fault["since"], "{died}");
         stack.thrust(60.0, LEASE_MS);
     });
 }

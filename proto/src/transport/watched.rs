@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::time::SystemTime;
 
 use serde::{Deserialize, Serialize};
 
@@ -47,6 +48,8 @@ pub struct Stood {
     pub thrust_n: Option<f64>,
     /// Shaft speed, rad/s; absent if not measured.
     pub shaft_speed_rad_s: Option<f64>,
+    /// When the servo was last heard: wall time, RFC 3339, which a start of the machine does not set back.
+    pub heard: Option<String>,
     /// What it did when it was last heard armed and not ramped down.
     pub driven: Option<Before>,
     /// How each latched fault came: whoever finds it at a later start tells it as old as it is.
@@ -62,6 +65,13 @@ pub struct Latched {
     pub since: String,
     /// What the thruster did just before, if that stopped it.
     pub before: Option<Before>,
+}
+
+impl Stood {
+    /// A time as it is written here.
+    pub fn time(at: SystemTime) -> String {
+        humantime::format_rfc3339_micros(at).to_string()
+    }
 }
 
 impl Watched {

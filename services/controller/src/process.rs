@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use kort_control::{ControllerConfig, LawKind, ModelError};
 use kort_proto::config::{Config, ConfigError, Thruster};
-use kort_proto::messages::{Answered, Command, Reply, RequestKind, Timing};
+use kort_proto::messages::{Answered, Reply, RequestKind, Timing};
 use kort_proto::revision;
 use kort_proto::transport::{ControllerPorts, Deployment, TransportError, keep_on, monotonic_ns, realtime};
 use kort_thruster::rig::Rig;
@@ -105,7 +105,7 @@ pub fn run(config: &Config, deployment: &Deployment, id: &str, latched: u64) -> 
             warn!("{missing}");
         }
     }
-    let mut told = false;
+    let (mut told, mut latched) = (false, latched);
     // Outer loop: a new owner of the shared memory begins a new generation; start afresh in it.
     while !stop.load(Ordering::Relaxed) {
         if let Err(nothing) = deployment.wait_for_generation(Duration::from_secs(1)) {
@@ -133,6 +133,7 @@ pub fn run(config: &Config, deployment: &Deployment, id: &str, latched: u64) -> 
             ports = ControllerPorts::open(deployment, id)?;
             info!(thruster = id, "controller takes its place again, at zero");
         }
+        latched = tick.leaves_behind();
     }
     info!(thruster = id, "controller ends, servo stopped");
     Ok(())
@@ -215,7 +216,7 @@ fn serve(
         }
         let fitted = workshop.fit(tick);
         let command = tick.tick(woke_ns);
-        let command = if stopping { Command { drive: 0.0, stop: 1, ..command } } else { command };
+        let command = if stopping { tick.last_command(command) } else { command };
         let before = std::mem::replace(&mut aside, tick.aside(woke_ns));
         if !aside {
             // What cannot be sent is missed by its reader, who watches for that.

@@ -25,6 +25,7 @@ struct Bench {
     armed: bool,
     armed_at: u64,
     servo_speaks: bool,
+    servo_faults: u64,
     gateway_speaks: bool,
     gateway_session: u64,
     setpoint: Setpoint,
@@ -41,6 +42,7 @@ impl Bench {
             armed: false,
             armed_at: 0,
             servo_speaks: true,
+            servo_faults: 0,
             gateway_speaks: true,
             gateway_session: START - 5,
             setpoint: Setpoint { lease_until_ns: u64::MAX, ..Setpoint::default() },
@@ -64,6 +66,7 @@ impl Bench {
                 signals,
                 armed: u32::from(self.armed),
                 armed_at_ns: self.armed_at,
+                faults: self.servo_faults,
                 drive_max: 9.0,
                 ..Telemetry::default()
             };
@@ -340,6 +343,24 @@ fn a_switch_of_law_is_bumpless_and_all_or_nothing() {
     assert_eq!(bench.tick.state().law, law, "nothing was changed");
     let unknown = Request { law: Text::new("velocity"), parameter_count: 0, ..request };
     assert!(bench.ask(unknown).1.contains("known are static_map"));
+}
+
+/// Another servo, started by itself, knows nothing of what the one before it had latched, nor that it drove.
+#[test]
+fn what_a_servo_takes_along_is_left_behind_as_its_loss() {
+    let mut bench = Bench::new();
+    bench.step();
+    assert_eq!(bench.tick.leaves_behind(), 0);
+    bench.arm();
+    assert_eq!(bench.tick.leaves_behind(), Fault::ServoLost.bit(), "it drove");
+    bench.armed = false;
+    bench.step();
+    assert_eq!(bench.tick.leaves_behind(), 0);
+    bench.servo_faults = Fault::OverCurrent.bit();
+    bench.step();
+    assert_eq!(bench.tick.leaves_behind(), Fault::ServoLost.bit());
+    let command = bench.step();
+    assert_eq!(bench.tick.last_command(command).stop, Command::ENDS);
 }
 
 proptest! {

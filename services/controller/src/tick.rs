@@ -49,6 +49,7 @@ pub struct Tick {
     /// Time from zero to the largest setpoint, s; `None` takes the law's own, see [`crate::slew`].
     rise_s: Option<f64>,
     armed: bool,
+    servo_faults: u64,
     armed_at_ns: u64,
     drive_max: f64,
     measured: Signals,
@@ -114,6 +115,7 @@ impl Tick {
             slew: Slew::default(),
             rise_s: Some(0.0),
             armed: false,
+            servo_faults: 0,
             armed_at_ns: 0,
             drive_max: 0.0,
             measured: Signals::UNKNOWN,
@@ -140,6 +142,19 @@ impl Tick {
         Self { latched, ..self }
     }
 
+    /// What stands latched when another servo, with a shared memory of its own, takes the place of the one that is heard: that
+    /// one knows nothing of the faults of this, nor that it drove.
+    pub fn leaves_behind(&self) -> u64 {
+        let lost = self.armed || self.servo_faults != 0;
+        self.latched | if lost { Fault::ServoLost.bit() } else { 0 }
+    }
+
+    /// The last command before the process ends.
+    pub fn last_command(&self, command: Command) -> Command {
+        let stop = if self.latched == 0 { Command::ENDS } else { Command::STOPS };
+        Command { drive: 0.0, stop, ..command }
+    }
+
     /// Takes a telemetry sample; call for every one, oldest first.
     pub fn take_telemetry(&mut self, telemetry: &Telemetry, now_ns: u64) {
         let life_ns = SERVO_PERIODS * self.period_ns;
@@ -157,6 +172,7 @@ impl Tick {
             self.forget();
         }
         self.armed = armed;
+        self.servo_faults = telemetry.faults;
         self.armed_at_ns = telemetry.armed_at_ns;
         self.drive_max = if telemetry.drive_max.is_finite() { telemetry.drive_max.max(0.0) } else { 0.0 };
         // A slow sensor shows a value only on some ticks: keep the newest of each.

@@ -79,6 +79,8 @@ use thruster::Thruster;
 
 /// Largest request body, bytes.
 const BODY_BYTES_MAX: usize = 16 * 1024;
+/// By then a thruster whose gateway is silent is at zero, on a busy machine too.
+const RAMPED_WITHIN: Duration = Duration::from_secs(1);
 
 /// Everything the routes share.
 #[derive(Debug)]
@@ -273,7 +275,8 @@ impl Drop for StreamGuard {
     }
 }
 
-/// Serves until SIGINT or SIGTERM; then disarms every thruster, closes a running recording and returns.
+/// Serves until SIGINT, SIGTERM or SIGHUP; then commands nothing any more, sees what is armed come to zero, closes running
+/// recordings and returns.
 ///
 /// # Errors
 /// If the address or the folder of the recordings cannot be used.
@@ -296,6 +299,15 @@ async fn heard_once(app: &App) {
         && app.thrusters().iter().any(|thruster| thruster.heard().servo.is_none())
     {
         tokio::time::sleep(Duration::from_millis(2)).await;
+    }
+}
+
+/// Waits for the ramp to zero that a gateway's silence leads to, so that recordings and events hold it.
+async fn disarmed_by_its_controller(app: &App) {
+    let began = std::time::Instant::now();
+    let armed = || app.thrusters().iter().any(|thruster| thruster.heard().armed(std::time::Instant::now()));
+    while began.elapsed() < RAMPED_WITHIN && armed() {
+        tokio::time::sleep(Duration::from_millis(10)).await;
     }
 }
 
@@ -405,11 +417,12 @@ async fn serve(
             .spawn(move || bus::run(&deployment, links, &recorder, &pulse, &bell, &stop))?
     };
 
+    let beating = Arc::clone(&pulse);
     tokio::spawn(async move {
         let mut beat = tokio::time::interval(Pulse::EVERY);
         loop {
             beat.tick().await;
-            pulse.beat();
+            beating.beat();
         }
     });
 
@@ -432,15 +445,11 @@ async fn serve(
     heard_once(&app).await;
     let serving = tokio::spawn(serve::run(listener, port));
     tokio::select! { _ = interrupt.recv() => (), _ = terminate.recv() => (), _ = hangup.recv() => () }
-    for thruster in
-        app.thrusters().iter().filter(|thruster| thruster.heard().armed(std::time::Instant::now()))
-    {
-        if let Err(problem) = thruster.disarm("the gateway on its way out").await {
-            tracing::warn!(thruster = thruster.id, ?problem, "could not disarm on the way out");
-        }
-    }
+    // Nobody asked a drive to stop: its controller hears no more of this gateway, and does what it does at any loss of it.
+    pulse.end();
     let _ = stop_streams.send(true);
     let _ = serving.await;
+    disarmed_by_its_controller(&app).await;
     // Answers under way and close frames get a moment; clients that keep their connection do not keep the gateway.
     for _ in 0..50 {
         if app.connections().counts().0 == 0 {

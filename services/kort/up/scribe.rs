@@ -52,19 +52,29 @@ impl Scribe {
 
 fn write(log: &EventLog, watched: &std::path::Path, inbox: &Receiver<Entry>) {
     let mut complained = false;
-    for entry in inbox {
-        let written = match entry {
-            Entry::Event(event) => {
-                log.append(&event).map_err(|error| format!("{error}\nhint: gateway.events needs space"))
-            }
-            Entry::Watched(state) => state.write(watched).map_err(|error| error.to_string()),
-        };
-        match written {
-            Ok(()) => complained = false,
-            Err(error) if !std::mem::replace(&mut complained, true) => {
-                warn!("what happened cannot be written down: {error}");
-            }
-            Err(_) => (),
+    while let Ok(first) = inbox.recv() {
+        // On a disk that is slower than what is noted only the newest of how things stand counts.
+        let (states, events): (Vec<_>, Vec<_>) = std::iter::once(first)
+            .chain(inbox.try_iter())
+            .partition(|entry| matches!(entry, Entry::Watched(_)));
+        for entry in events.into_iter().chain(states.into_iter().next_back()) {
+            write_one(log, watched, entry, &mut complained);
         }
+    }
+}
+
+fn write_one(log: &EventLog, watched: &std::path::Path, entry: Entry, complained: &mut bool) {
+    let written = match entry {
+        Entry::Event(event) => {
+            log.append(&event).map_err(|error| format!("{error}\nhint: gateway.events needs space"))
+        }
+        Entry::Watched(state) => state.write(watched).map_err(|error| error.to_string()),
+    };
+    match written {
+        Ok(()) => *complained = false,
+        Err(error) if !std::mem::replace(complained, true) => {
+            warn!("what happened cannot be written down: {error}");
+        }
+        Err(_) => (),
     }
 }

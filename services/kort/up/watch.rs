@@ -12,6 +12,8 @@ use super::role::Heritage;
 
 /// Ports that cannot be opened are tried again this often.
 const REOPEN_EVERY: Duration = Duration::from_millis(100);
+/// A stop that is no older came of the end of a process that is found ended now.
+const JUST_NOW: Duration = Duration::from_millis(200);
 /// Thrust that counts as none, share of the largest.
 const THRUST_SMALL: f64 = 0.03;
 /// Shaft speed that counts as none, share of the largest.
@@ -29,6 +31,7 @@ pub struct Watch {
     thrust_max_n: f64,
     speed_max_rad_s: f64,
     heard: Option<Instant>,
+    armed_at: Option<Instant>,
 }
 
 /// Who beat since the last look.
@@ -55,6 +58,7 @@ impl Watch {
             thrust_max_n: f64::NAN,
             speed_max_rad_s: f64::NAN,
             heard: None,
+            armed_at: None,
         }
     }
 
@@ -94,20 +98,26 @@ impl Watch {
             self.stood.shaft_speed_rad_s =
                 there(telemetry.signals.shaft_speed_rad_s, self.stood.shaft_speed_rad_s);
             self.tripped = telemetry.tripped;
+            if self.stood.armed {
+                self.armed_at = self.heard;
+            }
             if self.stood.armed && !was_ramping && !self.ramping {
                 let (thrust_n, shaft_speed_rad_s) = (self.stood.thrust_n, self.stood.shaft_speed_rad_s);
                 self.stood.driven = Some(Before { thrust_n, shaft_speed_rad_s });
             }
         }
+        if beats.servo {
+            self.stood.heard = Some(Stood::time(SystemTime::now()));
+        }
         beats.gateway = ports.setpoint.latest().is_some();
         if beats.servo || beats.controller {
-            self.note_latched();
+            self.note_latched(None);
         }
         beats
     }
 
-    /// Notes when each latched fault came, and forgets those that were cleared.
-    fn note_latched(&mut self) {
+    /// Notes when each latched fault came, now if not `at` another time, and forgets those that were cleared.
+    fn note_latched(&mut self, at: Option<&str>) {
         let faults = self.stood.servo_faults | self.stood.controller_faults;
         let latched = &mut self.stood.latched;
         latched.retain(|known| Fault::in_set(faults).any(|fault| fault.code() == known.code));
@@ -116,7 +126,7 @@ impl Watch {
                 let stopped = Some(&self.tripped).filter(|trip| trip.at_ns != 0);
                 latched.push(Latched {
                     code: fault.code(),
-                    since: humantime::format_rfc3339_micros(SystemTime::now()).to_string(),
+                    since: at.map_or_else(|| Stood::time(SystemTime::now()), str::to_owned),
                     before: (self.stood.driven.filter(|_| fault.is_ramped()))
                         .or(stopped.map(|trip| Before::of(trip.thrust_n, trip.shaft_speed_rad_s))),
                 });
@@ -124,33 +134,50 @@ impl Watch {
         }
     }
 
-    /// What the successor of a process takes over: a servo that ended while armed is a stop nobody asked for.
-    pub fn heritage(&self, role: &str) -> Heritage {
+    /// What the successor of a process takes over.
+    pub fn heritage(&mut self, role: &str) -> Heritage {
         match role {
-            "servo" if self.stood.armed => Heritage {
-                latched: self.stood.servo_faults | Fault::ServoRestarted.bit(),
-                tripped: self.stop_of_now(),
-            },
-            "servo" => Heritage { latched: self.stood.servo_faults, tripped: self.tripped },
+            "servo" => {
+                self.servo_ended();
+                Heritage { latched: self.stood.servo_faults, tripped: self.tripped }
+            }
             "controller" => Heritage { latched: self.stood.controller_faults, tripped: Trip::default() },
             _ => Heritage::default(),
         }
     }
 
-    /// The servo has ended: its successor starts disarmed.
+    /// The servo has ended: its successor starts disarmed, and if it was armed, that is a stop nobody asked for. It is as old
+    /// as the servo's last word: where the whole service died, that is long before anybody is told.
     pub fn servo_ended(&mut self) {
         if self.stood.armed {
-            self.tripped = self.stop_of_now();
+            self.tripped = self.last_word();
             self.stood.servo_faults |= Fault::ServoRestarted.bit();
-            self.note_latched();
+            let heard = self.stood.heard.clone();
+            self.note_latched(heard.as_deref());
         }
         self.stood.armed = false;
     }
 
-    /// What the thruster did when it was last heard, as a stop of this instant.
-    fn stop_of_now(&self) -> Trip {
+    /// What the thruster did just before a process of it ended while it was armed: by now that end may have stopped it.
+    pub fn driven_till_now(&self) -> Option<Before> {
+        let Stood { armed, servo_faults, controller_faults, thrust_n, shaft_speed_rad_s, driven, .. } =
+            &self.stood;
+        let stopped =
+            servo_faults | controller_faults != 0 && self.armed_at.is_some_and(|at| at.elapsed() < JUST_NOW);
+        if *armed {
+            return Some(Before { thrust_n: *thrust_n, shaft_speed_rad_s: *shaft_speed_rad_s });
+        }
+        driven.filter(|_| stopped)
+    }
+
+    /// What the thruster did when it was last heard, as a stop of then.
+    fn last_word(&self) -> Trip {
+        let heard = self.stood.heard.as_deref().and_then(|time| humantime::parse_rfc3339(time).ok());
+        let ago = heard.and_then(|time| SystemTime::now().duration_since(time).ok()).unwrap_or_default();
+        let ago_ns = u64::try_from(ago.as_nanos()).unwrap_or(u64::MAX);
         Trip {
-            at_ns: monotonic_ns(),
+            // Zero says that there was no stop; the machine itself may have been started since.
+            at_ns: monotonic_ns().saturating_sub(ago_ns).max(1),
             thrust_n: self.stood.thrust_n.unwrap_or(f64::NAN),
             shaft_speed_rad_s: self.stood.shaft_speed_rad_s.unwrap_or(f64::NAN),
             drive: f64::NAN,

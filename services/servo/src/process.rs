@@ -214,8 +214,9 @@ fn tick_until_stopped(
     loop {
         let (deadline_ns, missed) = ticker.wait();
         let woke_ns = monotonic_ns();
-        if stop.load(Ordering::Relaxed) {
-            servo.stop();
+        let ending = stop.load(Ordering::Relaxed);
+        if ending {
+            servo.end();
         }
         let shown = devices.show(At { now_ns: woke_ns, ticks: 1 + missed });
         // Requests are fetched first and acted upon last: by then every command is here that was sent before them.
@@ -241,7 +242,7 @@ fn tick_until_stopped(
         let _ = ports.telemetry.send(telemetry);
         ports.waker.wake();
         ticker.worked(woke_ns);
-        if stop.load(Ordering::Relaxed) {
+        if ending {
             devices.drive(woke_ns, None);
             return;
         }

@@ -130,8 +130,15 @@ impl Servo {
         self.before.drive = self.drive;
     }
 
-    /// Zero and disarmed at once; the process is about to end.
-    pub fn stop(&mut self) {
+    /// The process is about to end: the next tick is at zero, disarmed. An armed drive was not asked for that.
+    pub fn end(&mut self) {
+        if self.armed {
+            self.raised |= Fault::ServoRestarted.bit();
+        }
+    }
+
+    /// Zero and disarmed at once.
+    fn stop(&mut self) {
         self.armed = false;
         self.drive = 0.0;
     }
@@ -156,8 +163,12 @@ impl Servo {
             self.invalid = self.invalid.wrapping_add(1);
             return if self.armed { Fault::CommandInvalid.bit() } else { 0 };
         }
-        self.command = *command;
-        if sender == Fresh::NewSession && self.armed { Fault::ControllerRestarted.bit() } else { 0 }
+        let before = std::mem::replace(&mut self.command, *command);
+        let replaced = sender == Fresh::NewSession;
+        let ends = replaced || command.stop == Command::ENDS;
+        // Faults stop whoever has them latched: they do not go with it.
+        let forgets = replaced && before.stop == Command::STOPS && command.stop == 0;
+        if (self.armed && ends) || forgets { Fault::ControllerRestarted.bit() } else { 0 }
     }
 
     /// Acts on a request; `None` if it is not for the servo. One that is too old to be meant for now is refused, but

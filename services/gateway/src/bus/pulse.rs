@@ -1,7 +1,7 @@
 //! What wakes the bus before its next tick, and what tells it that the rest of the gateway lives.
 
 use std::sync::OnceLock;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::Thread;
 use std::time::{Duration, Instant};
 
@@ -28,6 +28,7 @@ impl Bell {
 pub struct Pulse {
     began: Instant,
     beat_ms: AtomicU64,
+    ended: AtomicBool,
 }
 
 impl Pulse {
@@ -38,7 +39,7 @@ impl Pulse {
 
     /// Beats now.
     pub fn new() -> Pulse {
-        Pulse { began: Instant::now(), beat_ms: AtomicU64::new(0) }
+        Pulse { began: Instant::now(), beat_ms: AtomicU64::new(0), ended: AtomicBool::new(false) }
     }
 
     /// The runtime beats.
@@ -46,8 +47,16 @@ impl Pulse {
         self.beat_ms.store(self.began.elapsed().as_millis() as u64, Ordering::Relaxed);
     }
 
+    /// It commands no more: the process is about to end.
+    pub fn end(&self) {
+        self.ended.store(true, Ordering::Relaxed);
+    }
+
     /// Did it beat lately?
     pub fn alive(&self) -> bool {
+        if self.ended.load(Ordering::Relaxed) {
+            return false;
+        }
         let last = Duration::from_millis(self.beat_ms.load(Ordering::Relaxed));
         self.began.elapsed().saturating_sub(last) < Pulse::LIFE
     }

@@ -69,12 +69,13 @@ impl Bridge {
         let faultless = telemetry.faults == 0 && self.latched.iter().all(|faults| faults.unwrap_or(0) == 0);
         if was && !armed && !self.disarm_asked && faultless {
             let id = &self.link.thruster.id;
-            self.link.events.tell(
-                EventKind::Disarmed,
-                Some(id),
-                "servo",
-                "disarmed: nobody commands it any more",
-            );
+            let led = self.link.thruster.desk().lease.current(Instant::now()).is_some();
+            let words = if led {
+                "disarmed, by none of this gateway's clients: the service stops, or another process asked for it"
+            } else {
+                "disarmed: nobody commands it any more"
+            };
+            self.link.events.tell(EventKind::Disarmed, Some(id), "servo", words);
         }
     }
 

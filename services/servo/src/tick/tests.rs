@@ -226,3 +226,46 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn an_end_that_nobody_asked_for_is_latched_with_what_was_before() {
+    // Its own.
+    let mut bench = Bench::armed();
+    bench.drive(3.0);
+    bench.servo.end();
+    assert_eq!(bench.drive(3.0), None);
+    assert_eq!(bench.servo.faults(), Fault::ServoRestarted.bit());
+    assert_eq!(bench.servo.telemetry(0, &Signals::UNKNOWN).tripped.drive, 3.0);
+    // The controller's; where the lease has ended the same command without its end is a stop in good order.
+    for (stop, faults) in [(Command::ENDS, Fault::ControllerRestarted.bit()), (Command::STOPS, 0)] {
+        let mut bench = Bench::armed();
+        bench.drive(3.0);
+        let last = Command { stop, ..bench.command(0.0) };
+        assert_eq!(bench.tick(Some(&last)), None);
+        assert_eq!(bench.servo.faults(), faults);
+    }
+    // Of one that is disarmed nobody asked anything.
+    let mut bench = Bench::new();
+    bench.servo.end();
+    let last = Command { stop: Command::ENDS, ..bench.command(0.0) };
+    bench.tick(Some(&last));
+    assert_eq!(bench.servo.faults(), 0);
+}
+
+#[test]
+fn a_controller_that_had_faults_latched_takes_none_of_them_along() {
+    for (first, second, faults) in [
+        (Command::STOPS, 0, Fault::ControllerRestarted.bit()),
+        (Command::STOPS, Command::STOPS, 0),
+        (Command::ENDS, 0, 0),
+        (0, 0, 0),
+    ] {
+        let mut bench = Bench::new();
+        let stopped = Command { stop: first, ..bench.command(0.0) };
+        bench.tick(Some(&stopped));
+        bench.session += 50 * MS;
+        let successor = Command { stop: second, ..bench.command(0.0) };
+        bench.tick(Some(&successor));
+        assert_eq!(bench.servo.faults(), faults, "{first}, {second}");
+    }
+}
