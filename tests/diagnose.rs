@@ -292,3 +292,22 @@ fn too_little_to_judge_is_said() {
     let report = diagnose(&[&steady], STAND, &[]);
     assert_ne!(report["verdict"], "explained", "{}", report["summary"]);
 }
+
+/// The noise of a current's sensor drives a model as a current does, and answers nothing.
+#[test]
+fn a_recording_of_a_thruster_at_rest_tells_nothing() {
+    let noise = |size: f64, seed: f64| {
+        move |k: usize, _: &str| {
+            (size * ((k as f64 * 12.9898 + seed).sin() * 43_758.545_3).fract()).to_string()
+        }
+    };
+    let columns = ["time_s", "current_a", "shaft_speed_rad_s", "thrust_n"];
+    let mut table = Table::read(clean()).keep(&columns);
+    for (column, size) in [("current_a", 0.03), ("shaft_speed_rad_s", 0.2), ("thrust_n", 0.8)] {
+        table = table.map(column, noise(size, size));
+    }
+    let report = diagnose(&[&table.save("at-rest.csv")], STAND, &[]);
+    assert_eq!(report["verdict"], "insufficient_data", "{}", report["summary"]);
+    let summary = report["summary"].as_str().unwrap();
+    assert!(summary.contains("nothing moves: current_a and what answers it"), "{summary}");
+}

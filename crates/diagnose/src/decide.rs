@@ -41,6 +41,8 @@ pub struct Circumstances {
     pub negligible: Vec<&'static str>,
     /// The recordings have too little in them.
     pub thin: bool,
+    /// Nothing moves in them.
+    pub still: bool,
     /// Members of the told set that do the same all the time: of one operating point they tell one number.
     pub steady: Vec<&'static str>,
     /// The simulation breaks down on the stated rig.
@@ -87,6 +89,7 @@ pub fn decide(explanations: &[Explanation], circumstances: &Circumstances) -> De
     let believed = |n: &Named| among_names(n.effect) >= BELIEVED && n.rivals.is_empty();
     let changes = |n: &Named| !circumstances.steady.contains(&n.effect);
     let verdict = if circumstances.broke_down
+        || circumstances.still
         // Steady data cannot part physics from parameters; that something changed in mid-run they show, and which
         // physics it could be.
         || circumstances.thin

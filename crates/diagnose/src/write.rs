@@ -123,12 +123,11 @@ impl<'a, 'p> Writer<'a, 'p> {
     }
 
     /// The report, and curves for its plots.
-    pub fn write(self, mut notes: Vec<String>, thin: Option<String>) -> (Report, Traces) {
+    pub fn write(self, mut notes: Vec<String>, thin: Option<kort_identify::thin::Thin>) -> (Report, Traces) {
         let (problem, options) = (self.problem, self.options);
         let baseline_full = self.residual(self.baseline);
         let last_full = self.residual(self.last);
-        let names = self.names_only();
-        let named_fit = self.search.fits.get(&names).unwrap_or(self.last);
+        let named_fit = self.search.fits.get(&self.names_only()).unwrap_or(self.last);
         let named_full = self.residual(named_fit);
         let whole = (self.excess(&baseline_full) - self.excess(&last_full)).max(1e-300);
         let left = (self.excess(&named_full) - self.excess(&last_full)).max(0.0) / whole;
@@ -138,6 +137,7 @@ impl<'a, 'p> Writer<'a, 'p> {
         let circumstances = Circumstances {
             negligible: negligible.iter().map(|n| n.0).collect(),
             thin: thin.is_some(),
+            still: thin.as_ref().is_some_and(|thin| thin.still),
             steady: left::steady(problem, self.last, &actions),
             broke_down: false,
             left,
@@ -244,8 +244,8 @@ impl<'a, 'p> Writer<'a, 'p> {
                 100.0 * everything
             ));
         }
-        if let (Some(why), Verdict::InsufficientData) = (&thin, decision.verdict) {
-            notes.insert(0, why.clone());
+        if let (Some(thin), Verdict::InsufficientData) = (&thin, decision.verdict) {
+            notes.insert(0, thin.why.clone());
         }
         notes.extend(negligible.iter().map(|(id, share)| words::negligible(id, *share)));
         notes.extend(words::strained(self.baseline));
@@ -267,7 +267,7 @@ impl<'a, 'p> Writer<'a, 'p> {
             remainder: remainder.as_ref(),
             next: next_experiment.as_ref(),
             baseline: &baseline,
-            thin: thin.as_deref(),
+            thin: thin.as_ref().map(|thin| thin.why.as_str()),
             alternatives: &alternatives,
         });
         let report = Report {

@@ -140,7 +140,7 @@ pub fn identify(
 ) -> Result<FitReport, DataError> {
     let Setup { mut problem, mut baseline, flagged, mut notes, thin, .. } =
         Setup::new(series, rig, options.model, options.criterion)?;
-    notes.extend(thin);
+    notes.extend(thin.map(|thin| thin.why));
     let typical = problem.scale.torque_n_m / problem.scale.shaft_speed_rad_s;
     open_friction(&mut baseline, rig, options.open_friction, typical);
     baseline = baseline.with_present(&options.with, &problem.scale);

@@ -31,4 +31,5 @@ pub mod simulate;
 mod smooth;
 pub mod spectrum;
 mod step;
+pub mod thin;
 pub use quadratic::{Minimum, Quadratic};

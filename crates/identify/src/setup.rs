@@ -17,6 +17,7 @@ use crate::readings;
 use crate::refuse;
 use crate::simulate::Problem;
 use crate::spectrum::median_interval;
+use crate::thin::{Thin, too_thin};
 
 /// Most steps of the fit that tells whether known effects are as stated.
 const STEPS: usize = 24;
@@ -34,7 +35,7 @@ pub struct Setup<'a> {
     /// Words from the checks.
     pub notes: Vec<String>,
     /// Why the recordings cannot tell anything, if so.
-    pub thin: Option<String>,
+    pub thin: Option<Thin>,
 }
 
 impl<'a> Setup<'a> {
@@ -133,7 +134,7 @@ impl<'a> Setup<'a> {
                     .into(),
             );
         }
-        let thin = too_thin(&recordings);
+        let thin = too_thin(&recordings, rig);
         let prescribed = recordings.iter().all(|p| p.driving == Driving::Speed);
         let stated = Parameters::stated(rig);
         let compared = |mut recordings: Vec<Prepared>| {
@@ -213,34 +214,6 @@ fn telling_column(series: &[Series], problem: &Problem, baseline: &Hypothesis) -
         most
     };
     names.into_iter().max_by(|a, b| follows(a).total_cmp(&follows(b)))
-}
-
-/// Fewest rows in all that noise can be learnt from.
-const FEWEST_ROWS: usize = 200;
-
-/// Recordings without enough change to tell anything.
-fn too_thin(recordings: &[Prepared]) -> Option<String> {
-    let samples: usize = recordings.iter().map(|r| r.time_s.len()).sum();
-    if samples < FEWEST_ROWS {
-        return Some(format!("{samples} rows in all are too few to learn the noise and hold data out"));
-    }
-    let changes: usize = recordings
-        .iter()
-        .map(|r| {
-            let top = r.command.iter().fold(0.0_f64, |m, c| m.max(c.abs()));
-            let mut at = r.command[0];
-            let mut moves = 0;
-            for c in &r.command {
-                if (c - at).abs() > 0.1 * top {
-                    moves += 1;
-                    at = *c;
-                }
-            }
-            moves
-        })
-        .sum();
-    (changes < 3)
-        .then(|| "the driving signal hardly changes: steady data cannot part physics from parameters".into())
 }
 
 /// One sample a step of the command, each just before the next: a table of settled points.
