@@ -8,6 +8,7 @@ use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssi
 
 use crate::dual::Dual;
 use crate::effects::{Context, Descriptor, Effect};
+use crate::plant::{Plant, Tick};
 
 /// `f64` or [`Dual`]: comparisons look at the value, arithmetic takes the derivatives along.
 ///
@@ -51,6 +52,12 @@ pub trait Real:
     fn same_slopes(self, other: Self) -> bool;
     /// An effect at work on these numbers.
     fn build(effect: &Descriptor, values: &[Self], context: &Context<Self>) -> Box<dyn Effect<Self>>;
+
+    /// Control ticks of a plant in these numbers. What is generic is compiled anew in every crate that says for which numbers;
+    /// through this, the plant's copies of its inner loop are compiled once, in this one.
+    fn advance(plant: &mut Plant<Self>, ticks: &[Tick], commands: Option<&[f64]>);
+    /// The loads of a plant in these numbers, and what its sensors show, in the state that it starts from.
+    fn settle(plant: &mut Plant<Self>);
 
     /// A function of this number, from its value and its slope.
     #[inline(always)]
@@ -167,6 +174,12 @@ impl Real for f64 {
     fn build(effect: &Descriptor, values: &[Self], context: &Context) -> Box<dyn Effect> {
         (effect.build.plain)(values, context)
     }
+    fn advance(plant: &mut Plant<Self>, ticks: &[Tick], commands: Option<&[f64]>) {
+        plant.advance(ticks, commands);
+    }
+    fn settle(plant: &mut Plant<Self>) {
+        plant.settle();
+    }
 }
 
 impl Real for Dual {
@@ -187,5 +200,11 @@ impl Real for Dual {
     }
     fn build(effect: &Descriptor, values: &[Self], context: &Context<Self>) -> Box<dyn Effect<Self>> {
         (effect.build.dual)(values, context)
+    }
+    fn advance(plant: &mut Plant<Self>, ticks: &[Tick], commands: Option<&[f64]>) {
+        plant.advance(ticks, commands);
+    }
+    fn settle(plant: &mut Plant<Self>) {
+        plant.settle();
     }
 }

@@ -26,6 +26,7 @@ pub use state::{Balance, Course, Drive, Driven, Local, Sensed, Tick};
 use friction::Rub;
 use measuring::{Counted, Filters, Way};
 use rates::Constants;
+use state::each;
 use stiff::Slopes;
 use stiffness::Stiff;
 
@@ -254,7 +255,13 @@ impl<T: Real> Plant<T> {
         self.current_a = T::from(current_a);
         self.counted.came_to(angle_rad, shaft_speed_rad_s);
         self.filters.speed_rad_s = T::from(shaft_speed_rad_s);
-        self.at = self.local_at(&self.x, self.current_a, 0.0, &Tick { time_s, ..Tick::default() });
+        T::settle(self);
+    }
+
+    /// Loads and sensors in the state that is set.
+    pub(crate) fn settle(&mut self) {
+        let now = Tick { time_s: self.time_s, ..Tick::default() };
+        self.at = self.local_at(&self.x, self.current_a, 0.0, &now);
         let mut balance = Balance::default();
         self.rates::<true, true, STATES>(&self.x, &self.at, &mut balance);
         self.filters.last_thrust_n = balance.thrust_n + balance.stand_n;
@@ -263,7 +270,7 @@ impl<T: Real> Plant<T> {
         self.filters.torque_n_m = balance.blade_torque_n_m;
         self.true_thrust_n = balance.thrust_n;
         self.filters.angle_rad = self.encoded(self.x[ANGLE]);
-        self.show(&Tick { time_s, ..Tick::default() }, time_s);
+        self.show(&now, self.time_s);
     }
 
     /// What was commanded until the start, which a drive that remembers begins with; else it begins with the first
@@ -322,15 +329,15 @@ impl<T: Real> Plant<T> {
     /// half the cost, or a quarter of it where they are calm. A stiff plant takes linearly implicit steps.
     pub fn stride(&mut self, ticks: &[Tick], commands: Option<&[f64]>) {
         if self.stiff.is_none() && self.observer_rad_s == 0.0 {
-            return self.advance(ticks, commands);
+            return T::advance(self, ticks, commands);
         }
         for (k, tick) in ticks.iter().enumerate() {
-            self.advance(&ticks[k..=k], commands.map(|all| &all[k..=k]));
+            T::advance(self, &ticks[k..=k], commands.map(|all| &all[k..=k]));
             self.pull(tick);
         }
     }
 
-    fn advance(&mut self, ticks: &[Tick], commands: Option<&[f64]>) {
+    pub(crate) fn advance(&mut self, ticks: &[Tick], commands: Option<&[f64]>) {
         // Copies of the inner loop: the one without hooks keeps everything in registers, the others carry no
         // more states, and show no more of the blade, than somebody looks at.
         let blade = !self.inflow_hooks.is_empty() || !self.foil_hooks.is_empty();
@@ -382,15 +389,4 @@ impl<T: Real> Plant<T> {
             blade_torque_n_m: T::ZERO,
         }
     }
-}
-
-/// An array of what a function gives for each place. The standard library's `array::from_fn` is left as
-/// calls where numbers carry derivatives.
-#[inline(always)]
-fn each<T: Real, const N: usize>(of: impl Fn(usize) -> T) -> [T; N] {
-    let mut all = [T::ZERO; N];
-    for (i, one) in all.iter_mut().enumerate() {
-        *one = of(i);
-    }
-    all
 }

@@ -277,3 +277,14 @@ at_rest! {
         since_mean_rad_s2
     }
 }
+
+/// An array of what a function gives for each place. The standard library's `array::from_fn` is left as
+/// calls where numbers carry derivatives.
+#[inline(always)]
+pub(super) fn each<T: Real, const N: usize>(of: impl Fn(usize) -> T) -> [T; N] {
+    let mut all = [T::ZERO; N];
+    for (i, one) in all.iter_mut().enumerate() {
+        *one = of(i);
+    }
+    all
+}
