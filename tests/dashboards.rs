@@ -218,6 +218,10 @@ fn every_dashboard_of_the_service_is_answered_from_a_live_run() {
         for (path, dashboard) in dashboards().into_iter().filter(|(path, _)| !path.ends_with("soak.json")) {
             assert_all_answered(port, &dashboard, &path.display().to_string());
         }
+        // It rubs from the start: that is no change, and no agreement either.
+        let torque = number(port, r#"kort_mismatch_residual_ratio{thruster="t1",residual="torque"}"#);
+        assert!(torque > 0.05, "the torque that its rig does not know: {torque}");
+        assert_eq!(number(port, r#"sum(kort_mismatch_alarm{thruster="t1"})"#), 0.0);
         let value = number(port, r#"kort_thrust_newtons{thruster="t1"}"#);
         assert!((value - 60.0).abs() < 12.0, "Prometheus shows the thrust that is there: {value}");
         assert_eq!(

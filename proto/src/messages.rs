@@ -224,12 +224,14 @@ message! { "kort.ControllerState",
         laws: [Text<32>; LAWS],
         /// How many are used.
         law_count: u32,
-        /// Path that is off against the rig as stated, from 1 in the order of [`PATHS`]; zero without an alarm.
+        /// Path that has changed since what is usual was learnt, from 1 in the order of [`PATHS`]; zero without an alarm.
         mismatch_path: u32,
         /// How near each path is to an alarm, as [`PATHS`]: 1 is one; NaN while what is usual is learnt.
         mismatch_level: [f64; 5],
         /// Time since the mismatch began, s.
         mismatch_since_s: f64,
+        /// What it was off the rig as stated in the last minute of driving, as [`RESIDUALS`]; NaN before that is known.
+        mismatch_lately: [f64; 6],
         /// The loop's timing.
         timing: Timing,
     }
@@ -237,6 +239,10 @@ message! { "kort.ControllerState",
 
 /// Paths of a thruster that a mismatch is told of, by their names in a diagnosis.
 pub const PATHS: [&str; 5] = ["drive", "shaft", "blade", "flow", "sensor"];
+
+/// What a mismatch is seen in: shares of what the model expects, but for the last two, which are shares of the largest thrust and
+/// of the largest current.
+pub const RESIDUALS: [&str; 6] = ["current", "torque", "thrust", "flow", "thrust_at_rest", "current_late"];
 
 message! { "kort.Request",
     /// Gateway (or supervisor) to servo and controller. Whom the kind concerns answers with one [`Reply`]: arm, servo;

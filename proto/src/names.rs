@@ -2,7 +2,7 @@
 //! swapped fields would pass unnoticed: the name carries the version of the messages.
 
 /// Raised with every change to the layout or meaning of a message.
-pub const MESSAGES_VERSION: u32 = 5;
+pub const MESSAGES_VERSION: u32 = 6;
 
 /// One stream of one thruster.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

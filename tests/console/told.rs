@@ -38,18 +38,36 @@ fn nothing_is_offered_or_shown_that_is_not_so() {
         }
 
         // A chip that is orange has its words.
-        let told = |page: &mut Browser, level: Value, alarm: Value| -> String {
-            let mismatch = json!({"alarm": alarm, "since_s": 3.0, "paths": [{"path": "drive", "level": 0.0}, {"path": "shaft", "level": level}]});
+        let told = |page: &mut Browser, level: Value, alarm: Value, torque: f64| -> String {
+            let mismatch = json!({"alarm": alarm, "since_s": 3.0, "agrees": torque.abs() <= 0.05,
+                "residuals": [{"residual": "current", "share": 0.01}, {"residual": "torque", "share": torque}, {"residual": "flow", "share": null}],
+                "paths": [{"path": "drive", "level": 0.0}, {"path": "shaft", "level": level}]});
             let chip = "$('paths').children[1].className";
-            page.eval(&format!("(showPaths({mismatch}), $('mismatch-text').textContent + ' ' + {chip})"))
+            page.eval(&format!("(showPaths({mismatch}), [$('mismatch-text').textContent, $('agreement-text').textContent, {chip}].join(' '))"))
                 .as_str()
                 .unwrap()
                 .to_owned()
         };
-        let orange = told(&mut page, json!(0.72), Value::Null);
-        assert!(orange.contains("shaft path (70 %) may be off") && orange.contains("warn"), "{orange}");
-        assert!(told(&mut page, json!(0.2), Value::Null).contains("agrees with its rig"));
-        assert!(told(&mut page, json!(1.2), json!("shaft")).contains("The shaft path is off since"));
+        let orange = told(&mut page, json!(0.72), Value::Null, 0.0);
+        assert!(orange.contains("shaft path (70 %) may have changed") && orange.contains("warn"), "{orange}");
+        let well = told(&mut page, json!(0.2), Value::Null, 0.04);
+        assert!(
+            well.contains("No path has changed") && well.contains("was within 5 %") && well.ends_with("good"),
+            "{well}"
+        );
+        // What is off from the start is no change, and no agreement either.
+        let ever = told(&mut page, json!(0.0), Value::Null, 0.12);
+        assert!(
+            ever.contains("No path has changed")
+                && ever.contains("off its rig description: torque 12 % above."),
+            "{ever}"
+        );
+        assert!(!ever.contains("good") && !ever.contains("agrees"), "{ever}");
+        let off = told(&mut page, json!(1.2), json!("shaft"), -0.2);
+        assert!(
+            off.contains("The shaft path has changed since") && off.contains("torque 20 % below"),
+            "{off}"
+        );
 
         // A diagnosis that was cancelled takes nothing away from the one before.
         let list = json!([

@@ -1,4 +1,4 @@
-//! Mismatch between thruster and model while it runs: which path is off, and since when.
+//! Mismatch between thruster and model while it runs: which path has changed, and since when; and how far it is off.
 //!
 //! Beside every tick, from what is measured and commanded alone (not from an observer that would learn the mismatch
 //! away): the drive's current behind its lag, the shaft's torque balance, the blades' thrust in a flow that the
@@ -17,6 +17,9 @@
 //! other residuals would raise the other paths' sums too: they begin anew then, over the
 //! residuals that it leaves alone. So a second fault is found beside a first, where it shows in any of those.
 //!
+//! What is off from the start is learnt as usual and no sum rises of it: so beside the sums stands what each residual is
+//! lately against the rig as stated, learnt or not.
+//!
 //! An ambient flow that changes and is not measured is off the model's path too, and shows as `flow`.
 
 mod cusum;
@@ -25,7 +28,7 @@ use crate::model::ControlModel;
 use crate::signals::Measurement;
 
 pub use cusum::threshold;
-use cusum::{Cusum, Usual};
+use cusum::{Cusum, Lately, Usual};
 
 /// Where a mismatch is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,7 +69,7 @@ pub const LEARNT: u32 = 150;
 const EXCITED: f64 = 0.01;
 
 /// Residuals of a block.
-const RESIDUALS: usize = 6;
+pub const RESIDUALS: usize = 6;
 const DRIVE: usize = 0;
 const TORQUE: usize = 1;
 const THRUST: usize = 2;
@@ -89,6 +92,9 @@ pub struct Mismatch {
     pub since_s: f64,
     /// Mean and spread are still being learnt.
     pub learning: bool,
+    /// What each residual was in the last minute of driving, as a share of what the model expects: current, torque, thrust and
+    /// flow, thrust of a sensor at rest, and current that comes late. None before there was a block that says anything.
+    pub lately: [Option<f64>; RESIDUALS],
 }
 
 /// Sums of one block.
@@ -109,6 +115,7 @@ pub struct Monitor {
     threshold: f64,
     sums: Sums,
     usual: [Usual; RESIDUALS],
+    lately: [Lately; RESIDUALS],
     faults: [(Path, [f64; RESIDUALS]); FAULTS],
     cusums: [Cusum; FAULTS],
     flow_m_s: f64,
@@ -160,6 +167,7 @@ impl Monitor {
             threshold: threshold(alarms_per_day, FAULTS),
             sums: Sums::default(),
             usual: [Usual::default(); RESIDUALS],
+            lately: [Lately::default(); RESIDUALS],
             faults: [
                 (Path::Drive, one(DRIVE)),
                 (Path::Drive, one(LATE)),
@@ -296,8 +304,11 @@ impl Monitor {
             drives.then(|| sums.drive[2] / sums.ticks),
         ];
         let mut z = [None; RESIDUALS];
-        for ((x, usual), z) in block.into_iter().zip(&mut self.usual).zip(&mut z) {
+        for (((x, usual), lately), z) in
+            block.into_iter().zip(&mut self.usual).zip(&mut self.lately).zip(&mut z)
+        {
             let Some(x) = x else { continue };
+            lately.take(x);
             *z = usual.standardised(x);
             if z.is_none() {
                 usual.take(x);
@@ -362,7 +373,8 @@ impl Monitor {
         let last = (0..FAULTS).filter(|k| self.off[*k] > 0).max_by_key(|k| self.off[*k]);
         let alarm = last.map(|k| self.faults[k].0);
         let since_s = last.map_or(0.0, |k| self.cusums[k].level().1 + self.sums.time_s);
-        Mismatch { level, alarm, since_s, learning: self.learning() }
+        let lately = self.lately.map(|lately| lately.mean());
+        Mismatch { level, alarm, since_s, learning: self.learning(), lately }
     }
 }
 

@@ -16,6 +16,10 @@ const DT: f64 = 2e-3;
 /// Within which an effect of a few percent is to be found, s.
 const WITHIN_S: f64 = 90.0;
 
+/// Places of residuals.
+const CURRENT: usize = 0;
+const TORQUE: usize = 1;
+
 /// A thrust reference that wanders over levels and directions.
 fn reference(time_s: f64) -> Reference {
     let levels = [0.4, 0.6, 0.3, 0.15, -0.2, -0.45, -0.6, -0.3, 0.2, 0.5];
@@ -162,9 +166,23 @@ fn an_effect_of_a_few_percent_is_found_on_its_path() {
     }
 }
 
+/// The sums learn it as usual; what the residual is lately says it.
+#[test]
+fn what_is_off_from_the_start_raises_no_alarm_and_is_told_all_the_same() {
+    let mut watched = Watched::new();
+    watched.switch(&[("coulomb_friction", &[("coulomb_torque_n_m", 0.1 * 9.0 * 1.25)])], &[]);
+    assert_eq!(watched.run(2.2 * f64::from(LEARNT) * BLOCK_S), None);
+    let told = watched.l.controller.mismatch();
+    assert!(!told.learning && told.level.iter().all(|level| *level < 0.5), "{told:?}");
+    assert!(told.lately[TORQUE].unwrap() > 0.1, "{told:?}");
+    assert!(told.lately[CURRENT].unwrap().abs() < 0.05, "{told:?}");
+}
+
 #[test]
 fn a_clean_run_gives_no_alarm() {
     let mut watched = learnt();
+    let told = watched.l.controller.mismatch().lately;
+    assert!(told.iter().flatten().count() >= 4 && told.iter().flatten().all(|x| x.abs() < 0.05), "{told:?}");
     assert_eq!(watched.run(1500.0), None, "{:?}", watched.l.controller.mismatch());
 }
 

@@ -7,21 +7,33 @@ const diagnosesOf = () => `${base()}/diagnoses`;
 const says = (id, words) => { if ($(id).textContent !== words) $(id).textContent = words; }; // read aloud when it changes
 const percent = (share) => (share === null || share === undefined ? "–" : `${Math.round(100 * share)} %`);
 
-// A light for each path; ten times a second with the state would be read aloud ten times.
+// A light for each path, green only where all is within 5 % of the rig: no change since the start is no agreement. Ten times a second
+// with the state it would be read aloud ten times.
 function showPaths(mismatch) {
   const doubted = (mismatch?.paths ?? []).filter((path) => path.level >= 0.5);
   const words = !mismatch ? "The controller is away."
-    : mismatch.alarm ? `The ${mismatch.alarm} path is off since ${new Date(Date.now() - 1000 * mismatch.since_s).toLocaleTimeString()}.`
+    : mismatch.alarm ? `The ${mismatch.alarm} path has changed since ${new Date(Date.now() - 1000 * mismatch.since_s).toLocaleTimeString()}.`
     : mismatch.paths.some((path) => path.level === null) ? "What is usual is being learnt; it takes some minutes of driving."
-    : doubted.length ? `The ${doubted.map((path) => `${path.path} path (${Math.round(10 * path.level) * 10} %)`).join(" and the ")} may be off: at 100 % it is said to be.`
-    : "The thruster agrees with its rig description.";
+    : doubted.length ? `The ${doubted.map((path) => `${path.path} path (${Math.round(10 * path.level) * 10} %)`).join(" and the ")} may have changed: at 100 % it is said to have.`
+    : "No path has changed since it was learnt what is usual.";
   says("mismatch-text", words);
+  says("agreement-text", agreement(mismatch));
   const kinds = (mismatch ? mismatch.paths : []).map((path) =>
-    [path.path, path.level === null ? "" : mismatch.alarm === path.path || path.level >= 1 ? "bad" : path.level >= 0.5 ? "warn" : "good"]);
+    [path.path, path.level === null ? "" : mismatch.alarm === path.path || path.level >= 1 ? "bad" : path.level >= 0.5 ? "warn" : mismatch.agrees ? "good" : ""]);
   const shown = JSON.stringify(kinds);
   if ($("paths").dataset.shown === shown) return;
   $("paths").dataset.shown = shown;
   $("paths").replaceChildren(...kinds.map(([name, kind]) => Object.assign(document.createElement("span"), { className: `chip ${kind}`, textContent: name })));
+}
+
+// How far all is off the rig as stated, whether it was so from the start or not.
+const RESIDUALS = { current: "current", torque: "torque", thrust: "thrust", flow: "flow", thrust_at_rest: "thrust at rest (of the largest)", current_late: "current that comes late (of the largest)" };
+function agreement(mismatch) {
+  if (!mismatch || mismatch.agrees === null) return "";
+  if (mismatch.agrees) return "In the last minute of driving all that is measured was within 5 % of the rig description.";
+  const off = mismatch.residuals.filter(({ share }) => share !== null && Math.abs(share) > 0.05).sort((a, b) => Math.abs(b.share) - Math.abs(a.share));
+  const each = off.map(({ residual, share }) => `${RESIDUALS[residual]} ${percent(Math.abs(share))} ${share > 0 ? "above" : "below"}`);
+  return `In the last minute of driving the thruster was off its rig description: ${each.join(", ")}. A diagnosis says of what.`;
 }
 
 function showDiagnosis() {

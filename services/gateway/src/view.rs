@@ -1,6 +1,6 @@
 //! What the interface shows of a thruster: the JSON documents and their schemas.
 
-use kort_proto::messages::{ControllerState, PATHS};
+use kort_proto::messages::{ControllerState, PATHS, RESIDUALS};
 use kort_proto::signals::{ESTIMATES, Estimates, Kind, SIGNALS, Signals};
 use serde::ser::SerializeMap;
 use serde::{Deserialize, Serialize, Serializer};
@@ -46,7 +46,7 @@ pub struct ThrusterState {
     pub measured: Values,
     /// What observer and estimator believe.
     pub estimated: Estimated,
-    /// Which path is off against the rig as stated; null while the controller is away.
+    /// Which path has changed, and how far all is off the rig as stated; null while the controller is away.
     pub mismatch: Option<MismatchView>,
     /// The diagnosis of it that runs; null if none does.
     pub diagnosis: Option<DiagnosisStep>,
@@ -122,16 +122,35 @@ pub struct Estimated {
     pub parameters: Vec<ParameterEstimate>,
 }
 
-/// Mismatch between the thruster and its rig description while it runs.
+/// Mismatch between the thruster and its rig description while it runs: what has changed since it was learnt what is usual, and
+/// what is off, changed or not.
 #[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
 pub struct MismatchView {
     /// How near each path is to an alarm: 1 is one; null while it is learnt what is usual.
     pub paths: Vec<PathView>,
-    /// The path that is off: drive, shaft, blade, flow or sensor; null without an alarm.
+    /// The path that has changed: drive, shaft, blade, flow or sensor; null without an alarm.
     #[schema(example = "shaft")]
     pub alarm: Option<&'static str>,
     /// Time since it began, s; null without an alarm.
     pub since_s: Option<f64>,
+    /// How far it was off the rig as stated in the last minute of driving, also where it always was.
+    pub residuals: Vec<ResidualView>,
+    /// Is every residual that is known within [`AGREES`] of the rig as stated? Null before one is known.
+    pub agrees: Option<bool>,
+}
+
+/// Within so much of what the model expects the thruster is said to agree with its rig description. Less than most rigs state
+/// their coefficients to: what is beyond may still be within those tolerances, which a diagnosis tells.
+const AGREES: f64 = 0.05;
+
+/// What is seen of a mismatch in one signal.
+#[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
+pub struct ResidualView {
+    /// current, torque, thrust, flow, thrust_at_rest or current_late.
+    pub residual: &'static str,
+    /// Measured less expected, as a share of what the model expects (at rest of the largest thrust; late of the largest current,
+    /// negative where it lags); null before it is known.
+    pub share: Option<f64>,
 }
 
 /// A path and how near it is to an alarm.
@@ -152,7 +171,20 @@ impl MismatchView {
             .iter()
             .zip(state.mismatch_level)
             .map(|(path, value)| PathView { path, level: level(value) });
-        Self { paths: paths.collect(), alarm, since_s: alarm.map(|_| state.mismatch_since_s) }
+        let shares = state.mismatch_lately.map(|share| Some(share).filter(|share| share.is_finite()));
+        let mut known = shares.iter().flatten().peekable();
+        let agrees = known.peek().is_some().then(|| known.all(|share| share.abs() <= AGREES));
+        Self {
+            paths: paths.collect(),
+            alarm,
+            since_s: alarm.map(|_| state.mismatch_since_s),
+            residuals: RESIDUALS
+                .iter()
+                .zip(shares)
+                .map(|(residual, share)| ResidualView { residual, share })
+                .collect(),
+            agrees,
+        }
     }
 
     /// For the event log.
@@ -160,9 +192,9 @@ impl MismatchView {
         match self.alarm {
             Some(path) => {
                 let since_s = self.since_s.unwrap_or(0.0);
-                format!("the {path} path is off against the rig as stated since {since_s:.0} s")
+                format!("the {path} path has changed since it was learnt what is usual, {since_s:.0} s ago")
             }
-            None => "the thruster agrees with the rig as stated again".into(),
+            None => "every path is again as it was when it was learnt what is usual".into(),
         }
     }
 }

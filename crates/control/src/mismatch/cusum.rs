@@ -37,6 +37,27 @@ impl Usual {
     }
 }
 
+/// Blocks that what a residual is lately is averaged over: a minute of driving.
+const LATELY: u32 = 30;
+
+/// What a residual is lately: the mean of the first blocks, then an exponential one.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Lately {
+    n: u32,
+    mean: f64,
+}
+
+impl Lately {
+    pub(super) fn take(&mut self, x: f64) {
+        self.n = LATELY.min(self.n + 1);
+        self.mean += (x - self.mean) / f64::from(self.n);
+    }
+
+    pub(super) fn mean(&self) -> Option<f64> {
+        (self.n > 0).then_some(self.mean)
+    }
+}
+
 /// Two-sided CUSUM with the time since it last stood at zero.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Cusum {

@@ -36,6 +36,7 @@ impl Tick {
         state.mismatch_level = if mismatch.learning { [f64::NAN; 5] } else { mismatch.level };
         state.mismatch_path = mismatch.alarm.map_or(0, |path| path as u32 + 1);
         state.mismatch_since_s = mismatch.since_s;
+        state.mismatch_lately = mismatch.lately.map(|share| share.unwrap_or(f64::NAN));
         if let Some(setpoint) = self.setpoint {
             state.setpoint_kind = setpoint.kind as u32;
             state.setpoint_accepted = setpoint.value;

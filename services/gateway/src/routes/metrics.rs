@@ -10,7 +10,7 @@ use axum::http::header;
 use axum::response::IntoResponse;
 use kort_proto::faults::Fault;
 use kort_proto::limits::Limit;
-use kort_proto::messages::PATHS;
+use kort_proto::messages::{PATHS, RESIDUALS};
 use kort_proto::signals::Kind as SignalKind;
 use kort_proto::transport::Restarts;
 use prometheus::{TEXT_FORMAT, TextEncoder};
@@ -277,11 +277,22 @@ fn state(families: &mut Families, thruster: &Thruster, tally: &Tally) {
         for ((k, path), level) in PATHS.iter().enumerate().zip(state.mismatch_level) {
             let labels = [("thruster", id), ("path", *path)];
             let alarm = f64::from(u8::from(state.mismatch_path as usize == k + 1));
-            families.gauge("mismatch_alarm", "Is this path off against the rig as stated?", &labels, alarm);
+            families.gauge(
+                "mismatch_alarm",
+                "Has this path changed since it was learnt what is usual?",
+                &labels,
+                alarm,
+            );
             if level.is_finite() {
                 let words = "How near a path is to an alarm of mismatch: 1 is one.";
                 families.gauge("mismatch_level_ratio", words, &labels, level);
             }
+        }
+        for (residual, share) in RESIDUALS.iter().zip(state.mismatch_lately).filter(|(_, x)| x.is_finite()) {
+            let words =
+                "Measured less expected in the last minute of driving, of what the rig as stated expects.";
+            let labels = [("thruster", id), ("residual", *residual)];
+            families.gauge("mismatch_residual_ratio", words, &labels, share);
         }
         for parameter in state.parameters.iter().take(state.parameter_count as usize) {
             let labels =
