@@ -69,6 +69,18 @@ fn nothing_is_offered_or_shown_that_is_not_so() {
             "{off}"
         );
 
+        // A gateway that answers late: what is asked for twice meanwhile is asked once, and what is known is not shown twice.
+        page.eval("(() => { window.asked = 0; window.now = fetch; window.fetch = (url, ...how) => { if (!String(url).startsWith('/v1/events')) return now(url, ...how); asked += 1; return new Promise((on) => setTimeout(on, 2500)).then(() => now(url, ...how)); }; })()");
+        let anew =
+            "await eventsComing?.catch(() => {}); asked = 0; lastEvent = 0; $('events').replaceChildren()";
+        page.eval(&format!("(async () => {{ {anew}; await Promise.all([loadEvents(), loadEvents()]); window.first = [asked, $('events').children.length]; }})(); 0"));
+        page.until("window.first !== undefined");
+        let events = stack.get("/v1/events?limit=100").unwrap().as_array().unwrap().len();
+        assert_eq!(page.eval("first"), json!([1, events]));
+        page.eval(&format!("(async () => {{ {anew}; await Promise.all([newEvents(), newEvents()]); window.second = $('events').children.length; }})(); 0"));
+        page.until("window.second !== undefined");
+        assert_eq!(page.eval("(window.fetch = now, second)"), json!(events));
+
         // A diagnosis that was cancelled takes nothing away from the one before.
         let list = json!([
             {"id": "d1", "state": "done", "summary": "Rotational flow is missing.", "findings": [], "usable": false, "rig_revision": 1},

@@ -289,10 +289,13 @@ $("controller-file").addEventListener("change", async () => {
 });
 
 // Event log ------------------------------------------------------------------------------------------------
-let lastEvent = 0;
-async function loadEvents() {
+let lastEvent = 0, eventsComing = null;
+// One request at a time: two on their way at once would both bring what came since the last.
+function loadEvents() { return (eventsComing ??= newEvents().finally(() => { eventsComing = null; })); }
+async function newEvents() {
   const events = await call("GET", `/v1/events?limit=100${lastEvent ? `&since=${lastEvent}` : ""}`); // the newest first, then those after them
   for (const event of events) {
+    if (event.id <= lastEvent) continue; // shown already
     lastEvent = event.id;
     const item = document.createElement("li");
     item.textContent = `${new Date(event.time).toLocaleTimeString()}  ${event.thruster ?? "all"}  ${event.detail}`;
