@@ -57,6 +57,9 @@ fn plots_go_by_keyboard_to_the_end_of_both_runs_and_are_saved_whole() {
         press(&mut page, "Home");
         assert_eq!(page.eval(span), Value::Null);
 
+        moved_by_keyboard_and_mouse(&mut page);
+        page.eval("zoomTo(null, null)");
+
         page.eval(RUNS);
         page.until("charts[0].shown.endsWith('true|false') && charts[0].plot.data[0].at(-1) > 12.9");
         let b = "charts[0].plot.data[1 + charts[0].signals.length + charts[0].signals.findIndex((s) => s[0] === 'thrust_n')]";
@@ -91,6 +94,51 @@ fn plots_go_by_keyboard_to_the_end_of_both_runs_and_are_saved_whole() {
         page.picture(concat!(env!("CARGO_MANIFEST_DIR"), "/target/console-saved-390.png"));
         assert_eq!(page.errors, Vec::<String>::new());
     });
+}
+
+/// Zoom is asked for quicker than pictures come, and the window moves: by Shift with arrows, a drag or the wheel.
+fn moved_by_keyboard_and_mouse(page: &mut Browser) {
+    let window = |page: &mut Browser| -> [f64; 2] {
+        let told = page.eval("shownNow().slice(1)");
+        [told[0].as_f64().unwrap(), told[1].as_f64().unwrap()]
+    };
+    // Four keys between two pictures.
+    page.eval("['+', '+', '+', '-'].forEach((key) => charts[0].figure.dispatchEvent(new KeyboardEvent('keydown', { key, bubbles: true })))");
+    let [from, to] = window(page);
+    assert!((to - from - 7.5).abs() < 1e-6, "half, half, half and twice 30 s: {}", to - from);
+    page.eval("charts[0].figure.focus()");
+    for kind in ["keyDown", "keyUp"] {
+        page.call("Input.dispatchKeyEvent", json!({"type": kind, "key": "ArrowLeft", "modifiers": 8}));
+    }
+    let [moved, end] = window(page);
+    assert!(
+        (from - moved - 0.75).abs() < 1e-6 && (end - moved - 7.5).abs() < 1e-6,
+        "a tenth back: {moved}, {end}"
+    );
+    page.eval("charts[0].figure.scrollIntoView({ block: 'center' })");
+    let at = page.eval("(() => { const r = charts[0].plot.over.getBoundingClientRect(); return [r.left + r.width / 2, r.top + r.height / 2, r.width]; })()");
+    let [x, y, width] = [0, 1, 2].map(|k| at[k].as_f64().unwrap());
+    let [before, _] = window(page);
+    let mouse = |page: &mut Browser, kind: &str, x: f64, more: Value| {
+        let mut event = json!({"type": kind, "x": x, "y": y, "button": "left", "modifiers": 8});
+        event.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
+        page.call("Input.dispatchMouseEvent", event);
+    };
+    mouse(page, "mousePressed", x, json!({"clickCount": 1}));
+    mouse(page, "mouseMoved", x + 0.2 * width, json!({"buttons": 1}));
+    mouse(page, "mouseReleased", x + 0.2 * width, json!({"clickCount": 1}));
+    page.until(&format!("Math.abs(shownNow()[1] - {before} + 1.5) < 0.1"));
+    let [from, to] = window(page);
+    assert!((to - from - 7.5).abs() < 1e-6, "a drag with Shift is no zoom");
+    mouse(page, "mouseWheel", x, json!({"deltaX": 0, "deltaY": 0.1 * width}));
+    page.until(&format!("Math.abs(shownNow()[1] - {from} - 0.75) < 0.05"));
+    mouse(page, "mouseWheel", x, json!({"deltaX": 0, "deltaY": -100, "modifiers": 2}));
+    page.until("Math.abs(shownNow()[2] - shownNow()[1] - 6) < 1e-6");
+    // Not beyond what there is.
+    page.eval("for (let k = 0; k < 2000; k += 1) panBy(-0.5)");
+    let over = page.eval("live.t[0] - shownNow()[1]").as_f64().unwrap();
+    let whole = page.eval("wholeNow()[1] - shownNow()[1]").as_f64().unwrap();
+    assert!(over.abs() < 0.1 || whole.abs() < 1.0, "{over} {whole}");
 }
 
 #[test]

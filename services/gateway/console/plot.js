@@ -132,12 +132,14 @@ class Chart {
   constructor(unit) {
     this.unit = unit; this.title = TITLES[unit] ?? "estimated";
     this.signals = signalsOf(unit);
-    this.figure = Object.assign(document.createElement("figure"), { tabIndex: 0, ariaLabel: `${this.title} in ${unit}: arrows move the cursor, + and − zoom, Home shows the whole window` });
+    this.figure = Object.assign(document.createElement("figure"), { tabIndex: 0, ariaLabel: `${this.title} in ${unit}: arrows move the cursor, with Shift the window, + and − zoom, Home shows the whole window` });
     this.figure.setAttribute("role", "group");
     this.figure.addEventListener("keydown", (event) => this.key(event));
     this.box = Object.assign(document.createElement("div"), { id: IDS[unit] ?? `plot-${TITLES[unit] ?? unit.replace(/\W+/g, "-")}` });
     this.box.setAttribute("role", "img"); this.box.setAttribute("aria-label", this.title);
     this.figure.append(this.box);
+    this.box.addEventListener("mousedown", (event) => this.drag(event), true); // before uPlot, which begins to choose a stretch
+    this.box.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
     new ResizeObserver(() => this.fit()).observe(this.figure);
   }
   fit() { const width = this.figure.clientWidth - 16; if (this.plot && width > 0 && width !== this.plot.width) this.plot.setSize({ width, height: 210 }); }
@@ -145,20 +147,39 @@ class Chart {
   key(event) {
     const steps = { ArrowLeft: -1, ArrowRight: 1 }[event.key], closer = { "+": 0.5, "=": 0.5, "-": 2, "−": 2 }[event.key];
     if (event.ctrlKey || event.metaKey || event.altKey || !this.plot) return;
-    if (steps) {
+    if (steps && event.shiftKey) {
+      panBy(steps / 10);
+    } else if (steps) {
       const width = this.plot.over.clientWidth, now = this.plot.cursor.left >= 0 ? this.plot.cursor.left : width;
-      const left = Math.max(0, Math.min(width, now + steps * width / (event.shiftKey ? 10 : 100)));
+      const left = Math.max(0, Math.min(width, now + steps * width / 100));
       this.plot.setCursor({ left, top: this.plot.over.clientHeight / 2 }, true, true);
       const { idx } = this.plot.cursor;
       const said = this.plot.series.flatMap((series, k) => (series.show && k > 0 ? [`${series.label} ${text(this.plot.data[k][idx], 2)}`] : []));
       says("cursor-text", `${text(this.plot.data[0][idx], 2)} s: ${said.join(", ")} ${this.unit}`);
     } else if (closer) {
-      const { min, max } = this.plot.scales.x, { left } = this.plot.cursor, from = left >= 0 ? this.plot.posToVal(left, "x") : (min + max) / 2;
-      const [, whole_from, whole_to] = wholeNow(), [low, high] = [from - (from - min) * closer, from + (max - from) * closer];
-      if (high - low >= whole_to - whole_from) zoomTo(null, null); else zoomTo(low, high);
+      const { left } = this.plot.cursor;
+      zoomBy(closer, left >= 0 ? left / this.plot.over.clientWidth : 0.5);
     } else if (event.key === "Home" || event.key === "0") {
       zoomTo(null, null);
     } else { return; }
+    event.preventDefault();
+  }
+  // What is held stays under the hand.
+  drag(event) {
+    if (event.button !== 0 || !event.shiftKey || !this.plot?.over.contains(event.target)) return;
+    event.stopPropagation(); event.preventDefault();
+    let at = event.clientX;
+    const width = this.plot.over.clientWidth, to = (moved) => { panBy((at - moved.clientX) / width); at = moved.clientX; };
+    document.addEventListener("mousemove", to);
+    document.addEventListener("mouseup", () => document.removeEventListener("mousemove", to), { once: true });
+  }
+  // Sideways the window moves; with Ctrl (two fingers on a pad send the same) it zooms. A wheel alone is the page's.
+  wheel(event) {
+    if (!this.plot) return;
+    const over = this.plot.over.getBoundingClientRect(), by = event.deltaX || (event.shiftKey ? event.deltaY : 0);
+    if (event.ctrlKey && event.deltaY) zoomBy(event.deltaY < 0 ? 0.8 : 1.25, Math.min(1, Math.max(0, (event.clientX - over.left) / over.width)));
+    else if (by) panBy(by / over.width);
+    else return;
     event.preventDefault();
   }
   // Series: each signal of run A and of run B; what is compared is dashed.
@@ -252,6 +273,18 @@ let zoomed = null; // [from_s, to_s], or none: the usual window
 function zoomTo(from_s, to_s) {
   zoomed = from_s === null ? null : [from_s, to_s];
   document.getElementById("zoom-out").disabled = !zoomed;
+}
+// By the window that is asked for, not by what was drawn last: keys and wheels are quicker than pictures.
+function zoomBy(closer, share) {
+  const [, from_s, to_s] = shownNow(), [, whole_from, whole_to] = wholeNow(), at_s = from_s + share * (to_s - from_s), span_s = (to_s - from_s) * closer;
+  if (span_s >= whole_to - whole_from) zoomTo(null, null); else zoomTo(at_s - share * span_s, at_s + (1 - share) * span_s);
+}
+// Moves the window by a share of its length, as far as there is something to see.
+function panBy(share) {
+  const [{ a, b }, from_s, to_s] = shownNow(), [, whole_from, whole_to] = wholeNow(), span_s = to_s - from_s;
+  const first_s = Math.min(whole_from, a.t[0] ?? whole_from), last_s = Math.max(whole_to, a.t.at(-1) ?? whole_to, b?.t.at(-1) ?? whole_to);
+  const begin_s = Math.max(first_s, Math.min(last_s - span_s, from_s + share * span_s));
+  if (Math.abs(begin_s - from_s) > 1e-6 * span_s) zoomTo(begin_s, begin_s + span_s);
 }
 
 // What is shown, as a table and as a picture.
