@@ -179,3 +179,49 @@ fn every_signal_of_the_stream_can_be_plotted() {
         assert_eq!(page.errors, Vec::<String>::new());
     });
 }
+
+/// What observer and estimator said before the page was opened, and while a recording was made, is in the plots as what they say now.
+#[test]
+fn estimates_are_shown_of_the_minutes_before_and_of_recordings() {
+    common::in_real_time(|| {
+        let mut stack = Stack::start();
+        let Some(mut page) = open(&stack) else { return };
+        page.eval("call('POST', '/v1/recordings', { name: 'held' }).then(() => { window.begun = true; }); 0");
+        page.until("window.begun");
+        stack.thrust(40.0, 30_000);
+        std::thread::sleep(std::time::Duration::from_secs(4));
+        page.eval("call('DELETE', '/v1/recordings/held').then(() => { window.ended = true; }); 0");
+        page.until("window.ended");
+        // Opened anew: nothing of it has come by the stream.
+        page.eval("window.old = true; location.reload()");
+        page.until("window.old === undefined && document.readyState === 'complete' && typeof state !== 'undefined' && state !== null");
+        page.until("live.t.at(-1) - live.t[0] > 3 && live.t.length > 120");
+        // Every estimate that the stream has a value of, and its doubt, has one in each second before the first state that came.
+        let told = "[...state.estimated.parameters.filter((p) => p.value !== null).map((p) => `estimated_${p.name}`), 'estimated_flow_low', 'estimated_flow_high']";
+        let holes = |of: &str| {
+            format!(
+                "{told}.filter((name) => [0, 1, 2].some((s) => !{of}.t.some((t, i) => t >= {of}.t[0] + 0.5 + s && t < {of}.t[0] + 1.5 + s && {of}.of(name)[i] !== null)))"
+            )
+        };
+        assert!(page.eval(&format!("{told}.length")).as_u64().unwrap() > 6);
+        assert_eq!(page.eval(&holes("live")), json!([]), "the minutes before");
+        page.until(
+            "[...document.querySelectorAll('#recordings button')].some((b) => b.ariaLabel === 'show held')",
+        );
+        page.eval("[...document.querySelectorAll('#recordings button')].find((b) => b.ariaLabel === 'show held').click()");
+        page.until("run !== null && run.a.t.length > 100");
+        assert_eq!(page.eval(&holes("run.a")), json!([]), "the recording");
+        // As it was: near the sensor, at the same instants.
+        let apart = "Math.max(...run.a.t.map((t, i) => [t, run.a.of('estimated_thrust_n')[i], run.a.of('thrust_n')[i]]).filter(([t, a, b]) => t > 2 && a !== null && b !== null).map(([, a, b]) => Math.abs(a - b)))";
+        let newton = page.eval(apart).as_f64().unwrap();
+        assert!(newton < 12.0, "{newton}");
+        for (theme, width) in [("light", 1280), ("dark", 390)] {
+            page.show_as(theme, width);
+            page.picture(&format!(
+                "{}/target/console-estimates-{theme}-{width}.png",
+                env!("CARGO_MANIFEST_DIR")
+            ));
+        }
+        assert_eq!(page.errors, Vec::<String>::new());
+    });
+}

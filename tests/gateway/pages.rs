@@ -50,6 +50,7 @@ fn the_openapi_document_names_every_route_and_each_answers() {
             "/v1/thrusters/{id}/controller",
             "/v1/thrusters/{id}/excitation",
             "/v1/thrusters/{id}/history",
+            "/v1/recordings/{name}/estimates",
             "/v1/thrusters/{id}/stream",
             "/v1/thrusters/{id}/rig",
             "/v1/thrusters/{id}/rig/rollback",

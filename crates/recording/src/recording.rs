@@ -96,6 +96,16 @@ impl Recording {
             .map_err(|problem| RecordingError::new(name, problem))
     }
 
+    /// The states that a live recording holds beside its signals, JSON objects, each with its time on the axis of `time_s`, s.
+    ///
+    /// # Errors
+    /// The file cannot be opened or is no MCAP; `path` stands in it.
+    pub fn states(path: &Path, take: impl FnMut(f64, &[u8])) -> Result<(), RecordingError> {
+        let name = path.display().to_string();
+        let input = BufReader::with_capacity(1 << 16, Self::open(path)?);
+        formats::states(input, take).map_err(|problem| RecordingError::new(&name, problem))
+    }
+
     /// Values of a column, if it is there.
     pub fn column(&self, name: &str) -> Option<&[f64]> {
         self.columns.iter().find(|c| c.name == name).map(|c| c.values.as_slice())

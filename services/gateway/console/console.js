@@ -89,19 +89,13 @@ function connect() {
 }
 
 function record(s) {
-  const set = s.setpoint || {}, cmd = s.commanded || {}, est = s.estimated, sides = {}, more = {};
-  for (const [name, of] of [["thrust_n", "thrust"], ["flow_m_s", "flow"], ["ambient_m_s", "ambient"]]) { // one standard error, where the observer has one
-    const doubt = est.parameters.find((p) => p.name === name)?.std_error ?? null;
-    if (doubt !== null && est[name] !== null) { sides[`estimated_${of}_low`] = est[name] - doubt; sides[`estimated_${of}_high`] = est[name] + doubt; }
-  }
-  for (const p of est.parameters) { // what an observer or an estimator has beside these depends on the rig and the law
-    if (!(p.name in est)) { addSignal(`estimated_${p.name}`, p.unit, `${p.name.replaceAll("_", " ")}, estimated`); more[`estimated_${p.name}`] = p.value; }
-  }
-  for (const { path, level } of s.mismatch?.paths ?? []) { addSignal(`mismatch_${path}`, LEVEL, path); more[`mismatch_${path}`] = level; }
+  const set = s.setpoint || {}, cmd = s.commanded || {}, { parameters, ...est } = s.estimated;
+  const estimates = [...Object.entries(est).map(([name, v]) => [`estimated_${name}`, "", v]),
+    ...parameters.flatMap((p) => [...(p.name in est ? [] : [[`estimated_${p.name}`, p.unit, p.value]]), [`estimated_${p.name}${DOUBT}`, p.unit, p.std_error]]),
+    ...(s.mismatch?.paths ?? []).map(({ path, level }) => [`mismatch_${path}`, LEVEL, level])];
   const before_s = live.t[live.t.length - 1];
   if (s.time_s - before_s > HOLE_S) loadHistory(before_s, s.time_s).catch(() => {});
-  live.push(s.time_s, { ...s.measured, ...cmd, ...sides, ...more, thrust_cmd_n: set.thrust_n ?? cmd.thrust_cmd_n, speed_cmd_rad_s: set.speed_rad_s ?? cmd.speed_cmd_rad_s,
-    estimated_thrust_n: est.thrust_n, estimated_flow_m_s: est.flow_m_s, estimated_ambient_m_s: est.ambient_m_s });
+  live.push(s.time_s, { ...s.measured, ...cmd, ...estimatesRow(estimates), thrust_cmd_n: set.thrust_n ?? cmd.thrust_cmd_n, speed_cmd_rad_s: set.speed_rad_s ?? cmd.speed_cmd_rad_s });
 }
 
 function show() {

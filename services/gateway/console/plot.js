@@ -268,6 +268,33 @@ function addSignal(name, unit, label) {
   if (chart) { chart.signals = signalsOf(unit); if (chart.plot) chart.build(); } else charts.push(new Chart(unit));
   showPicker();
 }
+// Estimates of an instant, [name, unit, value], as a row of columns: what an observer or an estimator gives depends on the rig and the
+// law; of some it shows one standard error to both sides.
+const DOUBT = "_std_error", SIDES = { estimated_thrust_n: "estimated_thrust", estimated_flow_m_s: "estimated_flow", estimated_ambient_m_s: "estimated_ambient" };
+function estimatesRow(estimates) {
+  const row = {}, doubts = {};
+  for (const [name, unit, v] of estimates) {
+    if (name.endsWith(DOUBT)) { doubts[name.slice(0, -DOUBT.length)] = v; continue; }
+    if (name.startsWith("mismatch_")) addSignal(name, LEVEL, name.slice(9)); else addSignal(name, unit, `${name.slice(10).replaceAll("_", " ")}, estimated`);
+    row[name] = v;
+  }
+  for (const [name, side] of Object.entries(SIDES)) {
+    if ((doubts[name] ?? null) === null || (row[name] ?? null) === null) continue;
+    row[`${side}_low`] = row[name] - doubts[name]; row[`${side}_high`] = row[name] + doubts[name];
+  }
+  return row;
+}
+// What the gateway kept of them, as rows for instants that are asked for in their order: the newest, if it is not old.
+const ESTIMATE_OLD_S = 0.5;
+function estimatesAt({ time_s, columns }) {
+  const all = Object.entries(columns);
+  let i = 0;
+  return (t) => {
+    while (i + 1 < time_s.length && time_s[i + 1] <= t + 1e-6) i += 1;
+    const there = time_s.length && time_s[i] <= t + 1e-6 && t - time_s[i] < ESTIMATE_OLD_S;
+    return there ? estimatesRow(all.map(([name, { unit, values }]) => [name, unit, values[i]])) : {};
+  };
+}
 const live = new Columns();
 let zoomed = null; // [from_s, to_s], or none: the usual window
 function zoomTo(from_s, to_s) {

@@ -3,17 +3,22 @@
 let run = null; // { a, b, names, at_s, playing, difference }, of two runs also what is drawn of them: { lines }
 
 async function fetchRun(name) {
-  const answer = await fetch(`/v1/recordings/${encodeURIComponent(name)}?format=csv`, { headers: token ? { Authorization: `Bearer ${token}` } : {} });
-  if (!answer.ok) { log(`recording ${name}: ${(await answer.json()).detail ?? answer.status}`, true); throw new Error(name); }
+  const asked = async (what) => {
+    const answer = await fetch(`/v1/recordings/${encodeURIComponent(name)}${what}`, { headers: token ? { Authorization: `Bearer ${token}` } : {} });
+    if (!answer.ok) { log(`recording ${name}: ${(await answer.json()).detail ?? answer.status}`, true); throw new Error(name); }
+    return answer;
+  };
+  const answer = await asked("?format=csv");
   const [head, ...rows] = (await answer.text()).split("\n").filter((line) => line), names = head.trim().split(",");
   const columns = new Columns(), every = Math.max(1, Math.ceil(rows.length / LIVE_POINTS));
+  const estimated = estimatesAt(await (await asked("/estimates")).json());
   // Of rows that are left out the values that stand in no other are kept: what is sampled seldom is not lost.
   let zero = null, row = {};
   rows.forEach((line, i) => {
     line.trim().split(",").forEach((cell, k) => { if (cell !== "") row[names[k]] = Number(cell); });
     if ((i + 1) % every) return;
     zero ??= row.time_s;
-    columns.push(row.time_s - zero, row);
+    columns.push(row.time_s - zero, { ...row, ...estimated(row.time_s) });
     row = {};
   });
   columns.done = true;
@@ -94,8 +99,8 @@ async function loadHistory(from_s, to_s) {
   const of = thruster, last_s = from_s === undefined ? 600 : Math.min(600, Math.ceil(state.time_s - from_s) + 2);
   const kept = await call("GET", `${base()}/history?last_s=${last_s}&hz=25`), part = new Columns(), names = Object.keys(kept.columns);
   if (of !== thruster) return;
-  const until_s = to_s ?? live.t[0] ?? Infinity;
-  kept.time_s.forEach((t, i) => { if (t > (from_s ?? -Infinity) && t < until_s) part.push(t, Object.fromEntries(names.map((name) => [name, kept.columns[name][i]]))); });
+  const until_s = to_s ?? live.t[0] ?? Infinity, estimated = estimatesAt(kept.estimates);
+  kept.time_s.forEach((t, i) => { if (t > (from_s ?? -Infinity) && t < until_s) part.push(t, { ...Object.fromEntries(names.map((name) => [name, kept.columns[name][i]])), ...estimated(t) }); });
   const place = lowerBound(live.t, until_s);
   for (const name in part.c) live.of(name);
   live.t.splice(place, 0, ...part.t);

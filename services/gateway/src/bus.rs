@@ -267,6 +267,9 @@ impl Bridge {
             self.ramping = state.limits & Limit::LeaseRamp.bit() != 0;
             self.tell_tripped(1, state.faults, None);
             self.tell_mismatch(state);
+            if let Some(telemetry) = &last {
+                self.link.ring.believe(telemetry.time_ns, state);
+            }
         }
         // Once the faults of both are known.
         if let Some(telemetry) = &last {

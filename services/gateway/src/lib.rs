@@ -18,6 +18,7 @@ mod diagnosis;
 mod durations;
 mod energy;
 mod error;
+mod estimates;
 mod events;
 mod excitation;
 mod extract;

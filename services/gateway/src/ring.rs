@@ -6,15 +6,18 @@ use std::collections::VecDeque;
 use std::io;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
-use kort_proto::messages::Telemetry;
+use kort_proto::messages::{ControllerState, Telemetry};
 use kort_proto::signals::Signals;
 use tokio::sync::oneshot;
 
+use crate::estimates::{Estimates, KeptEstimates};
 use crate::settings::DiagnosisLimits;
 use crate::thin::Thin;
 
 /// Rows that may wait: some seconds.
 const QUEUE: usize = 2048;
+/// So often estimates are kept, ns: as often as recordings keep them.
+const ESTIMATES_EVERY_NS: u64 = 100_000_000;
 
 /// A row: the servo's time on CLOCK_MONOTONIC, ns, and every signal.
 pub type Row = (u64, Signals);
@@ -42,8 +45,12 @@ impl Kept {
 /// What the ring's thread is given.
 enum Item {
     Row(Row),
+    /// What the controller says, at the servo's time.
+    State(Box<(u64, ControllerState)>),
     /// The rows of the last so many ns, please.
     Take(u64, oneshot::Sender<Vec<Row>>),
+    /// The estimates of the last so many ns, so many a second, please.
+    Estimates(u64, f64, oneshot::Sender<Estimates>),
 }
 
 /// The bus's end.
@@ -51,6 +58,8 @@ enum Item {
 pub struct Feed {
     thin: Thin,
     items: SyncSender<Item>,
+    /// When estimates were last handed over, on the servo's clock.
+    believed_ns: u64,
 }
 
 /// The end of whoever wants a copy.
@@ -67,10 +76,19 @@ pub fn start(limits: &DiagnosisLimits) -> io::Result<(Feed, Ring)> {
     let (items, inbox) = sync_channel(QUEUE);
     let (rows, span_ns) = (limits.ring_rows(), (limits.ring_time_s * 1e9) as u64);
     std::thread::Builder::new().name("ring".into()).spawn(move || keep(&inbox, rows, span_ns))?;
-    Ok((Feed { thin: Thin::new(limits.ring_rate_hz), items: items.clone() }, Ring { items }))
+    Ok((Feed { thin: Thin::new(limits.ring_rate_hz), items: items.clone(), believed_ns: 0 }, Ring { items }))
 }
 
 impl Feed {
+    /// What the controller says, at the servo's time; never waits.
+    pub fn believe(&mut self, time_ns: u64, state: &ControllerState) {
+        // An earlier time is another servo's clock.
+        if time_ns < self.believed_ns || time_ns - self.believed_ns >= ESTIMATES_EVERY_NS {
+            self.believed_ns = time_ns;
+            let _ = self.items.try_send(Item::State(Box::new((time_ns, *state))));
+        }
+    }
+
     /// A sample of the servo; never waits.
     pub fn take(&mut self, telemetry: &Telemetry) {
         if let Some(row) = self.thin.take(telemetry.time_ns, &telemetry.signals) {
@@ -88,10 +106,20 @@ impl Ring {
             Err(_) => Vec::new(),
         }
     }
+
+    /// The estimates of the last so many seconds, so many a second at most.
+    pub async fn estimates(&self, time_s: f64, hz: f64) -> Estimates {
+        let (answer, estimates) = oneshot::channel();
+        match self.items.try_send(Item::Estimates((time_s * 1e9) as u64, hz, answer)) {
+            Ok(()) => estimates.await.unwrap_or_default(),
+            Err(_) => Estimates::default(),
+        }
+    }
 }
 
 fn keep(inbox: &Receiver<Item>, most: usize, span_ns: u64) {
     let mut rows: VecDeque<Kept> = VecDeque::with_capacity(most);
+    let mut estimates = KeptEstimates::default();
     while let Ok(item) = inbox.recv() {
         match item {
             Item::Row(row) => {
@@ -104,6 +132,11 @@ fn keep(inbox: &Receiver<Item>, most: usize, span_ns: u64) {
                     rows.pop_front();
                 }
                 rows.push_back(Kept::new(&row));
+            }
+            Item::State(state) => estimates.take(state.0, &state.1, span_ns),
+            Item::Estimates(time_ns, hz, answer) => {
+                let from_ns = rows.back().map_or(0, |last| last.time_ns.saturating_sub(time_ns));
+                let _ = answer.send(estimates.since(from_ns, hz));
             }
             Item::Take(time_ns, answer) => {
                 let from_ns = rows.back().map_or(0, |last| last.time_ns.saturating_sub(time_ns));

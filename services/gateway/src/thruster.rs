@@ -386,7 +386,8 @@ fn finite(value: f64) -> Option<f64> {
     value.is_finite().then_some(value)
 }
 
-fn estimates(state: &ControllerState) -> Vec<ParameterEstimate> {
+/// What an estimator tells of its parameters.
+pub fn estimates(state: &ControllerState) -> Vec<ParameterEstimate> {
     (state.parameters.iter().take(state.parameter_count as usize))
         .map(|p| ParameterEstimate {
             name: p.name.as_str().to_owned(),

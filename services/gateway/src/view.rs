@@ -213,7 +213,7 @@ pub struct DiagnosisStep {
 }
 
 /// An estimated parameter.
-#[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct ParameterEstimate {
     /// Name.
     #[schema(example = "lift_max")]

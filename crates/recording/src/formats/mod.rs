@@ -61,6 +61,11 @@ fn decode_plain(name: &str, mut input: impl BufRead, map: Option<&ColumnMap>) ->
     }
 }
 
+/// The states of a live recording, see [`Recording::states`].
+pub(crate) fn states(input: impl io::Read, take: impl FnMut(f64, &[u8])) -> Result<(), Problem> {
+    mcap::states(input, take)
+}
+
 /// Reads a log as its messages: the values of the wanted sources, or the statistics of all.
 pub(crate) fn log(mut input: impl BufRead, wanted: Option<&[String]>) -> Result<Log, Problem> {
     let start = input.fill_buf().map_err(unreadable)?;

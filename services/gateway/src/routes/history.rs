@@ -10,6 +10,7 @@ use utoipa::{IntoParams, ToSchema};
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 use crate::App;
+use crate::estimates::Estimates;
 use crate::extract::{Path, Query};
 use crate::problem::{Kind, Problem};
 
@@ -50,9 +51,11 @@ struct History {
     time_s: Vec<f64>,
     /// Commands and measured signals by name, a value a row; null where it was not sampled.
     columns: BTreeMap<&'static str, Vec<Option<f64>>>,
+    /// What observer, estimator and the monitor of mismatch said meanwhile, ten times a second at most.
+    estimates: Estimates,
 }
 
-/// Commands and measured signals of the last minutes. What was never sampled has no column.
+/// Commands, measured signals and estimates of the last minutes. What was never sampled has no column.
 #[utoipa::path(get, path = "/v1/thrusters/{id}/history", tag = "thrusters",
     params(("id" = String, Path, description = "Name of the thruster", example = "t1"), HowMuch),
     responses(
@@ -72,7 +75,7 @@ async fn history(
             return Err(Problem::new(Kind::OutOfRange, words).hint("leave it out for the usual value"));
         }
     }
-    let mut rows = ring.last(last_s).await;
+    let (mut rows, estimates) = (ring.last(last_s).await, ring.estimates(last_s, hz).await);
     let (gap_ns, mut next_ns) = ((1e9 / hz) as u64, 0);
     rows.retain(|(at_ns, _)| {
         let due = *at_ns >= next_ns;
@@ -88,5 +91,6 @@ async fn history(
     Ok(axum::Json(History {
         time_s: rows.iter().map(|(at_ns, _)| *at_ns as f64 * 1e-9).collect(),
         columns: columns.filter(|(_, values)| values.iter().any(Option::is_some)).collect(),
+        estimates,
     }))
 }

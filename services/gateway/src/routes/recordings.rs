@@ -14,6 +14,7 @@ use utoipa::openapi::schema::{ArrayBuilder, ObjectBuilder, Schema, Type};
 use utoipa::{IntoParams, ToSchema};
 use utoipa_axum::{router::OpenApiRouter, routes};
 
+mod estimates;
 mod text;
 
 use crate::App;
@@ -27,7 +28,10 @@ pub const RATE_DEFAULT_HZ: f64 = 100.0;
 const RATE_MAX_HZ: f64 = 5000.0;
 
 pub fn routes() -> OpenApiRouter<Arc<App>> {
-    OpenApiRouter::new().routes(routes!(list, start, stop)).routes(routes!(fetch, tag, remove))
+    OpenApiRouter::new()
+        .routes(routes!(list, start, stop))
+        .routes(routes!(fetch, tag, remove))
+        .routes(routes!(estimates::estimates))
 }
 
 /// What to record. Every field may be left out where there is one thruster, and so may the whole body.
@@ -279,10 +283,7 @@ async fn fetch(
     let format = format.or(ending).unwrap_or(FileFormat::Mcap);
     let found = app.recorder().find(stem).map(|path| (path, stem));
     let (path, stem) =
-        found.or_else(|| Some((app.recorder().find(&name)?, name.as_str()))).ok_or_else(|| {
-            Problem::new(Kind::UnknownRecording, format!("there is no recording {name:?}"))
-                .hint("GET /v1/recordings lists them")
-        })?;
+        found.or_else(|| Some((app.recorder().find(&name)?, name.as_str()))).ok_or_else(|| unknown(&name))?;
     let save_as = format!("attachment; filename=\"{stem}.{}\"", format.ending());
     let (length, body) = match format {
         FileFormat::Csv => text::other(path, Format::Csv).await?,
@@ -305,6 +306,11 @@ async fn as_it_is(path: &std::path::Path) -> Result<(Option<usize>, Body), Probl
     let file = tokio::fs::File::open(path).await.map_err(|error| unreadable(path, error))?;
     let length = file.metadata().await.map_err(|error| unreadable(path, error))?.len();
     Ok((Some(length as usize), Body::from_stream(ReaderStream::new(file.take(length)))))
+}
+
+fn unknown(name: &str) -> Problem {
+    Problem::new(Kind::UnknownRecording, format!("there is no recording {name:?}"))
+        .hint("GET /v1/recordings lists them")
 }
 
 fn unreadable(path: &std::path::Path, error: impl std::fmt::Display) -> Problem {

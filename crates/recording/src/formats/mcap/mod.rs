@@ -1,6 +1,7 @@
 //! MCAP with JSON messages: one channel, one message a row, a field a column. A file of others may
 //! have several channels; their fields become columns over the common log time.
 
+mod beside;
 mod ended;
 mod messages;
 mod table;
@@ -15,6 +16,7 @@ use crate::error::Problem;
 use crate::map::ColumnMap;
 use crate::recording::Recording;
 
+pub(super) use beside::states;
 pub(super) use messages::log;
 use table::Table;
 pub use write::{Rows, schema};

@@ -6,6 +6,7 @@ use std::io::{self, Seek, Write};
 use mcap::records::MessageHeader;
 use serde_json::Value;
 
+use super::beside::SIGNALS;
 use super::ended::Ended;
 use super::{ABOUT, EVENT, LIBRARY, STATE};
 use crate::columns;
@@ -39,8 +40,7 @@ impl<W: Write + Seek> Rows<W> {
             .create(Ended::new(output)?)
             .map_err(cause)?;
         let schema = schema(columns).to_string();
-        let schema_id =
-            writer.add_schema("kort.recording/1", "jsonschema", schema.as_bytes()).map_err(cause)?;
+        let schema_id = writer.add_schema(SIGNALS, "jsonschema", schema.as_bytes()).map_err(cause)?;
         let topic = topic_of(topic);
         let channel_id = writer.add_channel(schema_id, &topic, "json", &BTreeMap::new()).map_err(cause)?;
         let columns = columns.iter().map(|c| c.to_string()).collect();
@@ -173,5 +173,5 @@ pub fn schema(columns: &[&str]) -> Value {
         .chain(columns)
         .map(|name| ((*name).to_string(), serde_json::json!({"type": "number", "description": about(name)})))
         .collect();
-    serde_json::json!({"type": "object", "title": "kort.recording/1", "properties": properties, "required": ["time_s"]})
+    serde_json::json!({"type": "object", "title": SIGNALS, "properties": properties, "required": ["time_s"]})
 }

@@ -34,12 +34,17 @@ const PART: usize = 64 << 10;
 /// A text, and the turn that ends with it.
 type Made = (Vec<u8>, SemaphorePermit<'static>);
 
+/// The turn of whoever makes something of a recording.
+pub async fn turn() -> Result<SemaphorePermit<'static>, Problem> {
+    timeout(TURN_WITHIN, TURN.acquire()).await.ok().and_then(Result::ok).ok_or_else(|| {
+        Problem::new(Kind::Overloaded, "other recordings are being made into CSV or Parquet, one at a time")
+            .hint("try again, or fetch the `.mcap`, which is sent as it is")
+    })
+}
+
 /// Length in bytes, where the text was made at once, and the text on its way.
 pub async fn other(path: PathBuf, format: Format) -> Result<(Option<usize>, Body), Problem> {
-    let turn = timeout(TURN_WITHIN, TURN.acquire()).await.ok().and_then(Result::ok).ok_or_else(|| {
-        Problem::new(Kind::Overloaded, "other recordings are being sent as CSV or Parquet, one at a time")
-            .hint("try again, or fetch the `.mcap`, which is sent as it is")
-    })?;
+    let turn = turn().await?;
     // The turn goes along: whoever asked may be gone before the text is made.
     let mut making = Box::pin(blocking(move || made(&path, format).map(|text| (text, turn))));
     match timeout(MADE_WITHIN, &mut making).await {
@@ -59,7 +64,7 @@ fn made(path: &Path, format: Format) -> Result<Vec<u8>, Problem> {
 }
 
 /// A recording that has just begun has no complete chunk, and one that a killed process left may have none at all.
-fn nothing_yet(error: impl std::fmt::Display) -> Problem {
+pub fn nothing_yet(error: impl std::fmt::Display) -> Problem {
     Problem::new(Kind::UnknownRecording, format!("nothing of it can be read: {error}"))
         .hint("a running recording is written within a second; as `.mcap` the file is sent as it is")
 }
