@@ -39,6 +39,40 @@ fn a_bag_in_sqlite_reads_as_the_same_bag_in_mcap() {
     assert_eq!(read(&write("wal.db3", &whole), "ros2:joint=1").rows(), 1000);
 }
 
+/// A vehicle's topics have names of its own: commands that say so are found; where there are none the map is named all the same, with
+/// what it lacks.
+#[test]
+fn the_map_of_ros_2_is_proposed_whatever_the_commands_are_called() {
+    let renamed = |file: &str, from: &str, to: &str| {
+        assert_eq!(from.len(), to.len(), "in place");
+        let mut whole = unpacked("ros2-two-thrusters.db3.gz");
+        let at = |whole: &[u8]| whole.windows(from.len()).position(|bytes| bytes == from.as_bytes());
+        while let Some(at) = at(&whole) {
+            whole[at..at + from.len()].copy_from_slice(to.as_bytes());
+        }
+        write(file, whole)
+    };
+    let log = renamed("own.db3", "forward_velocity_controller", "both_thrusters_of_the_craft");
+    let call = "ros2:command=both_thrusters_of_the_craft/commands,joint=0";
+    assert_eq!(shipped(&columns(&log)), [call]);
+    let recording = read(&log, call);
+    assert!(recording.column("speed_cmd_rad_s").is_some_and(|speed| speed.iter().any(|rad_s| *rad_s != 0.0)));
+
+    let log = renamed("none.db3", "controller/commands", "controller/measured");
+    let found = columns(&log);
+    assert!(shipped(&found).is_empty(), "{found}");
+    let part = &found["proposal"]["incomplete"][0];
+    assert_eq!(part["map"], "ros2:command=forward_velocity_controller/commands,joint=0");
+    assert_eq!(part["has"], serde_json::json!(["shaft_angle_rad", "shaft_speed_rad_s"]));
+    let lack = serde_json::json!([{"column": "speed_cmd_rad_s", "source": "forward_velocity_controller/commands.data[0]"}]);
+    assert_eq!(part["lacks"], lack);
+    let said = String::from_utf8(kort(&["columns", &log]).stdout).unwrap();
+    for words in ["a shipped map fits in part: ros2", "lacks  speed_cmd_rad_s: there is no forward_velocity"]
+    {
+        assert!(said.contains(words), "{words}: {said}");
+    }
+}
+
 /// Written by ROS 2 itself (rosbag2's own test file): messages of a type that the bag describes.
 #[test]
 fn a_bag_of_ros_2_itself_reads_by_its_own_descriptions() {

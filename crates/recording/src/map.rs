@@ -5,6 +5,7 @@ mod ask;
 mod read;
 mod shipped;
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use serde::Deserialize;
@@ -177,6 +178,40 @@ impl ColumnMap {
     pub(crate) fn example(name: &str) -> Option<Self> {
         let (_, text) = shipped::ALL.iter().find(|(n, _)| *n == name)?;
         Self::from_toml(name, text).ok()
+    }
+
+    /// A shipped map with another value in the place of one that it asks for: each that makes one of its sources one of these,
+    /// which its own example does not name.
+    pub(crate) fn answered<'s>(name: &str, sources: impl Iterator<Item = &'s str> + Clone) -> Vec<Self> {
+        let Some((_, text)) = shipped::ALL.iter().find(|(n, _)| *n == name) else { return Vec::new() };
+        let Some((given, templates)) = read::asks(name, text) else { return Vec::new() };
+        let mut maps: Vec<Self> = Vec::new();
+        for (key, usual) in &given {
+            let filled = |skip: &str, text: &str| {
+                let others = given.iter().filter(|(other, _)| other != skip);
+                others.fold(text.to_owned(), |text, (other, value)| {
+                    text.replace(&format!("{{{other}}}"), value)
+                })
+            };
+            let values = templates.iter().map(|template| filled(key, template)).flat_map(|template| {
+                let around = template.split_once(&format!("{{{key}}}"));
+                let around = around.map(|(before, behind)| (before.to_owned(), behind.to_owned()));
+                sources.clone().filter_map(move |source| {
+                    let (before, behind) = around.as_ref()?;
+                    Some(source.strip_prefix(before.as_str())?.strip_suffix(behind.as_str())?.to_owned())
+                })
+            });
+            let whole =
+                |value: &String| !value.is_empty() && !value.contains(['.', '[', ']', '{', '}', ',', '=']);
+            let values: BTreeSet<String> = values.filter(|value| value != usual && whole(value)).collect();
+            maps.extend(values.iter().filter_map(|value| {
+                let said = given
+                    .iter()
+                    .map(|(other, usual)| format!("{other}={}", if other == key { value } else { usual }));
+                read::map(name, text, Some(&Asked::parse(&said.collect::<Vec<_>>().join(",")))).ok()
+            }));
+        }
+        maps
     }
 
     /// A shipped map of a CAN bus for this node: the identifiers that it asks for are its example's, of that node. `None`

@@ -3,9 +3,10 @@
 pub(crate) mod join;
 pub(crate) mod propose;
 mod said;
+mod shipped;
 mod survey;
 
-pub use survey::{FieldSurvey, GapSurvey, Proposal, Survey, TopicSurvey, survey};
+pub use survey::{FieldSurvey, GapSurvey, Incomplete, Lack, Proposal, Survey, TopicSurvey, survey};
 
 /// A stamp that lies further than this behind its topic's newest begins the clock anew, s; less is disorder of the
 /// logger.

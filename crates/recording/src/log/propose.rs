@@ -1,13 +1,13 @@
 //! A column map for a log that nobody has mapped yet, from the names and units of its fields. It is shown, never used
 //! unasked: a name is a claim, and a person must check it.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use super::survey::Proposal;
-use super::{Field, Log, Topic, same_source};
+use super::{Field, Log, Topic, shipped};
 use crate::columns;
-use crate::map::{ColumnMap, Time};
+use crate::map::ColumnMap;
 use crate::units::{self, Unit};
 
 /// Fields chosen for a proposed map: (topic, field) and our column.
@@ -20,7 +20,7 @@ struct Rule {
     without: &'static [&'static str],
 }
 
-const ASKED: &[&str] =
+pub(super) const ASKED: &[&str] =
     &["cmd", "command", "ref", "reference", "set", "setpoint", "target", "desired", "goal"];
 const SUPPLY: &[&str] = &["supply", "bat", "battery", "in", "input", "bus", "dc"];
 
@@ -82,7 +82,7 @@ const ABOUT: &[&str] = &[
     "id",
 ];
 /// Words of what belongs to a drive: in a log of a whole vehicle a field without a unit must have one of them.
-const DRIVE: &[&str] = &[
+pub(super) const DRIVE: &[&str] = &[
     "esc",
     "motor",
     "motors",
@@ -112,7 +112,7 @@ const COMMANDS: &[(&str, &str)] = &[
 ];
 
 /// Words of a name: split at what is no letter, and where small letters become large.
-fn words(name: &str) -> Vec<String> {
+pub(super) fn words(name: &str) -> Vec<String> {
     let mut out = vec![String::new()];
     let mut small = false;
     for c in name.chars() {
@@ -204,70 +204,20 @@ fn fit(rule: &Rule, topic: &Topic, field: &Field) -> Option<(bool, usize, bool)>
 pub(super) fn propose(log: &Log) -> (Proposal, Chosen) {
     let table = log.topics.len() == 1 && log.topics[0].name.is_empty();
     let native = log.topics.iter().any(is_native);
-    let maps: Vec<ColumnMap> = if log.format == "candump" {
-        let ids = log
-            .topics
-            .iter()
-            .filter_map(|t| i32::from_str_radix(t.name.get(t.name.len().checked_sub(2)?..)?, 16).ok());
-        let nodes: BTreeSet<i32> = ids.flat_map(|id| [id, id & 0x7F]).collect();
-        let maps = ColumnMap::shipped()
-            .flat_map(|name| nodes.iter().filter_map(move |node| ColumnMap::of_node(name, *node)));
-        maps.filter(|map| map.sources().all(|(source, _)| on_bus(source, log))).collect()
-    } else {
-        ColumnMap::shipped()
-            .filter_map(|name| ColumnMap::example(name).filter(|map| suits(map, log, table)))
-            .collect()
-    };
+    let maps = shipped::fitting(log, table);
+    let incomplete = if native || table || !maps.is_empty() { Vec::new() } else { shipped::in_part(log) };
     let chosen = choose(log, table);
     let map = (!native && !chosen.is_empty()).then(|| toml(log, &chosen, table));
+    let without_response =
+        maps.iter().filter(|map| !shipped::responds(map, log)).map(ColumnMap::call).collect();
     let shipped = maps.iter().map(ColumnMap::call).collect();
-    let silent = maps.iter().filter(|map| !responds(map, log)).map(ColumnMap::call).collect();
-    (Proposal { native, shipped, without_response: silent, map }, if native { Chosen::new() } else { chosen })
+    let proposal = Proposal { native, shipped, without_response, incomplete, map };
+    (proposal, if native { Chosen::new() } else { chosen })
 }
 
 fn is_native(topic: &Topic) -> bool {
     let mut names = topic.fields.iter().map(|f| f.name.as_str());
     names.clone().any(|n| n == "time_s") && names.all(|n| columns::unit_missing(n).is_none())
-}
-
-/// Whether frames with this identifier are in the log of a bus, and are long enough for the number.
-fn on_bus(source: &str, log: &Log) -> bool {
-    let long_enough = || {
-        let (id, number) = source.split_once('.')?;
-        let (kind, at) = number.strip_suffix(']')?.split_once('[')?;
-        let bits: usize = kind.trim_matches(|c: char| !c.is_ascii_digit()).parse().ok()?;
-        let last = format!("u8[{}]", at.parse::<usize>().ok()? + bits / 8 - 1);
-        let mut frames = log.topics.iter().filter(|topic| topic.name.eq_ignore_ascii_case(id));
-        Some(frames.any(|topic| topic.fields.iter().any(|f| f.samples > 0 && f.name == last)))
-    };
-    long_enough().unwrap_or(false)
-}
-
-fn is_in(log: &Log, source: &str) -> bool {
-    let said = |topic: &Topic, f: &Field| f.samples + f.texts > 0 && same_source(&topic.source(f), source);
-    log.topics.iter().any(|topic| topic.fields.iter().any(|field| said(topic, field)))
-}
-
-/// Whether the map makes of this log a column that a model can be compared with.
-fn responds(map: &ColumnMap, log: &Log) -> bool {
-    const RESPONSES: [&str; 5] =
-        ["shaft_speed_rad_s", "shaft_angle_rad", "thrust_n", "torque_n_m", "flow_m_s"];
-    let mut columns = map.columns.iter().filter(|column| RESPONSES.contains(&column.name.as_str()));
-    columns.any(|column| !column.optional || is_in(log, &column.source))
-}
-
-/// Every source that the map must have is in the log.
-fn suits(map: &ColumnMap, log: &Log, table: bool) -> bool {
-    let there = |source: &str| is_in(log, source);
-    let stamps = match &map.time {
-        Time::Clock { .. } => !table,
-        Time::Column { source, .. } => table && there(source),
-        Time::Settled { .. } => table,
-    };
-    stamps
-        && map.select.as_ref().is_none_or(|select| there(&select.source))
-        && map.sources().all(|(source, optional)| optional || there(source))
-        && map.sources().any(|(source, _)| there(source))
 }
 
 fn choose(log: &Log, table: bool) -> Chosen {

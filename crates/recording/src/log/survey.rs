@@ -95,9 +95,31 @@ pub struct Proposal {
     pub shipped: Vec<String>,
     /// Those of them that give no measured response, for `kort convert`: there is nothing to compare a model with.
     pub without_response: Vec<String>,
+    /// Where no shipped map fits: those that some of the log would come in by, and what they lack.
+    pub incomplete: Vec<Incomplete>,
     /// A column map as TOML, made from names and units; to be checked by a person. None if nothing in the log looks
     /// like a column of kort.
     pub map: Option<String>,
+}
+
+/// A shipped map that has not all that it needs.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Incomplete {
+    /// As it stands behind `--columns`.
+    pub map: String,
+    /// Columns that it would make.
+    pub has: Vec<String>,
+    /// Columns that it must have, each with the source that is not in the log.
+    pub lacks: Vec<Lack>,
+}
+
+/// What a shipped map lacks.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Lack {
+    /// Our column.
+    pub column: String,
+    /// What it is made of.
+    pub source: String,
 }
 
 /// Reads a log and says what is in it; `name` stands in errors.

@@ -86,6 +86,13 @@ pub(super) fn map(name: &str, text: &str, asked: Option<&Asked>) -> Result<Colum
     })
 }
 
+/// What a map asks for with a value of each, and its sources before they are filled in.
+pub(super) fn asks(name: &str, text: &str) -> Option<(Vec<(String, String)>, Vec<String>)> {
+    let raw: RawMap = toml::from_str(text).ok()?;
+    let given = Given::new(name, &raw.ask, None).ok()?;
+    Some((given.into_pairs(), raw.columns.into_values().map(|column| column.source).collect()))
+}
+
 fn delimiter(map: &str, wanted: Option<&str>) -> Result<u8, MapError> {
     match wanted {
         None | Some(",") => Ok(b','),

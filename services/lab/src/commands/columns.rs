@@ -164,6 +164,12 @@ fn proposal(found: &Survey) -> String {
             writeln!(out, "a shipped map fits\n  kort diagnose {file} --rig RIG --columns {name}")
         };
     }
+    for part in &found.proposal.incomplete {
+        let _ = writeln!(out, "a shipped map fits in part: {}\n  has    {}", part.map, part.has.join(", "));
+        for lack in &part.lacks {
+            let _ = writeln!(out, "  lacks  {}: there is no {} in it", lack.column, lack.source);
+        }
+    }
     match &found.proposal.map {
         Some(map) => {
             out += "a map from the names in it, to be checked (-o MAP writes it):\n\n";
@@ -171,7 +177,10 @@ fn proposal(found: &Survey) -> String {
                 let _ = writeln!(out, "  {line}");
             }
         }
-        None if !found.proposal.native && found.proposal.shipped.is_empty() => {
+        None if !found.proposal.native
+            && found.proposal.shipped.is_empty()
+            && found.proposal.incomplete.is_empty() =>
+        {
             out += "nothing in it has the name of a signal of a thruster; docs/recordings.md shows how a map is written\n";
         }
         None => {}
