@@ -113,6 +113,17 @@ fn a_stranger_reads_the_file_of_a_killed_gateway_up_to_its_last_second() {
             assert!((-0.1..1.0).contains(&lost_s), "{topic}: the last {lost_s} s are missing");
         }
         assert!(read["topics"]["/events"]["messages"].as_u64() > Some(0), "{read}");
+        // What the fields are, and in which unit: of the signals, and of what stands beside them.
+        let fields = |topic: &str| read["topics"][topic]["fields"].clone();
+        let (rows, beside) = (fields("/t1"), fields("/t1/state"));
+        assert_eq!(rows["thrust_n"]["unit"], "N", "{rows}");
+        assert!(
+            rows["thrust_n"]["description"].as_str().is_some_and(|words| words.ends_with("[N]")),
+            "{rows}"
+        );
+        let flow = &beside["estimated"]["properties"]["flow_m_s"];
+        assert_eq!((&flow["type"], &flow["unit"]), (&json!("number"), &json!("m/s")), "{beside}");
+        assert_eq!(fields("/events")["detail"]["type"], "string");
         let state = &read["state"];
         assert_eq!(
             (&state["armed"], &state["setpoint"]["thrust_n"]),

@@ -17,7 +17,7 @@ mod recording;
 pub mod units;
 
 pub use error::{Place, Problem, RecordingError};
-pub use formats::{Format, LiveMcap, TOPIC, Writer, message_schema};
+pub use formats::{Format, LiveMcap, TOPIC, Writer, message_schema, state_schema};
 pub use log::{Survey, survey};
 pub use map::{ColumnMap, MapError};
 pub use recording::{Column, Gap, Recording, logs_in};

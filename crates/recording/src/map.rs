@@ -184,7 +184,9 @@ impl ColumnMap {
     /// which its own example does not name.
     pub(crate) fn answered<'s>(name: &str, sources: impl Iterator<Item = &'s str> + Clone) -> Vec<Self> {
         let Some((_, text)) = shipped::ALL.iter().find(|(n, _)| *n == name) else { return Vec::new() };
-        let Some((given, templates)) = read::asks(name, text) else { return Vec::new() };
+        let Some(read::Asks { given, sources: templates }) = read::asks(name, text) else {
+            return Vec::new();
+        };
         let mut maps: Vec<Self> = Vec::new();
         for (key, usual) in &given {
             let filled = |skip: &str, text: &str| {

@@ -148,6 +148,7 @@ fn take(subscribed: &mut BTreeMap<u32, usize>, text: &str) {
 fn channels(app: &App) -> Vec<Value> {
     let columns: Vec<&str> = SIGNALS.iter().map(|signal| signal.name).collect();
     let signals = kort_recording::message_schema(&columns).to_string();
+    let state = kort_recording::state_schema().to_string();
     let of = |id: usize, topic: String, name: &str, schema: &str| {
         json!({"id": id, "topic": topic, "encoding": "json", "schemaName": name, "schema": schema,
             "schemaEncoding": "jsonschema"})
@@ -155,7 +156,7 @@ fn channels(app: &App) -> Vec<Value> {
     let both = app.thrusters().iter().enumerate().flat_map(|(place, thruster)| {
         [
             of(2 * place, format!("/{}", thruster.id), "kort.recording/1", &signals),
-            of(2 * place + 1, format!("/{}/state", thruster.id), "kort.state/1", r#"{"type":"object"}"#),
+            of(2 * place + 1, format!("/{}/state", thruster.id), "kort.state/1", &state),
         ]
     });
     both.collect()

@@ -12,7 +12,7 @@ mod ros;
 mod stream;
 mod ulog;
 
-pub use mcap::{Rows as LiveMcap, schema as message_schema};
+pub use mcap::{Rows as LiveMcap, schema as message_schema, state_schema};
 
 use std::io::{self, BufRead, Seek, Write};
 use std::path::Path;

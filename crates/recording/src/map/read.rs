@@ -86,11 +86,19 @@ pub(super) fn map(name: &str, text: &str, asked: Option<&Asked>) -> Result<Colum
     })
 }
 
-/// What a map asks for with a value of each, and its sources before they are filled in.
-pub(super) fn asks(name: &str, text: &str) -> Option<(Vec<(String, String)>, Vec<String>)> {
+/// A map before it is filled in.
+pub(super) struct Asks {
+    /// What it asks for, with a value of each.
+    pub given: Vec<(String, String)>,
+    /// Its sources as they stand in the file.
+    pub sources: Vec<String>,
+}
+
+/// What a map asks for.
+pub(super) fn asks(name: &str, text: &str) -> Option<Asks> {
     let raw: RawMap = toml::from_str(text).ok()?;
-    let given = Given::new(name, &raw.ask, None).ok()?;
-    Some((given.into_pairs(), raw.columns.into_values().map(|column| column.source).collect()))
+    let given = Given::new(name, &raw.ask, None).ok()?.into_pairs();
+    Some(Asks { given, sources: raw.columns.into_values().map(|column| column.source).collect() })
 }
 
 fn delimiter(map: &str, wanted: Option<&str>) -> Result<u8, MapError> {

@@ -6,7 +6,8 @@ use std::io::Read;
 use mcap::records::Record;
 use serde_json::Value;
 
-use super::{STATE, records};
+use super::records;
+use super::schemas::{ROWS, STATE};
 use crate::error::Problem;
 
 /// Channels of a live recording, by what they are read for.
@@ -26,7 +27,7 @@ pub(crate) fn states(input: impl Read, mut take: impl FnMut(f64, &[u8])) -> Resu
             Record::Schema { header, .. } => drop(schemas.insert(header.id, header.name)),
             Record::Channel(channel) => match schemas.get(&channel.schema_id).map(String::as_str) {
                 Some(STATE) => drop(channels.insert(channel.id, Channel::States)),
-                Some(SIGNALS) => drop(channels.insert(channel.id, Channel::Signals)),
+                Some(ROWS) => drop(channels.insert(channel.id, Channel::Signals)),
                 _ => {}
             },
             Record::Message { header, data } => match (channels.get(&header.channel_id), origin_ns) {
@@ -46,6 +47,3 @@ pub(crate) fn states(input: impl Read, mut take: impl FnMut(f64, &[u8])) -> Resu
     })
     .map(drop)
 }
-
-/// Schema of the rows.
-pub(super) const SIGNALS: &str = "kort.recording/1";

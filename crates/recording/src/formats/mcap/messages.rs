@@ -9,7 +9,8 @@ use serde_json::Value;
 use super::super::cdr::Layout;
 use super::super::ros::Topic;
 use super::super::{ZSTD, ZSTD_MESSAGES};
-use super::{BESIDE, records};
+use super::records;
+use super::schemas::BESIDE;
 use crate::error::Problem;
 use crate::log::{Gather, Log};
 

@@ -4,6 +4,7 @@
 mod beside;
 mod ended;
 mod messages;
+mod schemas;
 mod table;
 mod write;
 
@@ -18,8 +19,9 @@ use crate::recording::Recording;
 
 pub(super) use beside::states;
 pub(super) use messages::log;
+pub use schemas::{rows as schema, state as state_schema};
 use table::Table;
-pub use write::{Rows, schema};
+pub use write::Rows;
 
 /// No record and no chunk of a sensible file is longer; a broken length must not eat the memory.
 const RECORD_LIMIT: usize = 1 << 30;
@@ -181,7 +183,3 @@ pub(super) fn decode(name: &str, input: impl Read, map: Option<&ColumnMap>) -> R
 const LIBRARY: &str = "kort ";
 /// Name of the metadata with what is known of a recording.
 const ABOUT: &str = "kort";
-/// Schemas of channels that stand beside the signals.
-const STATE: &str = "kort.state/1";
-const EVENT: &str = "kort.event/1";
-const BESIDE: [&str; 2] = [STATE, EVENT];

@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use mcap::records::Record;
 use serde_json::Value;
 
-use super::{ABOUT, BESIDE};
+use super::ABOUT;
+use super::schemas::BESIDE;
 use crate::assemble::{Assembler, Cell};
 use crate::error::{Place, Problem};
 use crate::map::ColumnMap;

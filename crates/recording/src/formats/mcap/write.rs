@@ -6,11 +6,9 @@ use std::io::{self, Seek, Write};
 use mcap::records::MessageHeader;
 use serde_json::Value;
 
-use super::beside::SIGNALS;
 use super::ended::Ended;
-use super::{ABOUT, EVENT, LIBRARY, STATE};
-use crate::columns;
-use crate::units;
+use super::schemas::{self, EVENT, ROWS, STATE};
+use super::{ABOUT, LIBRARY};
 
 /// Size of a chunk before compression, bytes.
 const CHUNK_BYTES: u64 = 128 * 1024;
@@ -39,8 +37,8 @@ impl<W: Write + Seek> Rows<W> {
             .disable_seeking(true)
             .create(Ended::new(output)?)
             .map_err(cause)?;
-        let schema = schema(columns).to_string();
-        let schema_id = writer.add_schema(SIGNALS, "jsonschema", schema.as_bytes()).map_err(cause)?;
+        let schema = schemas::rows(columns).to_string();
+        let schema_id = writer.add_schema(ROWS, "jsonschema", schema.as_bytes()).map_err(cause)?;
         let topic = topic_of(topic);
         let channel_id = writer.add_channel(schema_id, &topic, "json", &BTreeMap::new()).map_err(cause)?;
         let columns = columns.iter().map(|c| c.to_string()).collect();
@@ -61,13 +59,13 @@ impl<W: Write + Seek> Rows<W> {
     ) -> io::Result<Self> {
         let mut rows = Self::create(topic, columns, output)?;
         rows.about(about)?;
-        let object = br#"{"type":"object"}"#;
-        let mut channel = |schema: &str, topic: &str| -> io::Result<u16> {
-            let id = rows.writer.add_schema(schema, "jsonschema", object).map_err(cause)?;
+        let mut channel = |name: &str, schema: Value, topic: &str| -> io::Result<u16> {
+            let id =
+                rows.writer.add_schema(name, "jsonschema", schema.to_string().as_bytes()).map_err(cause)?;
             rows.writer.add_channel(id, topic, "json", &BTreeMap::new()).map_err(cause)
         };
-        let state = channel(STATE, &format!("{}/state", topic_of(topic)))?;
-        let event = channel(EVENT, "/events")?;
+        let state = channel(STATE, schemas::state(), &format!("{}/state", topic_of(topic)))?;
+        let event = channel(EVENT, schemas::event(), "/events")?;
         rows.beside = Some([state, event]);
         rows.origin_ns = origin_ns;
         Ok(rows)
@@ -161,17 +159,4 @@ fn cause(error: mcap::McapError) -> io::Error {
 
 fn topic_of(topic: &str) -> String {
     if topic.starts_with('/') { topic.to_string() } else { format!("/{topic}") }
-}
-
-/// JSON schema of a message with these columns beside `time_s`, so that Foxglove lists the signals with unit and meaning.
-pub fn schema(columns: &[&str]) -> Value {
-    let about = |name: &str| match columns::find(name) {
-        Some(known) => format!("{} [{}]", known.meaning, known.unit),
-        None => units::of_column(name).map_or("1".into(), |u| u.symbol.to_string()),
-    };
-    let properties: serde_json::Map<String, Value> = std::iter::once(&"time_s")
-        .chain(columns)
-        .map(|name| ((*name).to_string(), serde_json::json!({"type": "number", "description": about(name)})))
-        .collect();
-    serde_json::json!({"type": "object", "title": SIGNALS, "properties": properties, "required": ["time_s"]})
 }
