@@ -47,6 +47,26 @@ fn every_shipped_scenario_runs() {
     assert!(seen >= 10, "{seen} scenarios");
 }
 
+/// What dies away is zero in the end, not the smallest number that there is.
+#[test]
+fn at_rest_a_recording_says_zero() {
+    let folder = tempfile::tempdir().unwrap();
+    let (scenario, out) = (folder.path().join("rest.toml"), folder.path().join("rest.csv"));
+    let rest = "name = \"rest\"\nwhat = \"up, and to rest\"\ncommand = \"share\"\n\n[[segments]]\nkind = \"hold\"\nvalue = 0.5\nduration_s = 3.0\n\n\
+        [[segments]]\nkind = \"hold\"\nvalue = 0.0\nduration_s = 200.0\n";
+    std::fs::write(&scenario, rest).unwrap();
+    for rig in ["speed-drive", "rosa-rotor", "tunnel-10kw"] {
+        good(&simulate(rig, scenario.to_str().unwrap(), &out, &[]));
+        let recording = Recording::read(&out, None).unwrap();
+        for column in &recording.columns {
+            let tiny = column.values.iter().find(|value| **value != 0.0 && value.abs() < 1e-30);
+            assert_eq!(tiny, None, "{rig}: {}", column.name);
+        }
+        let speed = recording.column("shaft_speed_rad_s").unwrap();
+        assert_eq!(speed.last(), Some(&0.0), "{rig}");
+    }
+}
+
 #[test]
 fn the_program_needs_no_folder_beside_it() {
     let folder = tempfile::tempdir().unwrap();

@@ -20,6 +20,10 @@ Array = npt.NDArray[np.float64]
 """One 64-bit float a row; NaN means "not sampled then"."""
 
 
+_SHOWN = 12
+"""Columns that a summary names."""
+
+
 class Gap(NamedTuple):
     """A stretch without rows."""
 
@@ -45,7 +49,7 @@ def known_columns() -> list[Column]:
     return [Column(*one) for one in _kort.known_columns()]
 
 
-@dataclass
+@dataclass(repr=False)
 class Recording:
     """Rows at strictly increasing instants, columns in SI units."""
 
@@ -65,6 +69,24 @@ class Recording:
     """Source columns that the column map does not take over."""
     gaps: list[Gap] = field(default_factory=list)
     """Stretches without rows, as found when it was read."""
+
+    def __repr__(self) -> str:
+        """A few lines: how much there is, of what, and what a user should know."""
+        rows = len(self)
+        span = f", {self.time_s[0]:.6g} to {self.time_s[-1]:.6g} s" if rows else ""
+        out = [f"Recording {self.name!r}: {rows} rows{span}"]
+        seen = {name: int(np.count_nonzero(~np.isnan(values))) for name, values in self.columns.items()}
+        named = [name if n == rows else f"{name} ({n} samples)" for name, n in seen.items()]
+        more = len(named) - _SHOWN
+        out.append(f"  columns: {', '.join(named[:_SHOWN]) or 'none'}{f' and {more} more' if more > 0 else ''}")
+        if self.about:
+            out.append(f"  about: {', '.join(self.about)}")
+        told: dict[str, list[Gap] | list[str]] = {"gaps": self.gaps, "notes": self.notes, "losses": self.losses}
+        told["unused"] = self.unused
+        counts = [f"{len(what)} in .{name}" for name, what in told.items() if what]
+        if counts:
+            out.append(f"  besides: {', '.join(counts)}")
+        return "\n".join(out)
 
     def __len__(self) -> int:
         """Rows."""
@@ -129,8 +151,9 @@ class Recording:
 
     @classmethod
     def of(cls, name: str, time_s: npt.ArrayLike, columns: Mapping[str, npt.ArrayLike]) -> Recording:
-        """A recording from anything numpy takes for numbers. Raises ``ValueError``, naming the column."""
-        return cls(name, _floats(name, "time_s", time_s), {c: _floats(name, c, v) for c, v in columns.items()})
+        """A recording from anything numpy takes for numbers. Raises ``ValueError``, naming the column, also where the time
+        does not increase from row to row."""
+        return cls(name, _increasing(name, time_s), {c: _floats(name, c, v) for c, v in columns.items()})
 
     def cut(self, from_s: float, to_s: float) -> Recording:
         """The rows from ``from_s`` to before ``to_s``, s on the recording's own clock; a view, no copy."""
@@ -156,6 +179,19 @@ class Recording:
         """Names of the columns, ``time_s`` first."""
         yield "time_s"
         yield from self.columns
+
+
+def _increasing(recording: str, time_s: npt.ArrayLike) -> Array:
+    found = _floats(recording, "time_s", time_s)
+    steps = np.diff(found)
+    if not np.all(steps > 0.0):
+        row = int(np.argmin(steps > 0.0))
+        raise ValueError(
+            f"{recording}: column time_s does not increase from row {row} to {row + 1}: {found[row]:g} to "
+            f"{found[row + 1]:g}; allowed: strictly increasing\nhint: sort the rows by time, leave out those that stand twice, "
+            "and take one run of a log whose clock begins anew"
+        )
+    return found
 
 
 def _floats(recording: str, name: str, values: npt.ArrayLike) -> Array:

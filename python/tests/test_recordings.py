@@ -16,6 +16,27 @@ def small() -> kort.Recording:
     return kort.Recording.of("small", T, {"current_a": [1.0, 2.0, math.nan, 4.0], "thrust_n": [0.0, 1.0, 4.0, 9.0]})
 
 
+def test_a_recording_is_printed_in_a_few_lines() -> None:
+    columns = {f"extra{k}_v": np.arange(500.0) for k in range(14)} | {"current_a": [math.nan] * 400 + [1.0] * 100}
+    recording = kort.Recording.of("long", np.arange(500) * 0.01, columns)
+    recording.about = {"rig": "[propeller]\n" * 100}
+    recording.notes = ["said at length " * 30]
+    told = str(recording)
+    assert told == repr(recording)
+    assert len(told.splitlines()) == 4 and len(told) < 400, told
+    assert "500 rows, 0 to 4.99 s" in told and "and 3 more" in told and "1 in .notes" in told, told
+    assert "current_a (3 samples)" in str(small())
+
+
+@pytest.mark.parametrize("time_s", [[0.0, 0.2, 0.1, 0.3], [0.0, 0.1, 0.1, 0.2], [0.0, math.nan, 0.2, 0.3]])
+def test_time_that_does_not_increase_is_refused(time_s: list[float]) -> None:
+    frame = pd.DataFrame({"time_s": time_s, "thrust_n": T})
+    with pytest.raises(ValueError, match=r"time_s does not increase from row . to .*\nhint: sort"):
+        kort.Recording.from_pandas(frame, "bench")
+    with pytest.raises(ValueError, match="bench: column time_s"):
+        kort.Recording.from_polars(pl.from_pandas(frame).with_columns(pl.col("time_s").fill_null(math.nan)), "bench")
+
+
 def same(a: kort.Recording, b: kort.Recording) -> None:
     assert list(a) == list(b)
     for name in a:

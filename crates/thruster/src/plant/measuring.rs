@@ -1,6 +1,6 @@
 //! The measuring chain: encoder, filters, and what the sensors show, once a tick.
 
-use super::{ANGLE, Balance, Local, Plant, Sensed, Tick};
+use super::{ANGLE, Balance, Local, Plant, Sensed, Tick, died_away};
 use crate::models::ModelName;
 use crate::real::Real;
 
@@ -152,7 +152,7 @@ impl<T: Real> Plant<T> {
         // Angle differenced at the control rate, then a first-order filter.
         let raw = self.counted.speed_rad_s(angle);
         f.speed_rad_s = match self.decays.speed {
-            Some(left) => raw + (f.speed_rad_s - raw) * left,
+            Some(left) => died_away(raw + (f.speed_rad_s - raw) * left),
             _ if self.sensors.encoder_counts_per_rev.is_some() => raw,
             _ => self.at.shaft_speed_rad_s,
         };

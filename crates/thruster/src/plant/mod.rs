@@ -21,6 +21,7 @@ pub use crate::blade::Foil;
 pub use leap::Leap;
 pub use load::load_inertia_kg_m2;
 pub use run::{Response, Stimulus, simulate, simulate_each};
+use state::died_away;
 pub use state::{Balance, Course, Drive, Driven, Local, Sensed, Tick};
 
 use friction::Rub;
@@ -363,8 +364,9 @@ impl<T: Real> Plant<T> {
     fn arrive<const N: usize>(&mut self, ticks: &[Tick], x: &[T; N], end: Local<T>, balance: &Balance<T>) {
         let way = Way { from: self.at, from_rad: self.x[ANGLE], to_rad: x[ANGLE] };
         for (state, moved) in self.x.iter_mut().zip(x) {
-            *state = *moved;
+            *state = died_away(*moved);
         }
+        let end = end.settled();
         self.current_a = end.current_a;
         self.at = end;
         self.at.thrust_n = balance.thrust_n;

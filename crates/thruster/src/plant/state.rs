@@ -139,7 +139,28 @@ pub struct Local<T = f64> {
     pub blade_torque_n_m: T,
 }
 
+/// Below this a state of the plant, whatever its unit, is one that has died away.
+const DIED_AWAY: f64 = 1e-30;
+
+/// A state, or zero once it has died away: what decays would else go on halving until it is the smallest number there is, which is
+/// no speed and no current, and which processors are slow with.
+#[inline(always)]
+pub(super) fn died_away<T: Real>(state: T) -> T {
+    if state.re().abs() < DIED_AWAY { state.with(0.0) } else { state }
+}
+
 impl<T: Real> Local<T> {
+    /// With zero for what has died away.
+    #[inline(always)]
+    pub(super) fn settled(mut self) -> Self {
+        for state in
+            [&mut self.shaft_speed_rad_s, &mut self.axial_m_s, &mut self.swirl_m_s, &mut self.current_a]
+        {
+            *state = died_away(*state);
+        }
+        self
+    }
+
     /// Whether nothing that acts on the rates jumps from `before` to here; the end of one tick and
     /// the start of the next may differ in rounding. Without effects (`HOOKED` false) depth
     /// and temperature do not act.
