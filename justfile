@@ -36,6 +36,10 @@ slow-sockets ROUNDS="90" WINDOW_MS="1000":
 console-load SECONDS="600":
     KORT_CONSOLE_S={{SECONDS}} cargo test --test console eight_signals -- --nocapture
 
+# the picture of the console in the README, made by the test that an operator's way through it is
+picture:
+    KORT_CONSOLE_PICTURE="$PWD/docs/console.png" cargo test --test console an_operator_takes_command
+
 # fuzz an entry point: csv, mcap, toml, deployment, bodies, messages or wires (nightly, cargo-fuzz)
 fuzz TARGET SECONDS="60":
     mkdir -p fuzz/corpus/{{TARGET}}
