@@ -318,6 +318,27 @@ fn no_file_grows_too_long() {
     }
 }
 
+/// Who adds something goes from file to file as this page says: each is there, by its end where the page has just named its folder.
+#[test]
+fn what_contributing_names_is_there() {
+    let page = read("CONTRIBUTING.md");
+    let outside_blocks: String = page.split("```").step_by(2).collect();
+    let named = outside_blocks.split('`').skip(1).step_by(2);
+    let paths: Vec<&str> =
+        named.filter(|word| word.contains(['/', '.']) && !word.contains(['<', ' ', '*', ':', '#'])).collect();
+    let is_file = |word: &&str| {
+        word.ends_with(".rs") || word.ends_with(".md") || word.ends_with(".toml") || word.ends_with('/')
+    };
+    let sources = every_source();
+    let files: Vec<&str> = paths.into_iter().filter(is_file).filter(|word| !word.contains("NAME")).collect();
+    assert!(files.len() > 40, "{files:?}");
+    for file in files {
+        let there = root().join(file).exists()
+            || sources.iter().any(|source| format!("/{}", source.display()).contains(&format!("/{file}")));
+        assert!(there, "CONTRIBUTING.md names `{file}`, which is not there");
+    }
+}
+
 #[test]
 fn nothing_is_left_for_later() {
     for path in every_source().into_iter().filter(|p| !p.ends_with("tidy.rs")) {

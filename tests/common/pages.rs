@@ -32,6 +32,8 @@ const NOT_RUN: &[(&str, &str, &str)] = &[
     ("docs/index.md", "python benches/beside_pysindy.py", "fetches PySINDy and its libraries"),
     ("docs/operations.md", "apt install ./target/debian", "installs as root: packaging/test.sh does it"),
     ("docker/README.md", "docker compose", "needs docker"),
+    ("CONTRIBUTING.md", "cargo test --test tidy", "builds and runs the tests that this is one of"),
+    ("CONTRIBUTING.md", "export CI=true", "how CI builds: nothing is printed"),
     (
         "python/README.md",
         "pip install",
