@@ -1,5 +1,7 @@
 //! What the posterior comes to: names, rivals, verdict. One pure function; words come later and decide nothing.
 
+use kort_identify::thin::Thin;
+
 use crate::flexible::is_term;
 use crate::posterior::{Explanation, presence, told};
 use crate::report::Verdict;
@@ -39,10 +41,10 @@ const PRACTICAL: f64 = 0.1;
 pub struct Circumstances {
     /// Members of the told set that do less than our equations may err by: nothing to state.
     pub negligible: Vec<&'static str>,
-    /// The recordings have too little in them.
-    pub thin: bool,
-    /// Nothing moves in them.
-    pub still: bool,
+    /// Why the recordings have too little in them, if so.
+    pub thin: Option<Thin>,
+    /// Members of the told set with what the data alone do not part from them.
+    pub unparted: Vec<(&'static str, &'static str)>,
     /// Members of the told set that do the same all the time: of one operating point they tell one number.
     pub steady: Vec<&'static str>,
     /// The simulation breaks down on the stated rig.
@@ -75,8 +77,10 @@ pub fn decide(explanations: &[Explanation], circumstances: &Circumstances) -> De
     let mut named: Vec<Named> = Vec::new();
     for member in &members {
         let taken = |id: &&'static str| named.iter().any(|n| n.effect == *id);
-        let rivals: Vec<&'static str> =
-            rivals(explanations, best, member).into_iter().filter(|id| !taken(id)).collect();
+        let rivals: Vec<&'static str> = rivals(explanations, best, member, &circumstances.unparted)
+            .into_iter()
+            .filter(|id| !taken(id))
+            .collect();
         let place: Vec<&'static str> = std::iter::once(*member).chain(rivals).collect();
         for effect in &place {
             named.push(Named {
@@ -89,10 +93,10 @@ pub fn decide(explanations: &[Explanation], circumstances: &Circumstances) -> De
     let believed = |n: &Named| among_names(n.effect) >= BELIEVED && n.rivals.is_empty();
     let changes = |n: &Named| !circumstances.steady.contains(&n.effect);
     let verdict = if circumstances.broke_down
-        || circumstances.still
+        || circumstances.thin.as_ref().is_some_and(|thin| thin.still)
         // Steady data cannot part physics from parameters; that something changed in mid-run they show, and which
         // physics it could be.
-        || circumstances.thin
+        || circumstances.thin.is_some()
             && term.is_none()
             && !named.iter().any(|n| believed(n) && changes(n) || !n.rivals.is_empty())
     {
@@ -119,15 +123,23 @@ pub fn decide(explanations: &[Explanation], circumstances: &Circumstances) -> De
 }
 
 /// Effects that stand in a member's place, alone or two together, in sets that are else the same and likely enough
-/// to be stated.
-fn rivals(explanations: &[Explanation], best: &Set, member: &str) -> Vec<&'static str> {
+/// to be stated, or as good by the data alone.
+fn rivals(
+    explanations: &[Explanation],
+    best: &Set,
+    member: &str,
+    unparted: &[(&'static str, &'static str)],
+) -> Vec<&'static str> {
     let rest: Vec<&str> = best.iter().copied().filter(|id| *id != member).collect();
     let likely = told(explanations).map_or(0.0, |e| e.probability);
     let mut out = Vec::new();
     for other in explanations {
         let new: Vec<&'static str> = other.set.iter().copied().filter(|id| !best.contains(id)).collect();
         let near = match new[..] {
-            [new] => presence(explanations, new, 1.0) >= NEAR * presence(explanations, member, 1.0),
+            [new] => {
+                presence(explanations, new, 1.0) >= NEAR * presence(explanations, member, 1.0)
+                    || unparted.iter().any(|(of, rival)| *of == member && *rival == new)
+            }
             [_, _] => other.probability >= NEAR * likely,
             _ => false,
         };
@@ -160,12 +172,13 @@ mod tests {
     fn verdicts_follow_from_the_posterior() {
         let usual = Circumstances { beside_unknown: 0.75, ..Circumstances::default() };
         let left = Circumstances { left: 0.4, ..usual.clone() };
-        let thin = Circumstances { thin: true, ..usual.clone() };
+        let thin = Circumstances { thin: Some(Thin { why: String::new(), still: false }), ..usual.clone() };
+        let still = Circumstances { thin: Some(Thin { why: String::new(), still: true }), ..usual.clone() };
         let much = Circumstances { more_than_noise: true, ..usual.clone() };
         let one_point = Circumstances { steady: vec!["windage_drag"], ..thin.clone() };
         let broke_down = Circumstances { broke_down: true, ..usual.clone() };
         let tiny = Circumstances { negligible: vec!["windage_drag"], ..usual.clone() };
-        let (usual, left, thin, much) = (&usual, &left, &thin, &much);
+        let (usual, left, thin, still, much) = (&usual, &left, &thin, &still, &much);
         let (one_point, broke_down, tiny) = (&one_point, &broke_down, &tiny);
         type Case<'a> = (&'a [(&'a [&'static str], f64)], &'a Circumstances, Verdict);
         let table: &[Case] = &[
@@ -197,6 +210,8 @@ mod tests {
             (&[(&[], 0.0)], thin, Verdict::InsufficientData),
             (&[(&["windage_drag"], 0.0), (&[], 80.0)], thin, Verdict::Explained),
             (&[(&["windage_drag"], 0.0), (&[], 80.0)], one_point, Verdict::InsufficientData),
+            (&[(&["windage_drag"], 0.0), (&[], 80.0)], still, Verdict::InsufficientData),
+            (&[(&["unknown_shaft_step"], 0.0), (&[], 90.0)], still, Verdict::InsufficientData),
             (&[(&["windage_drag"], 0.0), (&["duct_loss"], 2.0), (&[], 80.0)], one_point, Verdict::Ambiguous),
             (&[], broke_down, Verdict::InsufficientData),
         ];
@@ -217,6 +232,19 @@ mod tests {
         let (once, twice) = (decided(with_term, &usual), decided(with_term, &much));
         assert!((once.named[0].probability - twice.named[0].probability).abs() < 1e-12);
         assert_eq!(beside.verdict, Verdict::PartlyExplained);
+    }
+
+    #[test]
+    fn what_only_a_common_effect_s_odds_part_is_not_told_apart() {
+        let costs: &[(&[&'static str], f64)] =
+            &[(&["thrust_sensor_lag"], 0.0), (&["clock_skew"], 11.0), (&[], 90.0)];
+        let usual = Circumstances { beside_unknown: 0.75, ..Circumstances::default() };
+        assert_eq!(decided(costs, &usual).verdict, Verdict::Explained, "odds of six to one");
+        let unparted = vec![("thrust_sensor_lag", "clock_skew")];
+        let decision = decided(costs, &Circumstances { unparted, ..usual });
+        assert_eq!(decision.verdict, Verdict::Ambiguous);
+        assert_eq!(decision.named[0].rivals, ["clock_skew"]);
+        assert!(decision.named[0].probability > 0.8, "and how likely each is, is said as before");
     }
 
     #[test]

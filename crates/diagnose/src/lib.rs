@@ -24,5 +24,6 @@ mod search;
 mod stand;
 pub mod traces;
 mod unknown;
+mod unparted;
 mod words;
 mod write;

@@ -136,8 +136,8 @@ impl<'a, 'p> Writer<'a, 'p> {
         let negligible = left::negligible(problem, self.last, &actions);
         let circumstances = Circumstances {
             negligible: negligible.iter().map(|n| n.0).collect(),
-            thin: thin.is_some(),
-            still: thin.as_ref().is_some_and(|thin| thin.still),
+            thin: thin.clone(),
+            unparted: crate::unparted::unparted(self.search, &self.best),
             steady: left::steady(problem, self.last, &actions),
             broke_down: false,
             left,
