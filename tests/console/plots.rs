@@ -215,8 +215,11 @@ fn estimates_are_shown_of_the_minutes_before_and_of_recordings() {
         let apart = "Math.max(...run.a.t.map((t, i) => [t, run.a.of('estimated_thrust_n')[i], run.a.of('thrust_n')[i]]).filter(([t, a, b]) => t > 2 && a !== null && b !== null).map(([, a, b]) => Math.abs(a - b)))";
         let newton = page.eval(apart).as_f64().unwrap();
         assert!(newton < 12.0, "{newton}");
-        for (theme, width) in [("light", 1280), ("dark", 390)] {
+        page.eval("[...document.querySelectorAll('details summary')].find((s) => s.textContent === 'keys and mouse').click()");
+        for (theme, width) in [("light", 1280), ("dark", 1280), ("light", 390), ("dark", 390)] {
             page.show_as(theme, width);
+            let wide = page.eval("document.documentElement.scrollWidth").as_u64().unwrap();
+            assert!(wide <= width, "{theme} at {width} px: the page is {wide} px wide");
             page.picture(&format!(
                 "{}/target/console-estimates-{theme}-{width}.png",
                 env!("CARGO_MANIFEST_DIR")
