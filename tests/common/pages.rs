@@ -29,7 +29,11 @@ const NOT_RUN: &[(&str, &str, &str)] = &[
         "writes the page itself, from sets that are not all here",
     ),
     ("docs/measured-recordings.md", "kort diagnose t200_static", "the whole table is not in the repository"),
-    ("docs/index.md", "python benches/beside_pysindy.py", "fetches PySINDy and its libraries"),
+    (
+        "docs/index.md",
+        "python benches/beside_mss.py",
+        "minutes of work with Octave, MSS and PySINDy, which are fetched",
+    ),
     ("docs/operations.md", "apt install ./target/debian", "installs as root: packaging/test.sh does it"),
     ("docker/README.md", "docker compose", "needs docker"),
     ("CONTRIBUTING.md", "cargo test --test tidy", "builds and runs the tests that this is one of"),
