@@ -298,7 +298,8 @@ fn too_little_to_judge_is_said() {
 fn a_recording_of_a_thruster_at_rest_tells_nothing() {
     let noise = |size: f64, seed: f64| {
         move |k: usize, _: &str| {
-            (size * ((k as f64 * 12.9898 + seed).sin() * 43_758.545_3).fract()).to_string()
+            let drawn = (k as f64 * 12.9898 + seed).sin() * 43_758.545_3;
+            (size * (2.0 * (drawn - drawn.floor()) - 1.0)).to_string()
         }
     };
     let columns = ["time_s", "current_a", "shaft_speed_rad_s", "thrust_n"];
