@@ -205,13 +205,12 @@ mod tests {
         for rig in [WET, DRY] {
             let thrust = |newton: f64| if rig == WET { newton } else { 0.0 };
             let at_rest = |noise: [f64; 3]| said(rig, "current_a", |_| [0.0; 3], noise);
-            if rig == WET {
-                assert_eq!(at_rest([0.02, 0.0, 0.5]), Some(true));
-            }
             assert_eq!(at_rest([0.02, 0.3, thrust(0.5)]), Some(true));
-            let offset = |_| [0.05, 0.0, thrust(-3.0)];
-            assert_eq!(said(rig, "current_a", offset, [0.02, 0.1, thrust(0.5)]), Some(true));
         }
+        assert_eq!(said(WET, "current_cmd_a", |_| [0.0; 3], [0.0, 0.1, 0.5]), Some(true));
+        // The speed is constant, and sensors are off zero by a trifle of what the drive can do.
+        assert_eq!(said(WET, "current_a", |_| [0.0; 3], [0.02, 0.0, 0.5]), Some(true));
+        assert_eq!(said(WET, "current_a", |_| [0.05, 0.0, -2.0], [0.02, 0.1, 0.5]), Some(true));
         // Noise that a filter has made slow is a trifle of what the drive can do.
         let slow = |k: usize| {
             let wave = (0.02 * k as f64).sin();
