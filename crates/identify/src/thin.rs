@@ -213,8 +213,8 @@ mod tests {
         assert_eq!(said(WET, "current_a", |_| [0.05, 0.0, -2.0], [0.02, 0.1, 0.5]), Some(true));
         // Noise that a filter has made slow is a trifle of what the drive can do.
         let slow = |k: usize| {
-            let wave = (0.02 * k as f64).sin();
-            [0.05 * wave, 0.1 * wave, 0.5 * wave]
+            let wave = |rate: f64| (rate * k as f64).sin();
+            [0.05 * wave(0.1), 0.1 * wave(0.17), 0.5 * wave(0.23)]
         };
         assert_eq!(said(WET, "current_a", slow, [0.001; 3]), Some(true));
     }
