@@ -71,7 +71,7 @@ impl Bridge {
             let id = &self.link.thruster.id;
             let led = self.link.thruster.desk().lease.current(Instant::now()).is_some();
             let words = if led {
-                "disarmed, by none of this gateway's clients: the service stops, or another process asked for it"
+                "disarmed, by none of this gateway's clients: the service stops, its servo is another, or another process asked for it"
             } else {
                 "disarmed: nobody commands it any more"
             };
