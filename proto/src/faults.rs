@@ -158,7 +158,7 @@ impl Fault {
                 "the controller ended or was replaced: see the event log, then clear and arm again"
             }
             Self::ServoRestarted => {
-                "the servo ended while armed (killed, hung or the whole service died): see the event log, then clear and arm again"
+                "the servo ended while armed (told to end, killed, hung, or the whole service died): see the event log, then clear and arm again"
             }
             Self::DriveLost => {
                 "the drive does not answer: check its cable, its power and `drive.port`; the servo's log says what was seen"

@@ -86,6 +86,14 @@ fn a_stream_ends_with_the_token_that_opened_it_and_commands_nothing_more() {
     });
 }
 
+/// How long a wrong token takes, and a request that shows it.
+fn a_wrong_token(site: &Site) -> (Duration, String) {
+    let token = "Bearer chief.00";
+    let began = Instant::now();
+    assert_eq!(ask(site.port, "GET", T1, &[("Authorization", token)], "").0, 401);
+    (began.elapsed(), format!("GET {T1} HTTP/1.1\r\nHost: 127.0.0.1\r\nAuthorization: {token}\r\n\r\n"))
+}
+
 /// Argon2 is heavy on purpose. Who makes it work holds up himself alone: a stop of another address, with a token that
 /// this gateway has not seen before, is no later for it.
 #[test]
@@ -93,13 +101,7 @@ fn a_flood_of_wrong_tokens_holds_up_no_stop_of_another_peer() {
     common::in_real_time(|| {
         let (site, _, mut supervisor) = guarded("viewer");
         let pilot = token(&site, "chief", "pilot");
-        let wrong = [("Authorization", "Bearer chief.00")];
-        let began = Instant::now();
-        assert_eq!(ask(site.port, "GET", T1, &wrong, "").0, 401);
-        let one = began.elapsed();
-
-        let request =
-            format!("GET {T1} HTTP/1.1\r\nHost: 127.0.0.1\r\nAuthorization: Bearer chief.00\r\n\r\n");
+        let (one, request) = a_wrong_token(&site);
         let flood: Vec<TcpStream> = (0..60)
             .filter_map(|_| {
                 let mut socket = TcpStream::connect(("127.0.0.1", site.port)).ok()?;
@@ -126,12 +128,7 @@ fn wrong_tokens_of_many_peers_do_not_hold_up_a_stop() {
     common::in_real_time(|| {
         let (site, _, mut supervisor) = guarded("viewer");
         let pilot = token(&site, "chief", "pilot");
-        let wrong = [("Authorization", "Bearer chief.00")];
-        let began = Instant::now();
-        assert_eq!(ask(site.port, "GET", T1, &wrong, "").0, 401);
-        let one = began.elapsed();
-        let request =
-            format!("GET {T1} HTTP/1.1\r\nHost: 127.0.0.1\r\nAuthorization: Bearer chief.00\r\n\r\n");
+        let (one, request) = a_wrong_token(&site);
         let flood: Vec<TcpStream> = (0..120u8)
             .map(|host| {
                 let mut socket = from([127, 0, 1, host], site.port);

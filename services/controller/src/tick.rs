@@ -270,7 +270,7 @@ impl Tick {
             thrust_cmd_n: if let Reference::Thrust(n) = reference { n } else { f64::NAN },
             speed_cmd_rad_s: if let Reference::Speed(w) = reference { w } else { f64::NAN },
             kind: self.kind as u32,
-            stop: u32::from(stop),
+            stop: if stop { Command::STOPS } else { 0 },
             ..Command::default()
         }
     }
