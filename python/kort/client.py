@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import ssl
 import time
 import urllib.error
 import urllib.request
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Coroutine, Iterable, Iterator, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from threading import Thread
 from types import TracebackType
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeVar
 from urllib.parse import quote, urlsplit, urlunsplit
 
 from . import _kort
 from .diagnosis import Diagnosis
 from .recording import Recording, _taken
 from .reports import build
+
+if TYPE_CHECKING:
+    from websockets.asyncio.client import ClientConnection
+
+_Result = TypeVar("_Result")
 
 
 class Answer(Exception):
@@ -291,24 +298,29 @@ class Stream:
 
     def __init__(self, client: Client, thruster: str, hz: float) -> None:
         try:
-            from websockets.sync.client import connect
+            from websockets.asyncio.client import connect
         except ImportError as why:
             raise ImportError("the stream needs websockets\nhint: pip install 'kort[stream]'") from why
         parts = urlsplit(client.url)
         scheme = "wss" if parts.scheme == "https" else "ws"
         address = urlunsplit((scheme, parts.netloc, parts.path + _of(thruster, "stream"), f"hz={hz}", ""))
         headers = None if client._token is None else {"Authorization": f"Bearer {client._token}"}
-        self._open = ExitStack()
-        self._socket = self._open.enter_context(
+
+        async def opened() -> ClientConnection:
             # What the library has read counts as read: a longer queue keeps old states for an iteration that paused.
-            connect(
+            return await connect(
                 address,
                 additional_headers=headers,
                 ssl=client._context if scheme == "wss" else None,
                 open_timeout=client._timeout_s,
                 max_queue=1,
             )
-        )
+
+        with ExitStack() as opening:
+            self._loop = opening.enter_context(_Loop())
+            self._socket = self._loop.run(opened())
+            opening.callback(lambda: self._loop.run(self._socket.close()))
+            self._open = opening.pop_all()
 
     def __enter__(self) -> Stream:
         return self
@@ -324,8 +336,13 @@ class Stream:
 
     def __iter__(self) -> Iterator[State]:
         """Ends when the service closes. Raises :class:`Answer` for a setpoint that was refused."""
-        for text in self._socket:
-            document = json.loads(text)
+        from websockets.exceptions import ConnectionClosedOK
+
+        while True:
+            try:
+                document = json.loads(self._loop.run(self._socket.recv()))
+            except ConnectionClosedOK:
+                return
             if "id" in document:
                 yield _state(document)
             elif "status" in document:
@@ -333,11 +350,45 @@ class Stream:
 
     def thrust(self, lease_id: str, thrust_n: float) -> None:
         """Commands thrust, N, under a lease."""
-        self._socket.send(json.dumps({"setpoint": {"thrust_n": thrust_n}, "lease_id": lease_id}))
+        self._send({"setpoint": {"thrust_n": thrust_n}, "lease_id": lease_id})
 
     def speed(self, lease_id: str, speed_rad_s: float) -> None:
         """Commands shaft speed, rad/s, under a lease."""
-        self._socket.send(json.dumps({"setpoint": {"speed_rad_s": speed_rad_s}, "lease_id": lease_id}))
+        self._send({"setpoint": {"speed_rad_s": speed_rad_s}, "lease_id": lease_id})
+
+    def _send(self, message: Mapping[str, Any]) -> None:
+        self._loop.run(self._socket.send(json.dumps(message)))
+
+
+class _Loop:
+    """One thread that does all reading and writing of a connection.
+
+    One thread that reads a TLS connection while another writes tears it now and then (python/cpython issue 143756);
+    ``websockets.sync`` has two.
+    """
+
+    def __init__(self) -> None:
+        self._loop = asyncio.new_event_loop()
+        self._thread = Thread(target=self._loop.run_forever, name="kort-stream", daemon=True)
+
+    def __enter__(self) -> _Loop:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join()
+        self._loop.close()
+
+    def run(self, work: Coroutine[Any, Any, _Result]) -> _Result:
+        """Does it there, and waits for it."""
+        done = asyncio.run_coroutine_threadsafe(work, self._loop)
+        try:
+            return done.result()
+        except BaseException:
+            # Of an interrupt (Ctrl-C) nothing goes on behind our back.
+            done.cancel()
+            raise
 
 
 def _of(thruster: str, what: str = "") -> str:

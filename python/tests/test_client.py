@@ -7,6 +7,7 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import kort
@@ -145,6 +146,12 @@ def test_tls_and_a_token(secured: tuple[kort.Client, Path], kort_program: str) -
         command.thrust(30.0)
         with client.stream("t1", hz=20) as stream:
             assert next(iter(stream)).setpoint == kort.Setpoint(thrust_n=30.0)
+        # One thread reads while another commands.
+        with client.stream("t1", hz=50) as stream, ThreadPoolExecutor(1) as pilot:
+            sent = pilot.submit(lambda: [stream.thrust(command.lease_id, float(n)) for n in range(50)])
+            assert len([state for state, _ in zip(stream, range(50))]) == 50
+            sent.result()
+            assert next(iter(stream)).setpoint == kort.Setpoint(thrust_n=49.0)
         command.disarm()
     trusted = client._context
     with pytest.raises(kort.Answer) as nobody:
