@@ -63,7 +63,7 @@ fn batches(kills: usize) -> impl Iterator<Item = Vec<usize>> {
 /// Kill -9 under way, at instants spread over a controller period and more. Lanes take batch after batch, each on a
 /// deployment of its own, side by side; a batch in which the machine stood still is gone through again.
 pub fn killed(table: &mut Table) {
-    let (kills, lanes) = (asked("KORT_FAULT_KILLS").unwrap_or(200), asked("KORT_FAULT_LANES").unwrap_or(12));
+    let (kills, lanes) = (asked("KORT_FAULT_KILLS").unwrap_or(200), asked("KORT_FAULT_LANES").unwrap_or(8));
     let end = asked("KORT_FAULT_MINUTES").map(|m| Instant::now() + Duration::from_secs(60 * m as u64));
     // The three in turn, so that whatever the machine does falls on all alike.
     let mut waiting = ROLES.map(|role| batches(kills).map(move |batch| (role, batch)));

@@ -3,7 +3,7 @@
 //! docs/operations.md promises, and the worst that was measured; a bound that does not hold fails the campaign.
 //!
 //! `KORT_FAULT_KILLS` says how often each process is killed (200; `just faults`: 1000), `KORT_FAULT_LANES` on how many
-//! deployments side by side (12), `KORT_FAULT_MINUTES` after how long no more is begun (never), `KORT_FAULT_GROUPS` which
+//! deployments side by side (8), `KORT_FAULT_MINUTES` after how long no more is begun (never), `KORT_FAULT_GROUPS` which
 //! groups are gone through (all; kills, processes, network, disk, shared_memory, sensors).
 
 #[path = "../common/mod.rs"]
