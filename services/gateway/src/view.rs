@@ -297,7 +297,8 @@ impl Serialize for Values {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut map = serializer.serialize_map(Some(self.0.len()))?;
         for (name, value) in &self.0 {
-            map.serialize_entry(name, &value.is_finite().then_some(value))?;
+            // At rest a sensor that is mounted the other way round shows no minus zero.
+            map.serialize_entry(name, &value.is_finite().then_some(value + 0.0))?;
         }
         map.end()
     }
