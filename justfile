@@ -25,7 +25,7 @@ prove *ARGS:
     cargo run --release -- prove --markdown docs/proof.md {{ARGS}}
 
 # the fault campaign: each process killed 1000 times (for so long at most), and the rest of docs/operations.md's table
-faults KILLS="1000" MINUTES="60" LANES="12":
+faults KILLS="1000" MINUTES="60" LANES="8":
     KORT_FAULT_KILLS={{KILLS}} KORT_FAULT_MINUTES={{MINUTES}} KORT_FAULT_LANES={{LANES}} cargo test --test faults -- --nocapture
 
 # 2,000 slow sockets from one peer: how late the servo wakes (p99, idle and beset in turn) and how long stop takes
