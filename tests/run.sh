@@ -68,10 +68,12 @@ for file in crates/*/tests/*.rs crates/*/tests/*/main.rs; do
   name="${file%/main.rs}"
   computes+=("$(basename "$name" .rs)")
 done
+# Alone, after them: what waits for diagnoses, which the service too gives to the idle class, and what has the narrowest bounds.
+alone=(console diagnoses faults drive_faults)
 waits=()
 for file in tests/*.rs tests/*/main.rs proto/tests/*.rs services/*/tests/*.rs; do
   name="$(basename "${file%/main.rs}" .rs)"
-  [[ " ${computes[*]} faults drive_faults " == *" $name "* ]] || waits+=("$name")
+  [[ " ${computes[*]} ${alone[*]} " == *" $name "* ]] || waits+=("$name")
 done
 idle=(nice -n 19)
 if command -v chrt >/dev/null; then idle=(setsid chrt --idle 0); fi
@@ -94,9 +96,8 @@ fi
 wait "$computing" || failed+=("what computes")
 cat "$tools/computes.log"
 
-# The campaign keeps the machine busy, and the bounds of both are the narrowest.
-say "faults, alone"
-cargo test --workspace --no-fail-fast --test=faults --test=drive_faults || failed+=("faults")
+say "alone: ${alone[*]}"
+cargo test --workspace --no-fail-fast "${alone[@]/#/--test=}" || failed+=("what runs alone")
 
 # Fuzzing where its tools are; elsewhere tests/any_input.rs stands in for it.
 if cargo +nightly fuzz --version >/dev/null 2>&1; then

@@ -341,7 +341,7 @@ class Stream:
         while True:
             try:
                 document = json.loads(self._loop.run(self._socket.recv()))
-            except ConnectionClosedOK:
+            except (ConnectionClosedOK, _Ended):
                 return
             if "id" in document:
                 yield _state(document)
@@ -360,6 +360,10 @@ class Stream:
         self._loop.run(self._socket.send(json.dumps(message)))
 
 
+class _Ended(ConnectionError):
+    """What is asked of a stream that was closed here."""
+
+
 class _Loop:
     """One thread that does all reading and writing of a connection.
 
@@ -376,12 +380,16 @@ class _Loop:
         return self
 
     def __exit__(self, *_: object) -> None:
+        self.run(self._rest())
         self._loop.call_soon_threadsafe(self._loop.stop)
         self._thread.join()
         self._loop.close()
 
     def run(self, work: Coroutine[Any, Any, _Result]) -> _Result:
         """Does it there, and waits for it."""
+        if self._loop.is_closed():
+            work.close()
+            raise _Ended("the stream is closed")
         done = asyncio.run_coroutine_threadsafe(work, self._loop)
         try:
             return done.result()
@@ -389,6 +397,12 @@ class _Loop:
             # Of an interrupt (Ctrl-C) nothing goes on behind our back.
             done.cancel()
             raise
+
+    @staticmethod
+    async def _rest() -> None:
+        """What another thread still waits for comes to its end first."""
+        others = asyncio.all_tasks() - {asyncio.current_task()}
+        await asyncio.gather(*others, return_exceptions=True)
 
 
 def _of(thruster: str, what: str = "") -> str:

@@ -126,6 +126,21 @@ def test_an_iteration_that_paused_goes_on_with_what_is(client: kort.Client) -> N
     assert times[-2] - times[0] < 0.6, times
 
 
+def test_a_closed_stream_has_ended(client: kort.Client) -> None:
+    stream = client.stream("t1", hz=20)
+    states = iter(stream)
+    next(states)
+    with ThreadPoolExecutor(1) as reader:
+        rest = reader.submit(lambda: list(states))
+        time.sleep(0.2)
+        stream.close()
+        assert all(state.id == "t1" for state in rest.result(timeout=10))
+    assert list(stream) == []
+    with pytest.raises(ConnectionError, match="closed"):
+        stream.thrust("nobody", 10.0)
+    stream.close()
+
+
 def test_a_refusal_is_the_problem_document(client: kort.Client) -> None:
     with pytest.raises(kort.Answer) as refused:
         client.state("t9")

@@ -23,7 +23,7 @@ pub use watch::{Watch, at_zero};
 /// Controller period of the deployments under test, ns.
 pub const PERIOD_NS: u64 = 100_000_000;
 /// How long anything may take on a busy machine.
-pub const PATIENCE: Duration = Duration::from_secs(30);
+pub const PATIENCE: Duration = Duration::from_secs(120);
 
 pub const KORT: &str = env!("CARGO_BIN_EXE_kort");
 

@@ -88,7 +88,7 @@ fn is_done(line: &str) -> bool {
 }
 
 /// What a page may take. Its own waits end before: each sleeps, and none may sleep past two thirds of this.
-const LONGEST_S: u32 = 180;
+const LONGEST_S: u32 = 600;
 
 /// Stands before a page's commands: every wait ends, and what the page started ends with it.
 fn prelude() -> String {
