@@ -135,16 +135,24 @@ fn changes(scale: &Scale, sizes: &[f64], instants: &[f64]) -> Member {
     member
 }
 
-/// Cost of a set with changes of the load on it, as many as pay for themselves, about as it will be; and the set from
-/// there.
-pub fn promise(problem: &Problem, parent: &Fit) -> Option<(f64, Hypothesis)> {
+/// What a small load does from each instant of a grid on, on a fitted set: nearly the same as on any other.
+pub fn on_a_grid(problem: &Problem, parent: &Fit) -> Vec<Change> {
     let looking = Looking::new(problem, parent);
+    let [from_s, _] = problem.scale.clock_s;
+    let step_s = grid_step_s(problem);
+    let instants = (0..INSTANTS).into_par_iter().map(|k| from_s + (k as f64 + 0.5) * step_s);
+    instants.filter_map(|instant| looking.change(instant)).collect()
+}
+
+fn grid_step_s(problem: &Problem) -> f64 {
     let [from_s, to_s] = problem.scale.clock_s;
-    let step_s = (to_s - from_s) / INSTANTS as f64;
-    let grid: Vec<Change> = (0..INSTANTS)
-        .into_par_iter()
-        .filter_map(|k| looking.change(from_s + (k as f64 + 0.5) * step_s))
-        .collect();
+    (to_s - from_s) / INSTANTS as f64
+}
+
+/// Cost of a set with changes of the load on it, as many as pay for themselves, about as it will be; and the set from
+/// there. Changes that do not pay for themselves where they are on the grid are not moved about.
+pub fn promise(problem: &Problem, parent: &Fit, grid: &[Change]) -> Option<(f64, Hypothesis)> {
+    let looking = Looking::new(problem, parent);
     let mut changes: Vec<Change> = Vec::new();
     let mut best: Option<(Promise, Vec<f64>)> = None;
     let mut in_vain = 0;
@@ -154,7 +162,9 @@ pub fn promise(problem: &Problem, parent: &Fit) -> Option<(f64, Hypothesis)> {
         let costs: Vec<f64> = costs.collect();
         let Some(least) = (0..grid.len()).min_by(|a, b| costs[*a].total_cmp(&costs[*b])) else { break };
         changes = beside(&grid[least]);
-        let promise = looking.place(&mut changes, step_s);
+        let pays = costs[least] < parent.cost();
+        let promise =
+            if pays { looking.place(&mut changes, grid_step_s(problem)) } else { looking.promise(&changes) };
         if best.as_ref().is_none_or(|(known, _)| promise.cost < known.cost) {
             best = Some((promise, changes.iter().map(|c| c.from_s).collect()));
             in_vain = 0;
@@ -187,7 +197,7 @@ pub fn with_one_less(problem: &Problem, fit: &Fit) -> Vec<(Hypothesis, Columns)>
 
 /// What a small load does from an instant on.
 #[derive(Clone)]
-struct Change {
+pub struct Change {
     from_s: f64,
     action: Arc<DVector<f64>>,
 }

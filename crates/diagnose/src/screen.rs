@@ -34,21 +34,25 @@ pub struct Screened {
 
 /// Starts of one effect that are fitted on top of one set.
 const STARTS_OF_ONE: usize = 2;
-/// What a closer look may gain beyond a probe's promise.
-const HOPE: f64 = 10.0;
 /// Part of what a probe promises that is worth no other look.
 const KEPT: f64 = 0.7;
 /// Promises looked at closely on top of one set, and effects of which one is.
 const CLOSELY: usize = 14;
 
-/// Screens effects on top of a fit, cheapest first. Effects that break the simulation down are left out.
-pub fn screen(problem: &Problem, parent: &Fit, probes: &[&[Probe]]) -> Vec<Screened> {
+/// Screens effects on top of a fit, cheapest first. Effects that break the simulation down are left out, and promises
+/// that are worth no closer look.
+pub fn screen(
+    problem: &Problem,
+    parent: &Fit,
+    probes: &[&[Probe]],
+    worth: impl Fn(&Promise) -> bool,
+) -> Vec<Screened> {
     let parent = &Arc::new(parent.clone());
     let known = problem.about(&parent.lines, &parent.columns, &parent.hypothesis);
     let known = known.curvature();
     let mut promised: Vec<Promise> =
         probes.par_iter().flat_map_iter(|probes| promises(problem, parent, known, probes)).collect();
-    promised.retain(|p| p.cost < parent.cost() + HOPE);
+    promised.retain(worth);
     promised.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     let mut effects = Vec::new();
     let promised = promised.into_iter().enumerate().filter(|(place, p)| {

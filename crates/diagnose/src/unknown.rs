@@ -10,7 +10,7 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 
 use crate::flexible::TERMS;
-use crate::load_steps::{self, LOAD_STEPS};
+use crate::load_steps::{self, Change, LOAD_STEPS};
 use crate::search::{Search, Set, with};
 
 /// Looks for what has no name beside a set, and keeps the sets with it that do better, or as well with fewer
@@ -24,7 +24,10 @@ pub fn look(
 ) {
     let terms: Vec<&'static Descriptor> =
         TERMS.iter().copied().filter(|t| (t.needs)(rig, offered).is_ok()).collect();
-    let beside = put_on(search, best, &terms, best);
+    let Some(fit) = search.fits.get(best) else { return };
+    let steps = terms.iter().any(|term| term.id == LOAD_STEPS.id);
+    let grid = if steps { load_steps::on_a_grid(search.problem, fit) } else { Vec::new() };
+    let beside = put_on(search, best, &terms, best, &grid);
     if let Some(beside) = &beside {
         // Names that only stood for it, and names that show once it is there.
         search.refine(beside);
@@ -32,7 +35,7 @@ pub fn look(
     // Where nothing pays on top of the names, only what does about as well as they do can stand in their place.
     let place = if beside.is_some() { Set::new() } else { best.clone() };
     if !best.is_empty()
-        && let Some(alone) = put_on(search, &Set::new(), &terms, &place)
+        && let Some(alone) = put_on(search, &Set::new(), &terms, &place, &grid)
     {
         search.climb(alone, progress);
     }
@@ -40,10 +43,16 @@ pub fn look(
 
 /// Fits the terms that promise most on top of a set; the best set with one, if a promise may earn its price and do as
 /// well as what is to be beaten.
-fn put_on(search: &mut Search, set: &Set, terms: &[&'static Descriptor], beaten: &Set) -> Option<Set> {
+fn put_on(
+    search: &mut Search,
+    set: &Set,
+    terms: &[&'static Descriptor],
+    beaten: &Set,
+    grid: &[Change],
+) -> Option<Set> {
     let parent = search.fits.get(set)?.clone();
     let mut promised: Vec<(f64, &'static Descriptor, Hypothesis)> =
-        terms.par_iter().filter_map(|term| promise(search, &parent, term)).collect();
+        terms.par_iter().filter_map(|term| promise(search, &parent, term, grid)).collect();
     let best = promised.iter().map(|p| p.0).fold(f64::INFINITY, f64::min);
     let doubt = search.doubt(parent.cost() - best);
     let most = search.cost(beaten).min(parent.cost()) + doubt;
@@ -78,10 +87,11 @@ fn promise(
     search: &Search,
     parent: &Fit,
     term: &'static Descriptor,
+    grid: &[Change],
 ) -> Option<(f64, &'static Descriptor, Hypothesis)> {
     let problem = search.problem;
     if term.id == LOAD_STEPS.id {
-        return load_steps::promise(problem, parent).map(|(cost, hypothesis)| (cost, term, hypothesis));
+        return load_steps::promise(problem, parent, grid).map(|(cost, hypothesis)| (cost, term, hypothesis));
     }
     let whole = Member::new(term, &problem.scale);
     let specs = (term.parameters)(&problem.scale);

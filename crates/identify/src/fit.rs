@@ -197,6 +197,13 @@ impl Problem<'_> {
         fit
     }
 
+    /// What a fit would come to from where it stands, as far as the response is a straight line.
+    pub fn promised(&self, from: &Fit) -> f64 {
+        let model = self.about(&from.lines, &from.columns, &from.hypothesis);
+        let there = model.minimise(&from.floor, &from.hypothesis.free, &from.values, 0.0);
+        there.misfit + there.penalty + model.price(&there.noise)
+    }
+
     /// What each effect of a fit does to the response: the change where it is taken away, mean square by band. Nothing
     /// is said of what has no size.
     pub fn actions(&self, fit: &Fit) -> Vec<Vec<f64>> {

@@ -9,6 +9,8 @@ use crate::screen::{Screened, screen};
 
 /// Doubt of a screen's cost, as a share of what it promises.
 const SCREEN_DOUBT: f64 = 0.15;
+/// What a closer look may gain beyond a probe's promise.
+const HOPE: f64 = 10.0;
 /// What another start must promise more than a fit has shown.
 const ENOUGH: f64 = 1.0;
 
@@ -40,7 +42,7 @@ impl Search<'_, '_> {
                 .filter(|(e, _)| !set.contains(&e.id))
                 .map(|(_, p)| p.as_slice())
                 .collect();
-            let screened = screen(problem, parent, &rest);
+            let screened = screen(problem, parent, &rest, |promise| promise.cost < parent.cost() + HOPE);
             self.screens.insert(set.clone(), screened);
         }
         let mut effects = Vec::new();
@@ -74,14 +76,20 @@ impl Search<'_, '_> {
             if chosen.is_empty() {
                 return sets;
             }
-            let new: Vec<(Set, Fit)> = chosen
+            let more =
+                |s: &&Screened| self.fits.get(&larger(s)).is_none_or(|fit| s.cost < fit.cost() - ENOUGH);
+            let key = |s: &Screened| (larger(s), s.cost.to_bits());
+            let begin: Vec<&Screened> =
+                chosen.iter().filter(more).filter(|s| !self.begun_from.contains(&key(s))).collect();
+            let new: Vec<(Set, Fit)> = begin
                 .par_iter()
-                .filter(|s| self.fits.get(&larger(s)).is_none_or(|fit| s.cost < fit.cost() - ENOUGH))
                 .map(|s| {
                     let floor = self.floor_of(&larger(s));
                     (larger(s), self.problem.settle(&s.hypothesis, &s.columns, &floor, ITERATIONS))
                 })
                 .collect();
+            let begun: Vec<_> = begin.into_iter().map(key).collect();
+            self.begun_from.extend(begun);
             new.into_iter().for_each(|(set, fit)| self.keep(set, fit));
             for set in chosen.iter().map(larger) {
                 if !sets.contains(&set) {

@@ -1,8 +1,12 @@
 //! Other forms of the members of a set.
 
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
 use kort_identify::fit::{Columns, Fit};
-use kort_identify::hypothesis::{Hypothesis, Member};
+use kort_identify::hypothesis::{Hypothesis, Member, Target};
 use kort_thruster::effects::Scale;
+use nalgebra::DVector;
 use rayon::prelude::*;
 
 use super::{FIRST_STEPS, ITERATIONS, Search, Set};
@@ -12,6 +16,9 @@ const ENOUGH: f64 = 0.3;
 
 /// Forms of one set from which first steps are taken.
 const CLOSELY: usize = 4;
+
+/// A number that a form adds: effect, place, and the bits of its order.
+type Added = (&'static str, usize, u64);
 
 /// A set in another form, with what a straight line promises.
 struct Promised {
@@ -30,9 +37,9 @@ impl Search<'_, '_> {
                 return;
             }
             let mut promised: Vec<Promised> = self
-                .other_forms(from)
-                .par_iter()
-                .map(|members| self.promised(from, members))
+                .begun(from)
+                .into_par_iter()
+                .map(|(hypothesis, columns)| self.promised(from, hypothesis, columns))
                 .filter(|form| form.cost.is_finite())
                 .collect();
             promised.sort_by(|a, b| a.cost.total_cmp(&b.cost));
@@ -56,11 +63,54 @@ impl Search<'_, '_> {
         }
     }
 
-    /// What a fit's members in these forms come to, as far as the response is a straight line from where they begin.
-    fn promised(&self, from: &Fit, members: &[Member]) -> Promised {
-        let (hypothesis, mut columns) = self.problem.recompose(from, members);
+    /// A fit's set in other forms, with all derivatives. One that several forms add at the same order of the shaft's angle
+    /// is learnt once: how they begin beside it changes it little.
+    fn begun(&self, from: &Fit) -> Vec<(Hypothesis, Columns)> {
+        let mut begun: Vec<(Hypothesis, Columns)> =
+            self.other_forms(from).iter().map(|members| self.problem.recompose(from, members)).collect();
+        let missing = |(hypothesis, columns): &(Hypothesis, Columns)| -> Vec<(usize, Added)> {
+            let all = (0..columns.len()).filter(|k| columns[*k].is_none());
+            all.map(|k| (k, self.added(hypothesis, k))).collect()
+        };
+        // Those that add most first: what one simulation can tell is asked of one.
+        let mut order: Vec<usize> = (0..begun.len()).collect();
+        order.sort_by_key(|i| std::cmp::Reverse(missing(&begun[*i]).len()));
+        let mut known = BTreeSet::new();
+        let asked: Vec<(usize, Vec<(usize, Added)>)> = order
+            .into_iter()
+            .map(|i| (i, missing(&begun[i]).into_iter().filter(|(_, key)| known.insert(*key)).collect()))
+            .collect();
+        let learnt: BTreeMap<Added, Arc<DVector<f64>>> = asked
+            .into_par_iter()
+            .flat_map_iter(|(i, asked)| {
+                let (hypothesis, places) = (&begun[i].0, asked.iter().map(|(k, _)| *k).collect::<Vec<_>>());
+                let columns = self.problem.derivatives(hypothesis, &hypothesis.start, &places);
+                let keyed = move |(k, lines)| {
+                    let (_, key) = asked.iter().find(|(place, _)| *place == k)?;
+                    Some((*key, Arc::new(lines)))
+                };
+                columns.into_iter().filter_map(keyed)
+            })
+            .collect();
+        for (hypothesis, columns) in &mut begun {
+            for (k, column) in columns.iter_mut().enumerate().filter(|(_, column)| column.is_none()) {
+                *column = learnt.get(&self.added(hypothesis, k)).cloned();
+            }
+        }
+        begun
+    }
+
+    /// What a free number that a form adds is: of which effect, at which of its places, at which order.
+    fn added(&self, hypothesis: &Hypothesis, k: usize) -> Added {
+        let Target::Effect(i, j) = hypothesis.free[k].target else { return ("", k, 0) };
+        let member = &hypothesis.effects[i];
+        let order = places(member, &self.problem.scale).into_iter().rfind(|place| *place < j);
+        (member.effect.id, j, order.map_or(0, |place| member.values[place].to_bits()))
+    }
+
+    /// What a form comes to, as far as the response is a straight line from where it begins.
+    fn promised(&self, from: &Fit, hypothesis: Hypothesis, columns: Columns) -> Promised {
         let lines = self.problem.residual_lines(&hypothesis, &hypothesis.start);
-        self.problem.complete(&hypothesis, &hypothesis.start, &mut columns);
         let model = self.problem.about(&lines, &columns, &hypothesis);
         let there = model.minimise(&from.floor, &hypothesis.free, &hypothesis.start, 0.0);
         let cost = there.misfit + there.penalty + model.price(&there.noise);

@@ -45,6 +45,8 @@ pub struct Search<'a, 'p> {
     /// Every set fitted.
     pub fits: BTreeMap<Set, Fit>,
     screens: BTreeMap<Set, Vec<Screened>>,
+    /// Sets that were fitted from what a screen promised, with the promise.
+    begun_from: BTreeSet<(Set, u64)>,
     /// What a larger set cost when a smaller one was last fitted from where it ended.
     dropped: BTreeMap<(Set, Set), f64>,
     reshaped: BTreeSet<(Set, u64)>,
@@ -68,6 +70,7 @@ impl<'a, 'p> Search<'a, 'p> {
             effects,
             fits: BTreeMap::new(),
             screens: BTreeMap::new(),
+            begun_from: BTreeSet::new(),
             dropped: BTreeMap::new(),
             reshaped: BTreeSet::new(),
             exchanged: BTreeSet::new(),
@@ -186,9 +189,9 @@ impl<'a, 'p> Search<'a, 'p> {
             let set = vec![effect.id];
             // Numbers that were bent to other equations may have no way back: from what is stated too.
             let stated: Vec<f64> = baseline.hypothesis.free.iter().map(|free| free.mean).collect();
-            for (values, columns) in [(&baseline.values, &baseline.columns), (&stated, &Vec::new())] {
+            for values in [&baseline.values, &stated] {
                 let hypothesis = baseline.hypothesis.with(values, member.clone(), &self.problem.scale);
-                self.fit_set(set.clone(), &hypothesis, columns);
+                self.fit_set(set.clone(), &hypothesis, &baseline.columns);
             }
             self.hold(&set, effect.id);
         }

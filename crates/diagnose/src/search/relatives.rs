@@ -2,15 +2,14 @@
 
 use kort_identify::fit::{Columns, Fit};
 use kort_identify::hypothesis::{Hypothesis, Member};
-use kort_identify::noise::Floor;
 use kort_thruster::effects::Descriptor;
 use rayon::prelude::*;
 
 use super::{FIRST_STEPS, ITERATIONS, Search, Set, with, without};
 use crate::probe::bends;
 
-/// Starts from which first steps are taken.
-const MOST_BEGUN: usize = 3;
+/// Starts from one place, each with the derivatives that are known there.
+type Starts = Vec<(Hypothesis, Columns)>;
 
 impl Search<'_, '_> {
     /// Fits, in the place of a member, what the catalogue says it is confused with and no screen led to, or not well: play,
@@ -35,18 +34,18 @@ impl Search<'_, '_> {
             self.ensure(&rest, set);
             for effect in others {
                 let place = with(&rest, effect.id);
-                let floor = self.floor_of(&place);
+                let mut starts: Vec<Starts> = Vec::new();
                 if !self.fits.contains_key(&place) {
-                    let Some(parent) = self.fits.get(&rest).cloned() else { break };
-                    if let Some(fit) = self.best_of_every_start(&parent, effect, &floor) {
-                        self.keep(place.clone(), fit);
-                    }
+                    starts.extend(self.beside(&rest, effect));
                 }
                 // The fit's own cost: priors grow with the temper, and the same exchange would be begun again.
                 let begun_from = self.fits.get(set).map_or(f64::INFINITY, Fit::cost).to_bits();
                 if self.exchanged.insert((set.clone(), place.clone(), begun_from))
-                    && let Some(fit) = self.exchange(set, member, effect, &floor)
+                    && self.cost(&place) > self.cost(set)
                 {
+                    starts.extend(self.instead(set, member, effect));
+                }
+                if let Some(fit) = self.best_of_starts(starts, [set, &rest, &place]) {
                     self.keep(place.clone(), fit);
                 }
                 tried.push(place);
@@ -55,32 +54,25 @@ impl Search<'_, '_> {
         self.better(set.clone(), tried)
     }
 
-    /// The best fit with one more effect of those that begin at each of its starts, beside the parent's values and
-    /// beside the stated ones, which the parent had to bend.
-    fn best_of_every_start(&self, parent: &Fit, effect: &'static Descriptor, floor: &Floor) -> Option<Fit> {
+    /// An effect at each of its starts on top of a set, beside the set's values and beside the stated ones, which it had
+    /// to bend.
+    fn beside(&self, set: &Set, effect: &'static Descriptor) -> Vec<Starts> {
+        let Some(parent) = self.fits.get(set) else { return Vec::new() };
         let scale = &self.problem.scale;
         let whole = Member::new(effect, scale);
-        let starts = whole.starts(scale);
-        let stated: Vec<f64> = (parent.hypothesis.free.iter().zip(&parent.values))
-            .map(|(free, value)| if free.stated { free.mean } else { *value })
-            .collect();
-        let beside = |(start, values): (&Vec<f64>, &[f64])| {
-            (parent.hypothesis.with(values, whole.clone().at(start.clone()), scale), Vec::new())
+        let stated = (parent.hypothesis.free.iter().zip(&parent.values))
+            .map(|(free, value)| if free.stated { free.mean } else { *value });
+        let stated: Vec<f64> = stated.collect();
+        let beside = |values: &Vec<f64>| {
+            let at = |start| parent.hypothesis.with(values, whole.clone().at(start), scale);
+            whole.starts(scale).into_iter().map(|start| (at(start), parent.columns.clone())).collect()
         };
-        let begun = starts.iter().flat_map(|s| [(s, &parent.values[..]), (s, &stated[..])]).map(beside);
-        let best = self.begun(begun.collect(), floor)?;
-        Some(self.problem.settle(&best.resume(), &best.columns, floor, ITERATIONS))
+        [&parent.values, &stated].map(beside).into()
     }
 
-    /// The best fit with an effect in the place of a member, all else where the set's fit has it; none where a
-    /// few steps do not lead near, or it does no better than what is known of that set.
-    fn exchange(&self, set: &Set, member: &str, effect: &'static Descriptor, floor: &Floor) -> Option<Fit> {
+    /// An effect at each of its starts in the place of a member, all else where the set's fit has it.
+    fn instead(&self, set: &Set, member: &str, effect: &'static Descriptor) -> Option<Starts> {
         let from = self.fits.get(set)?;
-        let place = with(&without(set, member), effect.id);
-        let known = self.cost(&place);
-        if known <= self.cost(set) {
-            return None;
-        }
         let scale = &self.problem.scale;
         let mut members = self.problem.members(&from.hypothesis, &from.values);
         let at = members.iter().position(|m| m.effect.id == member)?;
@@ -99,37 +91,42 @@ impl Search<'_, '_> {
             starts.push(taken);
         }
         let (base, columns) = self.problem.recompose(from, &members);
-        let beside =
-            |start: Vec<f64>| (base.with(&base.start, whole.clone().at(start), scale), columns.clone());
-        let best = self.begun(starts.into_iter().map(beside).collect(), floor)?;
-        let first = self.problem.finish(best);
-        let reach = self.cost(set) + self.doubt(known.min(first.cost()) - self.cost(set));
-        if first.cost() + self.prior(&place) > reach {
-            return None;
-        }
-        let fit = self.problem.settle(&first.resume(), &first.columns, floor, ITERATIONS);
-        (fit.cost() + self.prior(&place) < known).then_some(fit)
+        let at = |start| (base.with(&base.start, whole.clone().at(start), scale), columns.clone());
+        Some(starts.into_iter().map(at).collect())
     }
 
-    /// Of hypotheses that begin somewhere, the one that a few steps lead furthest.
-    fn begun(&self, starts: Vec<(Hypothesis, Columns)>, floor: &Floor) -> Option<Fit> {
+    /// The best fit of a set that begins at one of these starts. Of the best from each place, and the best of the
+    /// others, a few steps tell which leads furthest; it is fitted to its end where that is near the set whose place it is
+    /// to take.
+    fn best_of_starts(&self, starts: Vec<Starts>, [set, rest, place]: [&Set; 3]) -> Option<Fit> {
+        let floor = &self.floor_of(place);
         let merit = |fit: &Fit| fit.noise.misfit + fit.penalty;
         let steps = |(hypothesis, columns): &(Hypothesis, Columns), steps| {
             self.problem.fit(hypothesis, columns, floor, steps)
         };
-        let mut begun: Vec<((Hypothesis, Columns), f64)> = starts
-            .into_par_iter()
-            .map(|start| {
-                let merit = merit(&steps(&start, 0));
-                (start, merit)
-            })
-            .filter(|(_, merit)| merit.is_finite())
-            .collect();
-        begun.sort_by(|a, b| a.1.total_cmp(&b.1));
-        begun.truncate(MOST_BEGUN);
-        begun
+        let at_start = |start: (Hypothesis, Columns)| {
+            let merit = merit(&steps(&start, 0));
+            (start, merit)
+        };
+        let (mut begun, mut others) = (Vec::new(), Vec::new());
+        for starts in starts {
+            let mut of_place: Vec<_> = starts.into_par_iter().map(at_start).collect();
+            of_place.retain(|(_, merit)| merit.is_finite());
+            of_place.sort_by(|a, b| a.1.total_cmp(&b.1));
+            let mut of_place = of_place.into_iter();
+            begun.extend(of_place.next());
+            others.extend(of_place.next());
+        }
+        begun.extend(others.into_iter().min_by(|a, b| a.1.total_cmp(&b.1)));
+        let first = begun
             .par_iter()
             .map(|(start, _)| steps(start, FIRST_STEPS))
-            .min_by(|a, b| merit(a).total_cmp(&merit(b)))
+            .min_by(|a, b| merit(a).total_cmp(&merit(b)))?;
+        let first = self.problem.finish(first);
+        let reach = self.cost(set) + self.doubt(self.fits.get(rest)?.cost() - first.cost());
+        if first.cost() + self.prior(place) > reach {
+            return Some(first);
+        }
+        Some(self.problem.settle(&first.resume(), &first.columns, floor, ITERATIONS))
     }
 }
