@@ -1,4 +1,4 @@
-//! What members of a set are confused with, fitted from every start.
+//! What members of a set are confused with, begun from every start.
 
 use kort_identify::fit::{Columns, Fit};
 use kort_identify::hypothesis::{Hypothesis, Member};
