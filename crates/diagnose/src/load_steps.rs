@@ -277,7 +277,7 @@ impl<'a> Looking<'a> {
         let instants = 2.0 * (INSTANTS as f64).ln() * changes.len() as f64;
         let size = |k: usize| found.step[k] * free[k].sigma * self.small_n_m;
         Promise {
-            cost: found.misfit + found.penalty + model.price(&found.noise) + instants,
+            cost: model.cost(&found) + instants,
             sizes_n_m: (parent.values.len()..free.len()).map(size).collect(),
         }
     }

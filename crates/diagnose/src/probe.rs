@@ -244,7 +244,7 @@ fn of_form(
             &narrowed
         };
         let found = model.minimise(&parent.floor, &free, &values, 0.0);
-        let cost = found.misfit + found.penalty + model.price(&found.noise);
+        let cost = model.cost(&found);
         (cost, *liveliness, found, free)
     });
     let (cost, liveliness, found, free) = tried.min_by(|a, b| a.0.total_cmp(&b.0))?;

@@ -114,7 +114,7 @@ fn at(problem: &Problem, parent: &Arc<Fit>, known: &[DMatrix<f64>], member: Memb
     let model =
         Quadratic::extended(&problem.spectrum, &problem.criterion, &lines, &columns, &hypothesis.free, known);
     let minimum = model.minimise(&parent.floor, &hypothesis.free, &hypothesis.start, 0.0);
-    let cost = minimum.misfit + minimum.penalty + model.price(&minimum.noise);
+    let cost = model.cost(&minimum);
     let columns = parent.columns.iter().cloned().chain(new.into_iter().map(|c| Some(Arc::new(c)))).collect();
     Some(Screened { effect, hypothesis, columns, lines, upon: parent.clone(), cost })
 }

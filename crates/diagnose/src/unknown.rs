@@ -129,7 +129,7 @@ fn promise(
                 known.curvature(),
             );
             let found = model.minimise(&parent.floor, &hypothesis.free, &hypothesis.start, 0.0);
-            let cost = found.misfit + found.penalty + model.price(&found.noise);
+            let cost = model.cost(&found);
             let start = hypothesis
                 .free
                 .iter()

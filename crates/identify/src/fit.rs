@@ -201,7 +201,7 @@ impl Problem<'_> {
     pub fn promised(&self, from: &Fit) -> f64 {
         let model = self.about(&from.lines, &from.columns, &from.hypothesis);
         let there = model.minimise(&from.floor, &from.hypothesis.free, &from.values, 0.0);
-        there.misfit + there.penalty + model.price(&there.noise)
+        model.cost(&there)
     }
 
     /// What each effect of a fit does to the response: the change where it is taken away, mean square by band. Nothing

@@ -146,6 +146,11 @@ impl<'a> Quadratic<'a> {
             .map_or(f64::INFINITY, |c| 2.0 * c.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>())
     }
 
+    /// What a minimum costs: misfit, priors, and the price of the numbers there.
+    pub fn cost(&self, there: &Minimum) -> f64 {
+        there.misfit + there.penalty + self.price(&there.noise)
+    }
+
     /// Minimises misfit and priors from the point, where the parameters have these `values`; each step is
     /// damped by `damping`.
     pub fn minimise(&self, floor: &Floor, free: &[Free], values: &[f64], damping: f64) -> Minimum {

@@ -113,7 +113,7 @@ impl Search<'_, '_> {
         let lines = self.problem.residual_lines(&hypothesis, &hypothesis.start);
         let model = self.problem.about(&lines, &columns, &hypothesis);
         let there = model.minimise(&from.floor, &hypothesis.free, &hypothesis.start, 0.0);
-        let cost = there.misfit + there.penalty + model.price(&there.noise);
+        let cost = model.cost(&there);
         Promised { hypothesis, columns, cost }
     }
 

@@ -77,7 +77,7 @@ impl Search<'_, '_> {
             let free = &hypothesis.free;
             let model = Quadratic::extended(spectrum, criterion, &lines, &columns_there, free, known);
             let minimum = model.minimise(&parent.floor, free, &hypothesis.start, 0.0);
-            let cost = minimum.misfit + minimum.penalty + model.price(&minimum.noise);
+            let cost = model.cost(&minimum);
             let set = with(&with(set, a.effect.id), b.effect.id);
             cost.is_finite().then_some(Pair { set, hypothesis, columns, cost })
         };
