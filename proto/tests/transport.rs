@@ -93,3 +93,27 @@ fn leftovers_of_a_killed_owner_are_cleared() {
     drop(left);
     ServoPorts::open(&deployment, "t1").unwrap();
 }
+
+/// iceoryx2 would wait for such an object's length for ever, and the supervisor with it.
+#[test]
+fn who_opens_what_its_maker_was_killed_over_is_not_kept_waiting() {
+    let dir = tempfile::tempdir().unwrap();
+    let deployment = Deployment::new(Some(&dir.path().join("root")));
+    let mut owner = deployment.own().unwrap();
+    let generation = owner.create(&["t1"]).unwrap();
+    let prefix = deployment.config(generation).unwrap().global.prefix.to_string();
+    let objects = std::fs::read_dir("/dev/shm").unwrap().flatten().map(|entry| entry.path());
+    let services: Vec<_> = objects
+        .filter(|path| path.file_name().unwrap().to_string_lossy().starts_with(&prefix))
+        .filter(|path| path.extension().is_some_and(|extension| extension == "dynamic"))
+        .collect();
+    assert!(services.len() > 4, "{services:?}");
+    for service in services {
+        std::fs::remove_file(&service).unwrap();
+        std::fs::write(&service, "").unwrap();
+    }
+    let (told, answer) = std::sync::mpsc::channel();
+    std::thread::spawn(move || told.send(ServoPorts::open(&deployment, "t1").map(|_| ())));
+    let answer = answer.recv_timeout(Duration::from_secs(20)).expect("an answer");
+    assert!(matches!(answer, Err(TransportError::Iceoryx { .. })), "{answer:?}");
+}

@@ -21,6 +21,7 @@ use super::files::{allow_files, none_left};
 use super::ours::{nobody_else_may_replace, ours_alone, owner_only, owner_only_from_the_start, write_whole};
 use super::ports::{Services, create_services};
 use super::room;
+use super::stillborn::Remover;
 use crate::names::MESSAGES_VERSION;
 
 /// Longest root: the sockets by which iceoryx2 wakes a process lie under it, and a socket path has 107 bytes.
@@ -139,7 +140,14 @@ impl Deployment {
             return Err(TransportError::Locked { root: self.root.clone(), holder });
         }
         let _ = fs::write(&lock_path, format!("process {}", std::process::id()));
-        let owner = Owner { deployment: self.clone(), _lock: lock, node: None, services: Vec::new() };
+        let stillborn = Remover::start(self.prefix())?;
+        let owner = Owner {
+            deployment: self.clone(),
+            _lock: lock,
+            _stillborn: stillborn,
+            node: None,
+            services: Vec::new(),
+        };
         owner.clear();
         let mut folder = fs::DirBuilder::new();
         folder.recursive(true).mode(0o700).create(&self.root).map_err(file_error(&self.root))?;
@@ -248,6 +256,7 @@ fn tag(generation_ns: u64) -> String {
 pub struct Owner {
     deployment: Deployment,
     _lock: fs::File,
+    _stillborn: Remover,
     node: Option<Node<ipc::Service>>,
     services: Vec<Services>,
 }

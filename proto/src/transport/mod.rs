@@ -9,6 +9,7 @@ mod ours;
 mod ports;
 mod rig;
 mod room;
+mod stillborn;
 mod watched;
 
 pub use clock::{Ticker, idle, keep_on, monotonic_ns, ordinary, realtime};

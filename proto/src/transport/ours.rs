@@ -52,14 +52,15 @@ pub(super) fn owner_only_from_the_start(folder: &Path, prefix: &str) -> Result<(
 }
 
 /// What lies under a prefix; one that is removed this moment is nobody's.
-fn objects(folder: &Path, prefix: &str) -> impl Iterator<Item = (PathBuf, fs::Metadata)> {
+pub(super) fn objects(folder: &Path, prefix: &str) -> impl Iterator<Item = (PathBuf, fs::Metadata)> {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     entries
         .filter(move |entry| entry.file_name().as_encoded_bytes().starts_with(prefix.as_bytes()))
         .filter_map(|entry| Some((entry.path(), entry.metadata().ok()?)))
 }
 
-fn is_mine(about: &fs::Metadata) -> bool {
+/// A file, and this user's.
+pub(super) fn is_mine(about: &fs::Metadata) -> bool {
     about.is_file() && about.uid() == rustix::process::getuid().as_raw()
 }
 
