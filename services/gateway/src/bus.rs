@@ -125,7 +125,6 @@ struct Bridge {
     disarm_asked: bool,
     /// Until when answers are looked for between two ticks.
     errands_until: Option<Instant>,
-    unanswered: bool,
 }
 
 impl Bridge {
@@ -148,7 +147,6 @@ impl Bridge {
             armed: false,
             disarm_asked: false,
             errands_until: None,
-            unanswered: false,
         }
     }
 
@@ -165,12 +163,9 @@ impl Bridge {
             return self.refuse(now);
         };
         self.receive(&ports, recorder, now);
-        if std::mem::take(&mut self.unanswered)
-            && let Err(error) = ports.reconnect_requests(deployment, &self.link.thruster.id)
-        {
-            self.complain(error);
-        }
-        let sent = self.send_asks(&mut ports, now).and_then(|()| match pulse.alive() {
+        let asked =
+            self.send_asks(&mut ports, now).and_then(|()| self.ask_again(&mut ports, deployment, now));
+        let sent = asked.and_then(|()| match pulse.alive() {
             true => ports.setpoint.send(self.setpoint(now)),
             false => Ok(()),
         });
@@ -307,13 +302,28 @@ impl Bridge {
             self.pending.push(Pending::new(ask, now));
             ports.request.send(request)?;
         }
-        for pending in &mut self.pending {
-            if let Some((request, silent)) = pending.again(now) {
-                let (thruster, id) = (&self.link.thruster.id, request.id);
-                tracing::warn!(thruster, "no answer by the {} to request {id}: sent again", silent.name());
-                ports.request.send(request)?;
-                self.unanswered = true;
-            }
+        Ok(())
+    }
+
+    /// Sends again what is not answered, through ports opened anew: most likely a connection did not come about.
+    fn ask_again(
+        &mut self,
+        ports: &mut GatewayPorts,
+        deployment: &Deployment,
+        now: Instant,
+    ) -> Result<(), TransportError> {
+        let due: Vec<_> = self.pending.iter_mut().filter_map(|pending| pending.again(now)).collect();
+        if due.is_empty() {
+            return Ok(());
+        }
+        let thruster = self.link.thruster.id.clone();
+        if let Err(error) = ports.reconnect_requests(deployment, &thruster) {
+            self.complain(error);
+        }
+        for (request, silent) in due {
+            let id = request.id;
+            tracing::warn!(thruster, "no answer by the {} to request {id}: sent again", silent.name());
+            ports.request.send(request)?;
         }
         Ok(())
     }

@@ -6,21 +6,23 @@ use kort_proto::messages::{Process, Reply, Request, RequestKind};
 
 use crate::thruster::Ask;
 
-/// A request without an answer is sent again after this time: either way a message may be lost, and servo and controller
-/// act on a number once only, see [`kort_proto::messages::Answered`].
-const AGAIN_AFTER: Duration = Duration::from_millis(200);
+/// A request without an answer is sent again after this time, then after twice as long as before: either way a message
+/// may be lost, and servo and controller act on a number once only, see [`kort_proto::messages::Answered`]. A stop whose
+/// first message is lost keeps within its 100 ms.
+const AGAIN_AFTER: Duration = Duration::from_millis(40);
 
 /// A request that waits for its answers.
 pub struct Pending {
     since: Instant,
-    sent: Instant,
+    again_at: Instant,
+    wait: Duration,
     ask: Ask,
     replies: Vec<Reply>,
 }
 
 impl Pending {
     pub fn new(ask: Ask, now: Instant) -> Self {
-        Self { since: now, sent: now, ask, replies: Vec::new() }
+        Self { since: now, again_at: now + AGAIN_AFTER, wait: AGAIN_AFTER, ask, replies: Vec::new() }
     }
 
     /// Takes an answer; false if it is to another request.
@@ -45,10 +47,10 @@ impl Pending {
     /// The request, where it is time to send it once more, and who has not answered. A revision of the rig is not asked
     /// for twice: it is designed for longer than that.
     pub fn again(&mut self, now: Instant) -> Option<(Request, Process)> {
-        let due = now.duration_since(self.sent) >= AGAIN_AFTER
-            && self.ask.request.kind != RequestKind::SetRig as u32;
+        let due = now >= self.again_at && self.ask.request.kind != RequestKind::SetRig as u32;
         let silent = self.silent().filter(|_| due)?;
-        self.sent = now;
+        self.wait *= 2;
+        self.again_at = now + self.wait;
         Some((self.ask.request, silent))
     }
 
@@ -79,10 +81,11 @@ mod tests {
         let reply = |id, from: Process| Reply { id, from: from as u32, ..Reply::default() };
         assert!(!pending.take(&reply(2, Process::Servo)), "an answer to another");
         assert!(pending.take(&reply(3, Process::Controller)));
-        assert_eq!(pending.again(at(199)), None);
-        assert_eq!(pending.again(at(200)), Some((request, Process::Servo)));
-        assert_eq!(pending.again(at(399)), None);
-        assert!(pending.again(at(400)).is_some() && !pending.complete());
+        assert_eq!(pending.again(at(39)), None);
+        assert_eq!(pending.again(at(40)), Some((request, Process::Servo)));
+        assert_eq!(pending.again(at(119)), None);
+        assert!(pending.again(at(120)).is_some() && pending.again(at(279)).is_none());
+        assert!(pending.again(at(280)).is_some() && !pending.complete());
         assert!(pending.take(&reply(3, Process::Servo)) && pending.complete());
         assert_eq!(pending.again(at(650)), None);
         assert!(!pending.overdue(at(699)) && pending.overdue(at(700)));
