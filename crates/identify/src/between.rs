@@ -4,7 +4,7 @@
 //! this changes smoothly, or in steps that find their tick, nothing is lost; in a closed loop that answers its
 //! sensor's noise, or kicks at a change of its set-point between two rows, much is. No hypothesis is held to account
 //! for what that does: two courses are simulated that the samples allow alike, and the mean square of their
-//! difference is part of the noise floor.
+//! difference is part of the noise floor. So is that of a third, where what drives was measured, see [`crate::misread`].
 
 use std::sync::Arc;
 
@@ -31,22 +31,29 @@ fn unforetold(values: &[f64], row: usize) -> f64 {
 }
 
 impl Problem<'_> {
-    /// What the response owes to how that which drives runs between its samples, which nobody recorded: mean square
-    /// by band of the difference that another course makes which the samples allow as well.
+    /// What the response owes to how that which drives runs between its samples, which nobody recorded, and to what its
+    /// sensor misreads: mean square by band of the difference that another course makes which the samples allow as well.
     pub(crate) fn doubt_of_drivers(&self) -> Option<Vec<f64>> {
         let inputs = Inputs::new(&self.recordings, self.recordings.iter().map(Prepared::halfway).collect());
-        let (mut other, mut jumping) = (self.clone(), inputs.clone());
-        for (recording, commands) in other.recordings.iter_mut().zip(&mut jumping.commands) {
-            recording.drive_otherwise(commands);
-        }
         let plain = |inputs: Inputs| Hypothesis {
             effects: Vec::new(),
             free: Vec::new(),
             start: Vec::new(),
             inputs: Arc::new(inputs),
         };
-        let straight = self.residual_lines(&plain(inputs), &[]);
-        let powers = self.spectrum.powers(&(straight - other.residual_lines(&plain(jumping), &[])));
+        let straight = self.residual_lines(&plain(inputs.clone()), &[]);
+        let difference_of = |course: fn(&mut Prepared, &mut [f64])| {
+            let (mut other, mut inputs) = (self.clone(), inputs.clone());
+            for (recording, commands) in other.recordings.iter_mut().zip(&mut inputs.commands) {
+                course(recording, commands);
+            }
+            self.spectrum.powers(&(&straight - other.residual_lines(&plain(inputs), &[])))
+        };
+        let mut powers = difference_of(Prepared::drive_otherwise);
+        if self.recordings.iter().any(Prepared::is_driven_by_a_sensor) {
+            let misread = difference_of(Prepared::misread);
+            powers.iter_mut().zip(misread).for_each(|(power, misread)| *power += misread);
+        }
         powers.iter().all(|p| p.is_finite()).then_some(powers)
     }
 }
@@ -178,6 +185,13 @@ mod tests {
     fn a_rough_command_logged_slower_than_it_changes_is_in_doubt() {
         assert!(doubt("current_cmd_a", 500.0, rough) > 1e-3);
         assert!(doubt("current_a", 500.0, rough) > 1e-3, "and so is a current");
+    }
+
+    #[test]
+    fn what_a_sensor_of_that_which_drives_misreads_is_in_doubt() {
+        let noisy = |k: usize| (k as f64 * 0.01).sin() + 0.02 * ((k * k * 7919) as f64 * 0.37).sin();
+        assert!(doubt("current_a", 100.0, noisy) > 1e-4);
+        assert_eq!(doubt("current_cmd_a", 100.0, noisy), 0.0, "a command is what it says");
     }
 
     #[test]

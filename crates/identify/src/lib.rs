@@ -17,6 +17,7 @@ pub mod hypothesis;
 pub mod identifiable;
 pub mod identify;
 mod lag_on_command;
+mod misread;
 pub mod noise;
 mod over_the_top;
 mod quadratic;
