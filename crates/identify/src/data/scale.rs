@@ -141,6 +141,7 @@ pub fn available(model: ModelName, series: &[Series], all: &[Prepared]) -> Avail
         current_prescribed: all.iter().all(torque_given),
         torque_given: all.iter().any(torque_given),
         axial_flow_modelled: !matches!(model, ModelName::Model0 | ModelName::Model1),
+        turned_rad: angle_known(all).then(|| turned_rad(all)),
         speed_unsigned: series.iter().any(crate::checks::is_unsigned_speed),
         supply_sag_share: series
             .iter()

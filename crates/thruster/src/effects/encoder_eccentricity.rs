@@ -1,7 +1,9 @@
 //! The encoder's disc sits off centre.
 
 use super::memory::EncoderAhead;
-use super::{Available, Descriptor, Effect, Hooks, Path, Scale, Spec, angle_known, speed_measured};
+use super::{
+    Available, Descriptor, Effect, Hooks, Path, Scale, Spec, angle_known, speed_measured, turns_round,
+};
 use crate::plant::{Sensed, Tick};
 use crate::real::Real;
 use crate::rig::Rig;
@@ -44,7 +46,8 @@ fn parameters(_: &Scale) -> Vec<Spec> {
 
 fn needs(rig: &Rig, available: &Available) -> Result<(), &'static str> {
     speed_measured(rig, available)?;
-    angle_known(rig, available)
+    angle_known(rig, available)?;
+    turns_round(rig, available)
 }
 
 struct Eccentricity<T> {

@@ -207,7 +207,7 @@ mod spec;
 pub(crate) use memory::FirstOrder;
 pub use needs::{
     ANGLE_KNOWN, Available, EXTRA, always, angle_known, commanded, flow_measured, free_shaft, geared,
-    speaks_of_a_gear, speed_measured, thrust_measured, wet,
+    speaks_of_a_gear, speed_measured, thrust_measured, turns_round, wet,
 };
 pub use spec::{Scale, Spec, Stretch};
 

@@ -17,6 +17,8 @@ pub struct Available {
     pub axial_flow_modelled: bool,
     /// Only the size of the shaft speed was recorded: it is never negative although the drive reverses.
     pub speed_unsigned: bool,
+    /// Way of the shaft between its furthest ends, rad, where its angle is known in every recording: the longest of them.
+    pub turned_rad: Option<f64>,
     /// Share of the supply lost at the largest load, where every recording holds the supply.
     pub supply_sag_share: Option<f64>,
 }
@@ -102,6 +104,17 @@ pub fn angle_known(_: &Rig, available: &Available) -> Result<(), &'static str> {
     }
 }
 
+/// Needs a whole turn of a shaft whose angle is known: of what was not seen through a whole wave nothing tells that it comes
+/// again, and a weight, a spring or a gear that rubs by its load does the same.
+pub fn turns_round(_: &Rig, available: &Available) -> Result<(), &'static str> {
+    match available.turned_rad {
+        Some(turned_rad) if turned_rad < std::f64::consts::TAU => {
+            Err("the shaft made no whole turn, so nothing tells that what follows its angle comes again")
+        }
+        _ => Ok(()),
+    }
+}
+
 /// What a rig's name or class calls that which lies between motor and load.
 const GEARS: [&str; 12] = [
     "gear",
@@ -136,7 +149,8 @@ pub fn geared(rig: &Rig, available: &Available) -> Result<(), &'static str> {
 
 #[cfg(test)]
 mod tests {
-    use super::speaks_of_a_gear;
+    use super::{ANGLE_KNOWN, Available, speaks_of_a_gear, turns_round};
+    use crate::effects::find;
     use crate::rig::Rig;
 
     #[test]
@@ -149,5 +163,26 @@ mod tests {
         assert!(speaks("name = \"Geared motor\""));
         assert!(speaks("name = \"axis 3\"\nclass = \"linear axis on a ball screw\""));
         assert!(!speaks("name = \"axis 3\"\nclass = \"dry brushless motor\""));
+    }
+
+    #[test]
+    fn what_follows_the_angle_needs_a_whole_turn_of_it() {
+        let rig = Rig::from_toml(
+            "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = 0.01\ntorque_constant_nm_a = 1.0\n\
+             [amplifier]\nkind = \"current\"\n[sensors]\n",
+        )
+        .unwrap();
+        let turned = |turned_rad| Available {
+            columns: vec![ANGLE_KNOWN.into(), "shaft_speed_rad_s".into()],
+            turned_rad,
+            ..Available::default()
+        };
+        assert!(turns_round(&rig, &turned(None)).is_ok(), "an unknown angle is another matter");
+        for id in ["encoder_eccentricity", "position_dependent_friction"] {
+            let needs = find(id).unwrap().needs;
+            assert!(needs(&rig, &turned(Some(7.0))).is_ok(), "{id}");
+            let why = needs(&rig, &turned(Some(5.0))).unwrap_err();
+            assert!(why.contains("no whole turn"), "{id}: {why}");
+        }
     }
 }

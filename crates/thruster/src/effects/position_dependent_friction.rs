@@ -1,8 +1,9 @@
 //! Friction that varies over the turn: a bent shaft, an uneven seal or screw.
 
-use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, free_shaft};
+use super::{Available, Descriptor, Effect, Hooks, Path, Scale, Spec, free_shaft, turns_round};
 use crate::plant::{Balance, Local};
 use crate::real::Real;
+use crate::rig::Rig;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -29,7 +30,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
         }
         vec![vec![mean, 0.4, 0.4, 0.1, 0.1], vec![mean, -0.4, -0.4, 0.1, 0.1]]
     },
-    needs: free_shaft,
+    needs,
     build: both!(|values, _| {
         Box::new(PositionDependentFriction {
             mean_n_m: values[0],
@@ -54,6 +55,11 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
         wave("twice_sin_share"),
         wave("twice_cos_share"),
     ]
+}
+
+fn needs(rig: &Rig, available: &Available) -> Result<(), &'static str> {
+    free_shaft(rig, available)?;
+    turns_round(rig, available)
 }
 
 struct PositionDependentFriction<T> {
