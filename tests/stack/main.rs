@@ -289,11 +289,15 @@ fn a_process_that_hangs_is_ended_and_replaced() {
 fn the_end_of_the_terminal_leaves_nothing_in_shared_memory() {
     common::in_real_time(|| {
         let stack = Stack::start();
-        let ours = || std::fs::read_dir("/dev/shm").unwrap().flatten().count();
+        let prefix = strangers::in_shared_memory(&stack.site);
+        let ours = || {
+            let names = std::fs::read_dir("/dev/shm").unwrap().flatten().map(|entry| entry.file_name());
+            names.filter(|name| name.to_string_lossy().starts_with(&prefix)).count()
+        };
         let before = ours();
         kill(stack.supervisor.id(), "HUP");
         wait("the end", || (!alive(stack.supervisor.id())).then_some(()));
-        assert!(ours() + 20 < before, "{before} files before, {} after", ours());
+        assert!(before > 20 && ours() == 0, "{before} files before, {} after", ours());
         assert!(stack.site.log().contains("stopped"), "{}", stack.site.log());
     });
 }

@@ -88,16 +88,20 @@ fn a_link_that_somebody_laid_is_never_written_through() {
     });
 }
 
+/// What the names of a running deployment's objects in `/dev/shm` begin with.
+pub fn in_shared_memory(site: &Site) -> String {
+    let nodes = fs::read_dir(site.root()).unwrap().flatten().next().unwrap().path().join("nodes");
+    let entry = fs::read_dir(nodes).unwrap().flatten().find(|e| e.path().is_file()).unwrap();
+    entry.file_name().into_string().unwrap().split_inclusive('_').take(2).collect()
+}
+
 /// iceoryx2 gives one of its objects to everybody (the segment that counts its participants); whoever writes there
 /// keeps a gateway's successor from starting. Nothing of ours in `/dev/shm` is anybody else's, successors' included.
 #[test]
 fn nothing_in_shared_memory_can_be_opened_by_others() {
     common::in_real_time(|| {
         let stack = Stack::start();
-        let nodes = fs::read_dir(stack.site.root()).unwrap().flatten().next().unwrap().path().join("nodes");
-        let entry = fs::read_dir(nodes).unwrap().flatten().find(|e| e.path().is_file()).unwrap();
-        let name = entry.file_name().into_string().unwrap();
-        let prefix: String = name.split_inclusive('_').take(2).collect();
+        let prefix = in_shared_memory(&stack.site);
         let are_ours = || {
             let objects: Vec<_> = fs::read_dir("/dev/shm")
                 .unwrap()
