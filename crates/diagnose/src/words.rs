@@ -135,7 +135,15 @@ pub fn left_aside(
     verdict: Verdict,
     rig: &Rig,
 ) -> impl Iterator<Item = String> + use<> {
-    unused(series, problem).into_iter().chain(gearless(verdict, rig))
+    unused(series, problem).into_iter().chain(gearless(verdict, rig)).chain(swinging(verdict, problem))
+}
+
+/// What is not looked for since the shaft made no whole turn, where something is left.
+fn swinging(verdict: Verdict, problem: &Problem) -> Option<String> {
+    let whole = problem.scale.turned_rad >= std::f64::consts::TAU;
+    (!whole && verdict != Verdict::NoMismatch).then(|| {
+        "an eccentric encoder and friction by position are not looked for: the shaft made no whole turn, so nothing tells that what follows its angle comes again. Record one if it may turn".into()
+    })
 }
 
 /// What is not looked for because nobody speaks of it, where a dry shaft leaves something.
