@@ -47,6 +47,8 @@ pub struct LogPlan {
     pub stamps: Stamps,
     /// Instant at which the log begins, s: later than the run for a recording that starts in motion.
     pub from_s: f64,
+    /// What the encoder shows where the run begins, rad.
+    pub encoder_zero_rad: f64,
 }
 
 /// Rows; NaN is an empty cell.
@@ -107,7 +109,8 @@ pub fn table(
         table.columns.push((name, rows.iter().map(|&tick| at(tick)).collect()));
     };
     if let Some((name, list)) = setpoint {
-        add(name, &|tick| list[tick]);
+        let zero = if name == "shaft_angle_cmd_rad" { plan.encoder_zero_rad } else { 0.0 };
+        add(name, &|tick| list[tick] + zero);
     }
     if columns.command {
         match machine.drive {
@@ -123,7 +126,7 @@ pub fn table(
         add("current_a", &seen(|r| r.current_a));
     }
     if columns.angle {
-        add("shaft_angle_rad", &seen(|r| r.angle_rad));
+        add("shaft_angle_rad", &|tick| trace.readings[tick].angle_rad + plan.encoder_zero_rad);
     }
     add("shaft_speed_rad_s", &seen(|r| r.speed_rad_s));
     if columns.thrust {

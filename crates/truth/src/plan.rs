@@ -89,6 +89,7 @@ pub fn draw(kind: CaseKind, seed: u64, selection: &Selection, dice: &mut Dice) -
             columns,
             stamps,
             from_s: if dice.chance(0.12) { dice.between(0.5, 3.0) } else { 0.0 },
+            encoder_zero_rad: encoder_zero_rad(&mut Dice::new(seed, 300 + kind as u64)),
         },
         closed,
         wanted: Vec::new(),
@@ -152,6 +153,11 @@ fn draw_machine(selection: &Selection, dice: &mut Dice) -> Machine {
         None => dice.chance(DRY_SHARE),
     };
     if dry { dice.pick(&machines::DRY)(dice) } else { dice.pick(&machines::THRUSTERS)(dice) }
+}
+
+/// Where an encoder stands that was switched on before: some of them count from nothing.
+fn encoder_zero_rad(dice: &mut Dice) -> f64 {
+    if dice.chance(0.5) { 0.0 } else { dice.side() * dice.log_between(0.1, 100.0) }
 }
 
 fn columns(machine: &Machine, closed: bool, dice: &mut Dice) -> Columns {

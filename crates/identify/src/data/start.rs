@@ -14,7 +14,7 @@ pub(super) fn start_state(series: &Series, prepared: &Prepared) -> ([f64; 4], Op
     let speed_scale = series
         .column("shaft_speed_rad_s")
         .map_or(0.0, |c| c.iter().filter(|v| v.is_finite()).fold(0.0_f64, |m, v| m.max(v.abs())));
-    let speed = first("shaft_speed_rad_s").unwrap_or(0.0);
+    let (speed, angle) = (first("shaft_speed_rad_s").unwrap_or(0.0), first("shaft_angle_rad").unwrap_or(0.0));
     if speed.abs() < 0.01 * speed_scale || speed_scale == 0.0 {
         let asked = prepared.command.first().copied().unwrap_or(0.0);
         let range = prepared.command.iter().fold(0.0_f64, |m, c| m.max(c.abs()));
@@ -28,13 +28,13 @@ pub(super) fn start_state(series: &Series, prepared: &Prepared) -> ([f64; 4], Op
             Driving::Command("current_cmd_a") => asked,
             _ => 0.0,
         };
-        return ([0.0, 0.0, current, 0.0], before);
+        return ([0.0, 0.0, current, angle], before);
     }
     let flow = first("flow_m_s").unwrap_or(0.0);
     // Under a recorded power the current follows from it at once.
     let asked = if prepared.driving == Driving::Power { None } else { prepared.command.first().copied() };
     let current = first("current_a").or(asked).unwrap_or(0.0);
-    ([speed, flow, current, first("shaft_angle_rad").unwrap_or(0.0)], None)
+    ([speed, flow, current, angle], None)
 }
 
 #[cfg(test)]
@@ -54,6 +54,23 @@ mod tests {
             ("shaft_speed_rad_s".into(), (0..rows).map(|k| speed_rad_s + f64::from(k)).collect()),
         ];
         Prepared::new(&Series { name: "log".into(), time_s, columns }, &rig, false).unwrap().before
+    }
+
+    #[test]
+    fn a_shaft_that_stands_starts_where_its_encoder_says() {
+        let rig = "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = 0.01\ntorque_constant_nm_a = 1.0\n";
+        let columns = vec![
+            ("current_cmd_a".into(), (0..100).map(|k| if k < 50 { 0.0 } else { 1.0 }).collect()),
+            ("shaft_speed_rad_s".into(), (0..100).map(|k| f64::from((k - 50).max(0))).collect()),
+            (
+                "shaft_angle_rad".into(),
+                (0..100).map(|k| 68.0 + 0.005 * f64::from((k - 50).max(0)).powi(2)).collect(),
+            ),
+        ];
+        let time_s = (0..100).map(|k| 0.01 * f64::from(k)).collect();
+        let log = Series { name: "log".into(), time_s, columns };
+        let prepared = Prepared::new(&log, &Rig::from_toml(rig).unwrap(), false).unwrap();
+        assert_eq!(prepared.start, [0.0, 0.0, 0.0, 68.0]);
     }
 
     #[test]
