@@ -1,9 +1,8 @@
 //! A recording made ready for simulation: inputs on the control grid, responses on the log grid.
 
-use kort_thruster::plant::{Leap, Stimulus, load_inertia_kg_m2};
-use kort_thruster::rig::{AmplifierKind, Load, Rig};
+use kort_thruster::plant::{Leap, Stimulus};
+use kort_thruster::rig::{AmplifierKind, Rig};
 
-use crate::over_the_top::TOP_RAD;
 use crate::refuse;
 
 mod channel;
@@ -18,6 +17,7 @@ mod fresh;
 mod grain;
 mod lay_out;
 pub mod loaded;
+mod observed;
 mod pauses;
 pub mod row_means;
 mod scale;
@@ -29,6 +29,7 @@ pub use counted::counted_angle;
 pub use error::DataError;
 pub use fresh::fresh;
 pub use grain::Grain;
+pub use observed::OBSERVER_RAD_S;
 pub use pauses::pause_s;
 pub use scale::{COLUMN, available, scale};
 
@@ -196,32 +197,6 @@ fn shown(rig: &Rig, driving: Driving, response: Response) -> bool {
     }
 }
 
-/// Bandwidth of the observer on a shaft that nothing brings back to its course, rad/s: 1 Hz.
-pub const OBSERVER_RAD_S: f64 = std::f64::consts::TAU;
-
-/// Whether a disturbed shaft returns to its course by itself: blades brake it, or the back-EMF under a
-/// voltage does, within a few tenths of a second; a pendulum hangs. A dry shaft under a current integrates, and
-/// drifts; a pendulum that passes its top falls on either side.
-fn returns(series: &Series, rig: &Rig, driving: Driving) -> bool {
-    let commanded = matches!(driving, Driving::Command(_));
-    if driving == Driving::Speed || commanded && rig.amplifier.kind == AmplifierKind::Speed {
-        return true;
-    }
-    if let Load::Pendulum { .. } = rig.load {
-        let angle = series.column("shaft_angle_rad");
-        return angle.is_some_and(|q| q.iter().all(|q| q.is_nan() || q.abs() < TOP_RAD));
-    }
-    if rig.propeller.is_some() {
-        return true;
-    }
-    let (motor, voltage) = (&rig.motor, rig.amplifier.kind == AmplifierKind::Voltage);
-    let braking = match (motor.winding_resistance_ohm, driving) {
-        (Some(ohm), Driving::Command(_)) if voltage => motor.torque_constant_nm_a.value.powi(2) / ohm.value,
-        _ => 0.0,
-    };
-    braking / (motor.inertia_kg_m2.value + load_inertia_kg_m2(rig)) > OBSERVER_RAD_S
-}
-
 /// The coarsest step at which the plant is integrated, s.
 const COARSEST_TICK_S: f64 = 0.002;
 /// Fewest rows of a recording that can be compared with a model.
@@ -304,7 +279,7 @@ impl Prepared {
             speed_between: Vec::new(),
             extra: None,
             supply_held: Vec::new(),
-            observer_rad_s: if returns(series, rig, driving) { 0.0 } else { OBSERVER_RAD_S },
+            observer_rad_s: 0.0,
             row_means: false,
             lag_on_command: false,
             second: false,
@@ -318,6 +293,7 @@ impl Prepared {
             let stands = recorded.map_or_else(|| supply.clone(), held);
             prepared.supply_held = stands.iter().zip(&supply).map(|(held, v)| held / v.max(1e-9)).collect();
         }
+        prepared.observer_rad_s = observed::bandwidth_rad_s(series, rig, &prepared);
         prepared.lay_out(series, rig);
         (prepared.start, prepared.before) = start_state(series, &prepared);
         Ok(prepared)
