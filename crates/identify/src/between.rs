@@ -35,19 +35,23 @@ impl Problem<'_> {
     /// sensor misreads: mean square by band of the difference that another course makes which the samples allow as well.
     pub(crate) fn doubt_of_drivers(&self) -> Option<Vec<f64>> {
         let inputs = Inputs::new(&self.recordings, self.recordings.iter().map(Prepared::halfway).collect());
-        let plain = |inputs: Inputs| Hypothesis {
+        let stated = || Hypothesis {
             effects: Vec::new(),
             free: Vec::new(),
             start: Vec::new(),
-            inputs: Arc::new(inputs),
+            inputs: Arc::new(inputs.clone()),
         };
-        let straight = self.residual_lines(&plain(inputs.clone()), &[]);
+        let at = self.doubted_at.clone().unwrap_or_else(stated);
+        let lines = |problem: &Problem, inputs: Inputs| {
+            problem.residual_lines(&Hypothesis { inputs: Arc::new(inputs), ..at.clone() }, &at.start)
+        };
+        let straight = lines(self, inputs.clone());
         let difference_of = |course: fn(&mut Prepared, &mut [f64])| {
             let (mut other, mut inputs) = (self.clone(), inputs.clone());
             for (recording, commands) in other.recordings.iter_mut().zip(&mut inputs.commands) {
                 course(recording, commands);
             }
-            self.spectrum.powers(&(&straight - other.residual_lines(&plain(inputs), &[])))
+            self.spectrum.powers(&(&straight - lines(&other, inputs)))
         };
         let mut powers = difference_of(Prepared::drive_otherwise);
         if self.recordings.iter().any(Prepared::is_driven_by_a_sensor) {

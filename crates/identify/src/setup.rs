@@ -150,6 +150,7 @@ impl<'a> Setup<'a> {
         if let Some(led) = problem.led(&baseline) {
             (problem, baseline) = compared(led.recordings);
             baseline.start = led.values;
+            problem = problem.doubted_at(&baseline);
         }
         if let Some(hidden) = problem.hidden_by_gaps(&baseline) {
             notes.extend(hidden.words(&problem.recordings));

@@ -47,6 +47,8 @@ pub struct Problem<'a> {
     pub floor: Floor,
     /// What of the response is in doubt since nobody recorded what drives between its samples: mean square by band.
     pub doubt: Vec<f64>,
+    /// Where the doubt is looked at: a hypothesis at its start; where none is, the stated rig.
+    pub doubted_at: Option<Hypothesis>,
 }
 
 impl<'a> Problem<'a> {
@@ -63,13 +65,38 @@ impl<'a> Problem<'a> {
         let scale = crate::data::scale(&recordings, rig);
         let stated = Parameters::stated(rig);
         let doubt = vec![0.0; spectrum.bands.len()];
-        let mut problem =
-            Self { model, rig, stated, recordings, masked, scale, criterion, spectrum, floor, doubt };
-        if let Some(doubt) = problem.doubt_of_drivers() {
-            problem.floor = problem.floor.with_doubt(&doubt);
-            problem.doubt = doubt;
+        Self {
+            model,
+            rig,
+            stated,
+            recordings,
+            masked,
+            scale,
+            criterion,
+            spectrum,
+            floor,
+            doubt,
+            doubted_at: None,
         }
-        problem
+        .doubted()
+    }
+
+    /// The problem, with what it owes to how that which drives runs as part of its floor.
+    fn doubted(mut self) -> Self {
+        self.floor = Floor::of_signal(&self.spectrum.bands, &self.criterion);
+        self.doubt.fill(0.0);
+        if let Some(doubt) = self.doubt_of_drivers() {
+            self.floor = self.floor.with_doubt(&doubt);
+            self.doubt = doubt;
+        }
+        self
+    }
+
+    /// The problem with its doubt looked at where this hypothesis starts: of a rig that is stated roughly, or whose
+    /// friction is not stated, the simulation may be far from what was recorded, and more at the mercy of its input.
+    pub fn doubted_at(mut self, hypothesis: &Hypothesis) -> Self {
+        self.doubted_at = Some(hypothesis.clone());
+        self.doubted()
     }
 
     /// The recordings, each once, though it be two experiments.
@@ -83,9 +110,11 @@ impl<'a> Problem<'a> {
         for (mask, held) in masked.iter_mut().zip(held) {
             mask.iter_mut().zip(held).for_each(|(m, h)| *m |= *h);
         }
-        Self {
-            scale: self.scale,
-            ..Self::new(self.model, self.rig, self.recordings.clone(), masked, self.criterion)
+        let new = Self::new(self.model, self.rig, self.recordings.clone(), masked, self.criterion);
+        let new = Self { scale: self.scale, ..new };
+        match &self.doubted_at {
+            Some(hypothesis) => new.doubted_at(hypothesis),
+            None => new,
         }
     }
 
