@@ -152,11 +152,16 @@ impl Search<'_, '_> {
     }
 
     /// A member in another form than before; where the form adds an order of the shaft's angle, at each usual one that is
-    /// not at work already.
+    /// not at work already. Orders are added one after the other: of several at once each would have to be chosen.
     fn chosen(&self, member: Member, before: &Member) -> Vec<Member> {
         let at_work = orders(before, &self.problem.scale);
-        let added = orders(&member, &self.problem.scale).into_iter().find(|place| !at_work.contains(place));
-        let Some(place) = added else { return vec![member] };
+        let mut added = orders(&member, &self.problem.scale);
+        added.retain(|place| !at_work.contains(place));
+        let place = match added[..] {
+            [] => return vec![member],
+            [place] => place,
+            _ => return Vec::new(),
+        };
         let taken: Vec<f64> = at_work.iter().map(|place| before.values[*place]).collect();
         let at = |order| {
             let mut values = member.values.clone();
