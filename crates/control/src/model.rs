@@ -204,6 +204,7 @@ impl ControlModel {
             clock_s: [0.0, duration_s],
             angle_known: true,
             turned_rad: f64::INFINITY,
+            angle_rad: [0.0; 2],
             reverses: true,
         }
     }

@@ -5,8 +5,8 @@
 
 use kort_thruster::both;
 use kort_thruster::effects::{
-    Available, Context, Descriptor, Effect, Hooks, Path, Spec, commanded, free_shaft, one_start,
-    thrust_measured, wet,
+    Available, Context, Descriptor, Effect, Hooks, Path, Spec, angle_known, commanded, free_shaft, one_start,
+    thrust_measured, turns_round, wet,
 };
 use kort_thruster::plant::{Balance, Drive, Local, Sensed, Tick};
 use kort_thruster::real::Real;
@@ -19,6 +19,7 @@ use crate::nameless::nameless;
 pub const TERMS: &[&Descriptor] = &[
     &SHAFT_OVER_SPEED,
     &SHAFT_OVER_FLOW,
+    &SHAFT_OVER_ANGLE,
     &SHAFT_OVER_TIME,
     &load_steps::LOAD_STEPS,
     &DRIVE_OVER_TIME,
@@ -76,6 +77,7 @@ fn heights(unit: &'static str, size: f64, [from, to]: [f64; 2]) -> Vec<Spec> {
 enum Place {
     ShaftOverSpeed,
     ShaftOverFlow,
+    ShaftOverAngle,
     ShaftOverTime,
     DriveOverTime,
     BladeOverSpeed,
@@ -120,6 +122,7 @@ impl<T: Real> Effect<T> for Term<T> {
         match self.place {
             Place::ShaftOverSpeed => balance.shaft_torque_n_m += self.at(speed),
             Place::ShaftOverFlow => balance.shaft_torque_n_m += self.at(flow),
+            Place::ShaftOverAngle => balance.shaft_torque_n_m += self.at(at.shaft_angle_rad),
             Place::ShaftOverTime => balance.shaft_torque_n_m += self.at(time),
             Place::BladeOverSpeed => balance.thrust_n += self.at(speed),
             Place::BladeOverFlow => balance.thrust_n += self.at(flow),
@@ -157,6 +160,16 @@ pub(crate) fn flow_seen(rig: &Rig, available: &Available) -> Result<(), &'static
     if available.axial_flow_modelled { Ok(()) } else { Err("the baseline has no axial flow") }
 }
 
+/// Needs a free shaft that swings: where it makes no whole turn, a weight, a spring or a cable may hang on it.
+fn swings(rig: &Rig, available: &Available) -> Result<(), &'static str> {
+    free_shaft(rig, available)?;
+    angle_known(rig, available)?;
+    match turns_round(rig, available) {
+        Ok(()) => Err("the shaft turns round, and what comes again with its angle is torque_ripple_cogging"),
+        Err(_) => Ok(()),
+    }
+}
+
 fn shaft_and_flow(rig: &Rig, available: &Available) -> Result<(), &'static str> {
     free_shaft(rig, available)?;
     flow_seen(rig, available)
@@ -179,6 +192,15 @@ term!(
     shaft_and_flow,
     |s| heights("N m", 0.1 * s.torque_n_m, s.both_ways(s.flow_m_s)),
     ShaftOverFlow
+);
+term!(
+    SHAFT_OVER_ANGLE,
+    "unknown_shaft_over_angle",
+    Shaft,
+    "shaft torque [N m] over shaft_angle_rad",
+    swings,
+    |s| heights("N m", 0.1 * s.torque_n_m, s.angle_rad),
+    ShaftOverAngle
 );
 term!(
     SHAFT_OVER_TIME,
@@ -278,6 +300,21 @@ mod tests {
         assert_eq!(curve(&values, &points, -9.0), 0.0);
         assert_eq!(curve(&values, &points, 9.0), 7.0);
         assert!((curve(&values, &points, 0.0) - 3.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_hangs_on_a_shaft_is_looked_for_where_it_swings() {
+        let rig = Rig::from_toml(
+            "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = 0.01\ntorque_constant_nm_a = 1.0\n",
+        )
+        .unwrap();
+        let turned = |turned_rad| {
+            let columns = vec![kort_thruster::effects::ANGLE_KNOWN.into()];
+            Available { columns, turned_rad, ..Available::default() }
+        };
+        assert!(swings(&rig, &turned(Some(1.2))).is_ok());
+        assert!(swings(&rig, &turned(Some(40.0))).is_err(), "it turns round");
+        assert!(swings(&rig, &Available::default()).is_err(), "nobody knows where it stands");
     }
 
     #[test]

@@ -72,6 +72,7 @@ fn levels(paper: &Paper, effect: &str) -> Vec<Level> {
         clock_s: [0.0, SETTLE_S],
         angle_known: true,
         turned_rad: f64::INFINITY,
+        angle_rad: [0.0; 2],
         reverses: true,
     };
     // Twice the size at which a fit would start: a few percent of the loads.

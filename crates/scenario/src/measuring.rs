@@ -98,6 +98,7 @@ mod tests {
             clock_s: [0.0, 10.0],
             angle_known: true,
             turned_rad: f64::INFINITY,
+            angle_rad: [0.0; 2],
             reverses: true,
         }
     }

@@ -274,6 +274,7 @@ pub fn scale(rig: &Rig, p: &Parameters, peak: f64, tick_s: f64, duration_s: f64)
         clock_s: [0.0, duration_s],
         angle_known: true,
         turned_rad: f64::INFINITY,
+        angle_rad: [0.0; 2],
         reverses: true,
     }
 }

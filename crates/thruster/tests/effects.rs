@@ -139,6 +139,7 @@ fn bench(name: &'static str, text: &str) -> Bench {
             clock_s: [0.0, DURATION_S],
             angle_known: true,
             turned_rad: f64::INFINITY,
+            angle_rad: [0.0; 2],
             reverses: true,
         },
         rig,

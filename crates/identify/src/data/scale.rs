@@ -69,6 +69,7 @@ pub fn scale(all: &[Prepared], rig: &Rig) -> Scale {
         reverses: goes_astern(all, speed, command),
         angle_known: angle_known(all),
         turned_rad: turned_rad(all),
+        angle_rad: ends_rad(all).filter(|_| angle_known(all)).unwrap_or([0.0; 2]),
     }
 }
 
@@ -95,13 +96,16 @@ fn angle_known(all: &[Prepared]) -> bool {
     all.iter().all(|p| p.stimulus.ticks.iter().any(|t| t.shaft_angle_rad.is_some()))
 }
 
+/// Least and greatest angle of the shaft, rad, where it is known.
+fn ends_rad<'a>(these: impl IntoIterator<Item = &'a Prepared>) -> Option<[f64; 2]> {
+    let ticks = these.into_iter().flat_map(|p| &p.stimulus.ticks);
+    let angles = ticks.filter_map(|t| t.shaft_angle_rad.map(|(at, _)| at));
+    angles.map(|q| [q, q]).reduce(|[a, b], [c, d]| [a.min(c), b.max(d)])
+}
+
 /// The longest way of a recording's shaft between its furthest ends, rad.
 fn turned_rad(all: &[Prepared]) -> f64 {
-    let way = |p: &Prepared| {
-        let angles = p.stimulus.ticks.iter().filter_map(|t| t.shaft_angle_rad.map(|(at, _)| at));
-        let ends = angles.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), q| (a.min(q), b.max(q)));
-        if ends.0.is_finite() { ends.1 - ends.0 } else { f64::INFINITY }
-    };
+    let way = |p: &Prepared| ends_rad([p]).map_or(f64::INFINITY, |[from, to]| to - from);
     all.iter().map(way).fold(0.0, f64::max)
 }
 

@@ -31,6 +31,8 @@ pub struct Scale {
     pub angle_known: bool,
     /// Way of the shaft's known angle between its furthest ends, rad; infinite where none is known.
     pub turned_rad: f64,
+    /// Least and greatest shaft angle of all recordings, rad; nothing where it is not known.
+    pub angle_rad: [f64; 2],
     /// Whether command or shaft speed ever went astern.
     pub reverses: bool,
 }
@@ -57,6 +59,7 @@ impl Scale {
         clock_s: [0.0, 1.0],
         angle_known: true,
         turned_rad: f64::INFINITY,
+        angle_rad: [0.0; 2],
         reverses: true,
     };
 }

@@ -72,6 +72,7 @@ impl Bench {
             clock_s: [0.0, DURATION_S],
             angle_known: true,
             turned_rad: f64::INFINITY,
+            angle_rad: [0.0; 2],
             reverses: true,
         };
         Self { rig, stimulus: Stimulus { ticks, logs }, scale }

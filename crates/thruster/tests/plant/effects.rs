@@ -151,6 +151,7 @@ fn cogging_has_several_orders_at_once() {
         clock_s: [0.0, 10.0],
         angle_known: true,
         turned_rad: f64::INFINITY,
+        angle_rad: [0.0; 2],
         reverses: true,
     };
     let mut values = vec![0.0; (cogging.parameters)(&scale).len()];
