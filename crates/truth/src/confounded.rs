@@ -3,6 +3,7 @@
 use crate::dice::Dice;
 use crate::excitation::Excitation;
 use crate::families;
+use crate::load::Load;
 use crate::log::Stamps;
 use crate::machines;
 use crate::plan::{Plan, Wanted};
@@ -23,6 +24,10 @@ pub fn confound(plan: &mut Plan, seed: u64, dice: &mut Dice) {
     // Rivals, each with the form that cannot be told from the others', and the size.
     let (rivals, share): (&[(&str, usize)], f64) = match seed % 5 {
         0 => {
+            // A weight turns the shaft back, where friction and an offset differ.
+            if plan.machine.load != Load::None {
+                plan.machine = dice.pick(&machines::DRY)(dice);
+            }
             plan.excitation = Excitation::OneSided;
             (&[("coulomb_friction", 0), ("torque_channel_bias", 0)], dice.between(0.02, 0.08))
         }

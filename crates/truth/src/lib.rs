@@ -3,7 +3,7 @@
 //!
 //! [`case`] builds recordings, the rig file stated for them, and the sealed answer:
 //!
-//! 1. a machine is drawn ([`machines`]): a thruster of some size, or a dry shaft;
+//! 1. a machine is drawn ([`machines`]): a thruster of some size, or a dry shaft, perhaps with a load that the rig states ([`load`]);
 //! 2. an excitation ([`excitation`]), perhaps inside a closed loop ([`controller`]);
 //! 3. what is hidden: effects, each from a family of forms ([`families`]), or terms of a random
 //!    grammar that no catalogue holds ([`grammar`]);
@@ -22,6 +22,7 @@ pub mod dice;
 pub mod excitation;
 pub mod families;
 pub mod grammar;
+pub mod load;
 pub mod log;
 pub mod machine;
 pub mod machines;

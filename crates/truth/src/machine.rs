@@ -1,6 +1,7 @@
 //! The true machine: motor, drive, shaft, perhaps blades and water, and its sensors.
 
 use crate::blades::Blades;
+use crate::load::Load;
 
 /// How the drive is commanded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,7 +59,9 @@ pub struct Machine {
     pub build: Build,
     /// Blades, duct and water.
     pub blades: Option<Blades>,
-    /// Inertia of all that turns, kg m2.
+    /// What else hangs on the shaft.
+    pub load: Load,
+    /// Inertia of all that turns, the load with it, kg m2.
     pub inertia_kg_m2: f64,
     /// Viscous friction that the rig states, N m s.
     pub viscous_nm_s: f64,

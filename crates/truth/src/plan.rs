@@ -68,6 +68,8 @@ pub struct Plan {
 
 /// Share of cases on a dry shaft.
 const DRY_SHARE: f64 = 0.3;
+/// Share of the dry shafts on which a load hangs.
+const LOADED_SHARE: f64 = 0.35;
 
 /// Draws machine, excitation, log and effects of a case.
 pub fn draw(kind: CaseKind, seed: u64, selection: &Selection, dice: &mut Dice) -> Plan {
@@ -80,7 +82,11 @@ pub fn draw(kind: CaseKind, seed: u64, selection: &Selection, dice: &mut Dice) -
         }
         _ => dice.pick(&Excitation::DRAWN),
     };
-    let closed = dice.chance(if machine.wet() { 0.12 } else { 0.3 });
+    let closed = dice.chance(match () {
+        () if machine.wet() => 0.12,
+        () if machine.load.swings() => 0.7,
+        () => 0.3,
+    });
     let columns = columns(&machine, closed, dice);
     let stamps = if dice.chance(0.75) { Stamps::Even } else { dice.pick(&[Stamps::Jitter, Stamps::Uneven]) };
     let mut plan = Plan {
@@ -89,7 +95,12 @@ pub fn draw(kind: CaseKind, seed: u64, selection: &Selection, dice: &mut Dice) -
             columns,
             stamps,
             from_s: if dice.chance(0.12) { dice.between(0.5, 3.0) } else { 0.0 },
-            encoder_zero_rad: encoder_zero_rad(&mut Dice::new(seed, 300 + kind as u64)),
+            // Where an arm hangs down is known.
+            encoder_zero_rad: if machine.load.swings() {
+                0.0
+            } else {
+                encoder_zero_rad(&mut Dice::new(seed, 300 + kind as u64))
+            },
         },
         closed,
         wanted: Vec::new(),
@@ -152,7 +163,13 @@ fn draw_machine(selection: &Selection, dice: &mut Dice) -> Machine {
         Some(kind) => kind == MachineKind::Dry,
         None => dice.chance(DRY_SHARE),
     };
-    if dry { dice.pick(&machines::DRY)(dice) } else { dice.pick(&machines::THRUSTERS)(dice) }
+    if !dry {
+        dice.pick(&machines::THRUSTERS)(dice)
+    } else if dice.chance(LOADED_SHARE) {
+        dice.pick(&machines::LOADED)(dice)
+    } else {
+        dice.pick(&machines::DRY)(dice)
+    }
 }
 
 /// Where an encoder stands that was switched on before: some of them count from nothing.
@@ -170,7 +187,8 @@ fn columns(machine: &Machine, closed: bool, dice: &mut Dice) -> Columns {
         command: !measured,
         duty: voltage && dice.chance(0.5),
         current,
-        angle: dice.chance(0.85),
+        // What a swinging weight does depends on where it is.
+        angle: dice.chance(0.85) || machine.load.swings(),
         thrust: wet && dice.chance(0.9),
         torque: wet && dice.chance(0.55),
         flow: wet && dice.chance(0.75),
@@ -269,10 +287,14 @@ impl Plan {
         let list = shares(self.excitation, seconds, quick_s, sensors.tick_s, dice);
         if !self.closed {
             let limit = self.machine.command_limit();
-            let top = if self.machine.drive == DriveKind::Voltage {
-                limit
-            } else {
-                limit * dice.between(0.85, 1.0)
+            let top = match self.machine.drive {
+                // Over the top is nothing to try open loop.
+                _ if self.machine.load.swings() => {
+                    let held = self.machine.load.largest_weight_n_m() / self.machine.torque_limit_n_m();
+                    limit * (dice.between(0.5, 0.8) * held).min(1.0)
+                }
+                DriveKind::Voltage => limit,
+                DriveKind::Current => limit * dice.between(0.85, 1.0),
             };
             return Trial {
                 asked: list.iter().map(|s| (s * top * 1e5).round() / 1e5).collect(),
@@ -296,11 +318,12 @@ impl Plan {
         };
         let slow_s = m.drive_lag_s + m.sensors.speed_filter_s + 2.0 * m.sensors.tick_s;
         let crossover = (0.4 / slow_s).min(6.0 / quick_s);
-        if !m.wet() && dice.chance(0.4) {
+        if !m.wet() && (m.load.swings() || dice.chance(0.4)) {
             let natural = 0.35 * crossover;
             let law =
                 Controller::Angle { proportional: natural * natural * per, damping: 1.6 * natural * per };
-            return (dice.between(1.0, 6.0), law);
+            let top = if m.load.swings() { dice.between(0.6, 2.5) } else { dice.between(1.0, 6.0) };
+            return (top, law);
         }
         let bench = Bench { machine: m, full: Scale::default(), step_s: m.coarse_step_s(), quantise: false };
         let ticks = (12.0 * quick_s / m.sensors.tick_s) as usize;

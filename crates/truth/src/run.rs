@@ -213,6 +213,8 @@ impl Bench<'_> {
         let twisted = physics.iter().find_map(|each| each.link(now, x[TWIST], x[SPEED] - x[FAR]));
         let load_speed = if twisted.is_some() { x[FAR] } else { x[SPEED] };
         let (thrust_n, torque_n_m) = self.blades(now, load_speed, physics, &mut of);
+        let load_angle = if twisted.is_some() { x[ANGLE] - x[TWIST] } else { x[ANGLE] };
+        let torque_n_m = torque_n_m + machine.load.torque_n_m(load_angle, load_speed);
         let inertia = machine.inertia_kg_m2 + shaft.inertia_kg_m2;
         let near = inertia * (1.0 - twisted.map_or(0.0, |link| link.far_share));
         let load = match twisted {

@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use crate::dice::Dice;
+use crate::load::Load;
 use crate::machine::{DriveKind, Machine};
 
 /// Quantities that a rig states and a fit may move.
@@ -26,6 +27,8 @@ pub enum Quantity {
     Viscous,
     /// `winding_resistance_ohm`
     Resistance,
+    /// `mass_kg` of a load, or the coefficient of a fan
+    LoadSize,
 }
 
 impl Quantity {
@@ -40,6 +43,9 @@ impl Quantity {
         }
         if machine.drive == DriveKind::Voltage {
             list.push(Resistance);
+        }
+        if machine.load != Load::None {
+            list.push(Quantity::LoadSize);
         }
         list
     }
@@ -58,7 +64,15 @@ impl Quantity {
             }
         }
         match self {
-            Quantity::Inertia => machine.inertia_kg_m2 *= factor,
+            Quantity::Inertia => {
+                let load = machine.load.inertia_kg_m2();
+                machine.inertia_kg_m2 = load + factor * (machine.inertia_kg_m2 - load);
+            }
+            Quantity::LoadSize => {
+                let own = machine.inertia_kg_m2 - machine.load.inertia_kg_m2();
+                machine.load = machine.load.scaled(factor);
+                machine.inertia_kg_m2 = own + machine.load.inertia_kg_m2();
+            }
             Quantity::TorqueConstant => machine.torque_constant_nm_a *= factor,
             Quantity::Viscous => machine.viscous_nm_s *= factor,
             Quantity::Resistance => machine.winding_resistance_ohm *= factor,
@@ -90,6 +104,8 @@ pub fn claims(machine: &Machine, close: &[Quantity], dice: &mut Dice) -> Vec<Cla
             _ if close.contains(&quantity) => 0.004,
             Quantity::Pitch => 0.3 * care.min(0.15),
             Quantity::Flux => 0.5 * care,
+            // A scale and a rule are at hand; a fan is as well known as the rest.
+            Quantity::LoadSize if machine.load.inertia_kg_m2() > 0.0 => 0.015,
             _ => care,
         };
         let error = (sigma * dice.normal()).clamp(-1.9 * sigma, 1.9 * sigma);
@@ -140,8 +156,11 @@ pub fn rig_toml(machine: &Machine, name: &str, claims: &[Claim], recorded: Recor
     } else {
         text += "kind = \"none\"\n";
     }
-    let _ =
-        writeln!(text, "\n[motor]\ninertia_kg_m2 = {}", claimed(Quantity::Inertia, machine.inertia_kg_m2));
+    let _ = writeln!(
+        text,
+        "\n[motor]\ninertia_kg_m2 = {}",
+        claimed(Quantity::Inertia, machine.inertia_kg_m2 - machine.load.inertia_kg_m2())
+    );
     let _ = writeln!(
         text,
         "torque_constant_nm_a = {}",
@@ -167,6 +186,30 @@ pub fn rig_toml(machine: &Machine, name: &str, claims: &[Claim], recorded: Recor
         machine.current_limit_a,
         significant(machine.supply_v, 4)
     );
+    match machine.load {
+        Load::None => {}
+        Load::Arm { mass_kg, length_m } => {
+            let _ = write!(
+                text,
+                "\n[load]\nkind = \"pendulum\"\nmass_kg = {}\nlength_m = {length_m}\n",
+                claimed(Quantity::LoadSize, mass_kg)
+            );
+        }
+        Load::Fan { drag_nm_s2 } => {
+            let _ = write!(
+                text,
+                "\n[load]\nkind = \"fan\"\nfan_coefficient_nm_s2 = {}\n",
+                claimed(Quantity::LoadSize, drag_nm_s2)
+            );
+        }
+        Load::Carriage { mass_kg, lead_m_rev, incline_rad } => {
+            let _ = write!(
+                text,
+                "\n[load]\nkind = \"slide\"\nmass_kg = {}\nlead_m_rev = {lead_m_rev}\nincline_rad = {incline_rad}\n",
+                claimed(Quantity::LoadSize, mass_kg)
+            );
+        }
+    }
     let s = &machine.sensors;
     text += "\n[sensors]\n";
     if !recorded.irregular {
@@ -220,6 +263,21 @@ mod tests {
             }
         }
         assert!(widest > 1.6 && widest <= 2.0, "{widest}");
+    }
+
+    #[test]
+    fn a_load_is_stated_beside_the_motor_s_own_inertia() {
+        let machine = crate::machines::LOADED[0](&mut Dice::new(3, 1));
+        let own = machine.inertia_kg_m2 - machine.load.inertia_kg_m2();
+        let recorded = Recorded { torque: false, irregular: false };
+        let text = rig_toml(&machine, "arm", &[], recorded);
+        assert!(text.contains(&format!("inertia_kg_m2 = {}", significant(own, 5))), "{text}");
+        assert!(text.contains("[load]\nkind = \"pendulum\""), "{text}");
+        // More inertia of the motor is no heavier weight, and the other way round.
+        let other = Quantity::Inertia.scaled(&machine, 1.5);
+        assert!((other.inertia_kg_m2 - other.load.inertia_kg_m2() - 1.5 * own).abs() < 1e-12);
+        let other = Quantity::LoadSize.scaled(&machine, 1.5);
+        assert!((other.inertia_kg_m2 - other.load.inertia_kg_m2() - own).abs() < 1e-12);
     }
 
     #[test]

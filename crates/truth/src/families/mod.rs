@@ -134,7 +134,12 @@ fn current_driven(machine: &Machine) -> bool {
 }
 
 fn encoder(machine: &Machine) -> bool {
-    machine.sensors.tachometer_noise == 0.0
+    machine.sensors.tachometer_noise == 0.0 && turns_round(machine)
+}
+
+/// What comes again with every turn is known by turns.
+fn turns_round(machine: &Machine) -> bool {
+    !machine.load.swings()
 }
 
 /// A bus that sags is seen where the voltage drives, or in water where the current needs most of it.

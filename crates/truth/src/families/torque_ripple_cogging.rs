@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::{Family, any};
+use super::{Family, turns_round};
 use crate::dice::Dice;
 use crate::machine::{Machine, Scale};
 use crate::physics::{Now, Path, Physics, Shaft};
@@ -11,7 +11,7 @@ use crate::physics::{Now, Path, Physics, Shaft};
 pub const FAMILY: Family = Family {
     path: Path::Drive,
     forms: &["one order", "several orders", "ripple with current"],
-    fits: any,
+    fits: turns_round,
     draw,
     ..Family::new("torque_ripple_cogging")
 };

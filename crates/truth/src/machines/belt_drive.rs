@@ -2,6 +2,7 @@
 
 use super::bench_sensors;
 use crate::dice::Dice;
+use crate::load::Load;
 use crate::machine::{Build, DriveKind, Machine, Sensors};
 
 /// A specimen.
@@ -11,6 +12,7 @@ pub fn specimen(dice: &mut Dice) -> Machine {
         class: "dry belt drive",
         build: Build::Belt,
         blades: None,
+        load: Load::None,
         inertia_kg_m2: dice.log_between(0.025, 0.1),
         viscous_nm_s: dice.between(0.15, 0.4),
         torque_constant_nm_a: dice.between(0.8, 1.3),

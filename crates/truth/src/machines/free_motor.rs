@@ -2,6 +2,7 @@
 
 use super::bench_sensors;
 use crate::dice::Dice;
+use crate::load::Load;
 use crate::machine::{Build, DriveKind, Machine};
 
 /// A specimen.
@@ -10,6 +11,7 @@ pub fn specimen(dice: &mut Dice) -> Machine {
         class: "dry brushless motor, no load",
         build: Build::Direct,
         blades: None,
+        load: Load::None,
         inertia_kg_m2: dice.log_between(3e-6, 1.2e-5),
         viscous_nm_s: dice.log_between(8e-5, 2e-4),
         torque_constant_nm_a: dice.between(0.018, 0.035),

@@ -3,6 +3,7 @@
 
 use super::bench_sensors;
 use crate::dice::Dice;
+use crate::load::Load;
 use crate::machine::{Build, DriveKind, Machine};
 
 /// A specimen.
@@ -12,6 +13,7 @@ pub fn specimen(dice: &mut Dice) -> Machine {
         class: "dry gear motor",
         build: Build::Geared,
         blades: None,
+        load: Load::None,
         inertia_kg_m2: dice.log_between(0.002, 0.012),
         viscous_nm_s: dice.log_between(0.004, 0.02),
         torque_constant_nm_a: dice.between(0.35, 0.7),

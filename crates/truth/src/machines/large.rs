@@ -2,6 +2,7 @@
 
 use super::{ducted, stand_sensors};
 use crate::dice::Dice;
+use crate::load::Load;
 use crate::machine::{Build, DriveKind, Machine, Sensors};
 
 /// A specimen.
@@ -10,6 +11,7 @@ pub fn specimen(dice: &mut Dice) -> Machine {
         class: "tunnel thruster",
         build: Build::Propeller,
         blades: Some(ducted(0.2, 0.25, (0.5, 0.75), (0.9, 1.2), dice)),
+        load: Load::None,
         inertia_kg_m2: dice.between(0.08, 0.14),
         viscous_nm_s: 0.0,
         torque_constant_nm_a: dice.between(2.1, 2.7),

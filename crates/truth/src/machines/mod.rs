@@ -1,13 +1,16 @@
 //! Machines, a file each: what is true of one specimen of a class.
 
 mod belt_drive;
+mod blower;
 mod free_motor;
 mod gear_motor;
+mod hoist;
 mod large;
 mod servo_axis;
 mod small;
 mod stand;
 mod survey;
+mod swing_arm;
 mod tiny;
 
 use crate::blades::Blades;
@@ -24,6 +27,10 @@ pub const THRUSTERS: [Specimen; 6] =
 /// Dry shafts.
 pub const DRY: [Specimen; 4] =
     [servo_axis::specimen, gear_motor::specimen, belt_drive::specimen, free_motor::specimen];
+
+/// Dry shafts with a load that the rig states.
+pub const LOADED: [Specimen; 4] =
+    [swing_arm::specimen, swing_arm::specimen, blower::specimen, hoist::specimen];
 
 /// Sensors of a thruster stand: 500 Hz control, 100 Hz log, 20 Hz flow meter.
 fn stand_sensors(thrust_full_scale_n: f64) -> Sensors {

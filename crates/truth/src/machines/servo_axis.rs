@@ -2,6 +2,7 @@
 
 use super::bench_sensors;
 use crate::dice::Dice;
+use crate::load::Load;
 use crate::machine::{Build, DriveKind, Machine};
 
 /// A specimen.
@@ -11,6 +12,7 @@ pub fn specimen(dice: &mut Dice) -> Machine {
         class: "dry servo axis",
         build: Build::Direct,
         blades: None,
+        load: Load::None,
         inertia_kg_m2: dice.log_between(0.0012, 0.006),
         viscous_nm_s: dice.between(0.012, 0.03),
         torque_constant_nm_a: dice.between(0.4, 0.65),

@@ -2,6 +2,7 @@
 
 use super::{ducted, stand_sensors};
 use crate::dice::Dice;
+use crate::load::Load;
 use crate::machine::{Build, DriveKind, Machine};
 
 /// A specimen.
@@ -11,6 +12,7 @@ pub fn specimen(dice: &mut Dice) -> Machine {
         class: "small brushless",
         build: Build::Propeller,
         blades: Some(ducted(0.038, 0.04, (0.62, 0.88), (0.75, 1.0), dice)),
+        load: Load::None,
         inertia_kg_m2: dice.between(5.2e-5, 6.8e-5),
         viscous_nm_s: 0.0,
         torque_constant_nm_a: dice.between(0.0158, 0.0195),

@@ -2,6 +2,7 @@
 
 use super::{ducted, stand_sensors};
 use crate::dice::Dice;
+use crate::load::Load;
 use crate::machine::{Build, DriveKind, Machine};
 
 /// A specimen.
@@ -10,6 +11,7 @@ pub fn specimen(dice: &mut Dice) -> Machine {
         class: "ducted work-class",
         build: Build::Propeller,
         blades: Some(ducted(0.13, 0.1271, (0.48, 0.62), (1.05, 1.35), dice)),
+        load: Load::None,
         inertia_kg_m2: dice.between(0.0085, 0.0115),
         viscous_nm_s: 0.0,
         torque_constant_nm_a: dice.between(1.12, 1.28),

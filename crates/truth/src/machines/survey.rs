@@ -2,6 +2,7 @@
 
 use super::{ducted, stand_sensors};
 use crate::dice::Dice;
+use crate::load::Load;
 use crate::machine::{Build, DriveKind, Machine};
 
 /// A specimen.
@@ -10,6 +11,7 @@ pub fn specimen(dice: &mut Dice) -> Machine {
         class: "ducted survey-class",
         build: Build::Propeller,
         blades: Some(ducted(0.075, 0.08, (0.62, 0.88), (0.75, 1.0), dice)),
+        load: Load::None,
         inertia_kg_m2: dice.between(7e-4, 9.5e-4),
         viscous_nm_s: 0.0,
         torque_constant_nm_a: dice.between(0.17, 0.21),

@@ -2,6 +2,7 @@
 
 use super::{ducted, stand_sensors};
 use crate::dice::Dice;
+use crate::load::Load;
 use crate::machine::{Build, DriveKind, Machine, Sensors};
 
 /// A specimen.
@@ -10,6 +11,7 @@ pub fn specimen(dice: &mut Dice) -> Machine {
         class: "micro ducted",
         build: Build::Propeller,
         blades: Some(ducted(0.025, 0.03, (0.6, 0.9), (0.8, 1.1), dice)),
+        load: Load::None,
         inertia_kg_m2: dice.between(6e-6, 1.1e-5),
         viscous_nm_s: 0.0,
         torque_constant_nm_a: dice.between(0.0085, 0.0115),

@@ -116,7 +116,7 @@ enum Kind {
 enum Machine {
     /// A thruster
     Thruster,
-    /// A dry shaft: servo axis, gear motor, belt drive, motor without a load
+    /// A dry shaft: servo axis, gear motor, belt drive, motor without a load, servo with a weight on an arm, blower, carriage on an incline
     Dry,
 }
 
