@@ -2,6 +2,7 @@
 
 use super::{Family, geared};
 use crate::dice::Dice;
+use crate::load::Load;
 use crate::machine::{Machine, Scale};
 use crate::memory::Lag;
 use crate::physics::{Now, Path, Physics, Shaft};
@@ -30,6 +31,8 @@ struct Gear {
     form: Form,
     full_n_m: f64,
     share: f64,
+    /// Share of the inertia that turns on the motor's side of the mesh: what it takes does not pass.
+    motor_side: f64,
     /// What the gear carries, through the mesh's own compliance.
     carried: Lag,
 }
@@ -40,7 +43,13 @@ fn draw(form: usize, machine: &Machine, _: &Scale, dice: &mut Dice) -> Box<dyn P
         1 => Form::Preload(dice.between(0.02, 0.1)),
         _ => Form::Driven(dice.between(1.2, 2.0)),
     };
-    Box::new(Gear { form, full_n_m: machine.torque_limit_n_m(), share: 0.0, carried: Lag::default() })
+    // Of a gear motor without a load, all of it turns on the far side.
+    let motor_side = match machine.load {
+        Load::None => 0.0,
+        load => 1.0 - load.inertia_kg_m2() / machine.inertia_kg_m2,
+    };
+    let full_n_m = machine.torque_limit_n_m();
+    Box::new(Gear { form, full_n_m, share: 0.0, motor_side, carried: Lag::default() })
 }
 
 impl Physics for Gear {
@@ -64,6 +73,8 @@ impl Physics for Gear {
     }
 
     fn advance(&mut self, now: &Now, step_s: f64) {
-        self.carried.follow(now.motor_torque_n_m - now.blade_torque_n_m, 0.001, step_s);
+        // The motor's torque less what turns its own side: J_m (motor - load) / J.
+        let motor = (1.0 - self.motor_side) * now.motor_torque_n_m;
+        self.carried.follow(motor + self.motor_side * now.blade_torque_n_m, 0.001, step_s);
     }
 }
