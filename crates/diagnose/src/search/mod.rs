@@ -2,6 +2,7 @@
 //! effects, to convergence. Every set that was fitted is kept, with its cost: the posterior is over them.
 
 mod afar;
+mod every_start;
 mod expand;
 mod forms;
 mod relatives;
@@ -239,15 +240,12 @@ impl<'a, 'p> Search<'a, 'p> {
                 let near = self.near(&best);
                 near.iter().for_each(|set| self.reshape(set));
                 next = self.better(best.clone(), near);
-                if !helps(self, &next) {
-                    next = self.stand_in(&best);
-                }
-                if !helps(self, &next) {
-                    next = self.relatives(&best);
-                }
-                if !helps(self, &next) && best.len() + 1 < MOST_EFFECTS {
-                    next = self.two_at_once(&best);
-                    if next != best {
+                for step in [Self::stand_in, Self::relatives, Self::every_start, Self::two_at_once] {
+                    if helps(self, &next) {
+                        break;
+                    }
+                    next = step(self, &best);
+                    if next.len() > best.len() {
                         next = self.settled(next, progress);
                     }
                 }

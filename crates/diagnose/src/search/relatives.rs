@@ -56,7 +56,7 @@ impl Search<'_, '_> {
 
     /// An effect at each of its starts on top of a set, beside the set's values and beside the stated ones, which it had
     /// to bend.
-    fn beside(&self, set: &Set, effect: &'static Descriptor) -> Vec<Starts> {
+    pub(super) fn beside(&self, set: &Set, effect: &'static Descriptor) -> Vec<Starts> {
         let Some(parent) = self.fits.get(set) else { return Vec::new() };
         let scale = &self.problem.scale;
         let whole = Member::new(effect, scale);
@@ -98,7 +98,7 @@ impl Search<'_, '_> {
     /// The best fit of a set that begins at one of these starts. Of the best from each place, and the best of the
     /// others, a few steps tell which leads furthest; it is fitted to its end where that is near the set whose place it is
     /// to take.
-    fn best_of_starts(&self, starts: Vec<Starts>, [set, rest, place]: [&Set; 3]) -> Option<Fit> {
+    pub(super) fn best_of_starts(&self, starts: Vec<Starts>, [set, rest, place]: [&Set; 3]) -> Option<Fit> {
         let floor = &self.floor_of(place);
         let merit = |fit: &Fit| fit.noise.misfit + fit.penalty;
         let steps = |(hypothesis, columns): &(Hypothesis, Columns), steps| {

@@ -82,6 +82,21 @@ fn two_that_pay_together_are_found_without_either_alone() {
 }
 
 #[test]
+fn what_acts_out_of_proportion_is_begun_from_every_start_where_more_than_noise_is_left() {
+    with_search(vec![&coulomb_friction::DESCRIPTOR, &encoder_filter_lag::DESCRIPTOR], |search| {
+        let nothing = Set::new();
+        search.probes.insert(nothing.clone(), search.probe_all(&nothing));
+        search.expand(&nothing, f64::NEG_INFINITY);
+        let both = search.two_at_once(&nothing);
+        let alone = vec!["coulomb_friction"];
+        assert_eq!(search.every_start(&both), both);
+        assert!(!search.fits.contains_key(&alone), "what both leave is noise: there is nothing to begin for");
+        search.every_start(&nothing);
+        assert!(search.cost(&alone) < search.cost(&nothing) - 100.0, "no screen led there");
+    });
+}
+
+#[test]
 fn orders_of_cogging_that_are_not_the_usual_ones_are_found_one_after_the_other() {
     let orders = [3.0, 5.0, 9.0];
     let cogging_n_m = move |angle: f64| orders.iter().map(|k| 4e-4 * (k * angle + k).sin()).sum();

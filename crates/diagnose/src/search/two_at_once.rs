@@ -12,7 +12,7 @@ use kort_identify::hypothesis::Hypothesis;
 use nalgebra::DVector;
 use rayon::prelude::*;
 
-use super::{ITERATIONS, Search, Set, with};
+use super::{ITERATIONS, MOST_EFFECTS, Search, Set, with};
 use crate::screen::Screened;
 
 /// Pairs that are fitted on top of one set.
@@ -30,6 +30,9 @@ struct Pair {
 impl Search<'_, '_> {
     /// Fits on top of a set the pairs that promise to pay; the best set.
     pub(super) fn two_at_once(&mut self, set: &Set) -> Set {
+        if set.len() + 1 >= MOST_EFFECTS {
+            return set.clone();
+        }
         let bar = self.cost(set);
         let mut promised: Vec<Pair> = self.promised_pairs(set);
         promised.retain(|pair| !self.fits.contains_key(&pair.set));
