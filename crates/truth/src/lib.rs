@@ -3,7 +3,8 @@
 //!
 //! [`case`] builds recordings, the rig file stated for them, and the sealed answer:
 //!
-//! 1. a machine is drawn ([`machines`]): a thruster of some size, or a dry shaft, perhaps with a load that the rig states ([`load`]);
+//! 1. a machine is drawn ([`machines`]): a thruster of some size, or a dry shaft, perhaps with a load that
+//!    the rig states ([`load`]);
 //! 2. an excitation ([`excitation`]), perhaps inside a closed loop ([`controller`]);
 //! 3. what is hidden: effects, each from a family of forms ([`families`]), or terms of a random
 //!    grammar that no catalogue holds ([`grammar`]);
