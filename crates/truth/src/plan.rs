@@ -82,11 +82,8 @@ pub fn draw(kind: CaseKind, seed: u64, selection: &Selection, dice: &mut Dice) -
         }
         _ => dice.pick(&Excitation::DRAWN),
     };
-    let closed = dice.chance(match () {
-        () if machine.wet() => 0.12,
-        () if machine.load.swings() => 0.7,
-        () => 0.3,
-    });
+    let closed_share = if machine.load.swings() { 0.7 } else { 0.3 };
+    let closed = dice.chance(if machine.wet() { 0.12 } else { closed_share });
     let columns = columns(&machine, closed, dice);
     let stamps = if dice.chance(0.75) { Stamps::Even } else { dice.pick(&[Stamps::Jitter, Stamps::Uneven]) };
     let mut plan = Plan {
