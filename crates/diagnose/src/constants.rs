@@ -45,8 +45,10 @@ pub struct PosteriorConstants {
     pub temper: f64,
     /// What the temper grows to as a share of what the likeliest set costs less than the baseline.
     pub form_share: f64,
-    /// Odds against the likeliest set by the number of its effects.
+    /// What leaving a name out must cost for odds of one to one that nothing which was not fitted is right in its place.
     pub surprise: f64,
+    /// Power with which those odds grow.
+    pub surprise_power: f64,
     /// Factor on a name in a set that needs a nameless term: the world then holds what the catalogue does not.
     pub beside_unknown: f64,
 }
@@ -80,12 +82,13 @@ mod tests {
             c.posterior.temper,
             c.posterior.form_share,
             c.posterior.surprise,
+            c.posterior.surprise_power,
             c.posterior.beside_unknown,
             c.remainder.practical,
             c.remainder.practical_flow,
         ] {
             assert!(value > 0.0);
         }
-        assert!(c.posterior.surprise < 0.5 && c.search.exact > 1);
+        assert!(c.posterior.beside_unknown < 1.0 && c.search.exact > 1);
     }
 }

@@ -3,7 +3,7 @@
 use kort_identify::thin::Thin;
 
 use crate::flexible::is_term;
-use crate::posterior::{Explanation, presence, told};
+use crate::posterior::Posterior;
 use crate::report::Verdict;
 use crate::search::Set;
 
@@ -31,7 +31,7 @@ pub struct Decision {
 
 /// A rival stands near a name from this share of its probability on: odds of five to one part them.
 pub(crate) const NEAR: f64 = 0.2;
-/// From this probability on, among all that was fitted, a name is believed.
+/// From this probability on a name is believed.
 const BELIEVED: f64 = 0.7;
 /// A remainder below this share of what was to be explained is of no practical size.
 const PRACTICAL: f64 = 0.1;
@@ -51,33 +51,29 @@ pub struct Circumstances {
     pub broke_down: bool,
     /// Share of the squared error above the noise that the told set's names leave.
     pub left: f64,
-    /// Factor on names beside what has no name: a nameless term, or more error than noise.
-    pub beside_unknown: f64,
     /// Whether the told set leaves more than noise of such sensors can be.
     pub more_than_noise: bool,
 }
 
-/// Decides from the posterior over sets, likeliest first.
-pub fn decide(explanations: &[Explanation], circumstances: &Circumstances) -> Decision {
+/// Decides from the posterior over sets.
+pub fn decide(posterior: &Posterior, circumstances: &Circumstances) -> Decision {
     let empty: Set = Vec::new();
-    let best = told(explanations).map_or(&empty, |e| &e.set);
+    let best = posterior.told().map_or(&empty, |e| e.set());
     let term = best.iter().copied().find(|id| is_term(id));
     let stands = |id: &&'static str| !is_term(id) && !circumstances.negligible.contains(id);
     let members: Vec<&'static str> = best.iter().copied().filter(stands).collect();
-    // How likely a name is among all that was fitted, and whether it stands in a world that the catalogue holds.
-    let among_names = |effect: &str| presence(explanations, effect, 1.0);
+    // How likely a name is, and how likely where the catalogue does not hold all that acts.
     let stated = |effect: &str| {
-        let factor = circumstances.beside_unknown;
         if circumstances.more_than_noise {
-            factor * among_names(effect)
+            posterior.beside_unknown() * posterior.probability(effect)
         } else {
-            presence(explanations, effect, factor)
+            posterior.stated(effect)
         }
     };
     let mut named: Vec<Named> = Vec::new();
     for member in &members {
         let taken = |id: &&'static str| named.iter().any(|n| n.effect == *id);
-        let rivals: Vec<&'static str> = rivals(explanations, best, member, &circumstances.unparted)
+        let rivals: Vec<&'static str> = rivals(posterior, best, member, &circumstances.unparted)
             .into_iter()
             .filter(|id| !taken(id))
             .collect();
@@ -90,7 +86,7 @@ pub fn decide(explanations: &[Explanation], circumstances: &Circumstances) -> De
             });
         }
     }
-    let believed = |n: &Named| among_names(n.effect) >= BELIEVED && n.rivals.is_empty();
+    let believed = |n: &Named| posterior.probability(n.effect) >= BELIEVED && n.rivals.is_empty();
     let changes = |n: &Named| !circumstances.steady.contains(&n.effect);
     let verdict = if circumstances.broke_down
         || circumstances.thin.as_ref().is_some_and(|thin| thin.still)
@@ -125,27 +121,27 @@ pub fn decide(explanations: &[Explanation], circumstances: &Circumstances) -> De
 /// Effects that stand in a member's place, alone or two together, in sets that are else the same and likely enough
 /// to be stated, or as good by the data alone.
 fn rivals(
-    explanations: &[Explanation],
+    posterior: &Posterior,
     best: &Set,
     member: &str,
     unparted: &[(&'static str, &'static str)],
 ) -> Vec<&'static str> {
     let rest: Vec<&str> = best.iter().copied().filter(|id| *id != member).collect();
-    let likely = told(explanations).map_or(0.0, |e| e.probability);
+    let likely = posterior.told().map_or(0.0, |e| e.probability);
     let mut out = Vec::new();
-    for other in explanations {
-        let new: Vec<&'static str> = other.set.iter().copied().filter(|id| !best.contains(id)).collect();
+    for other in &posterior.sets {
+        let new: Vec<&'static str> = other.set().iter().copied().filter(|id| !best.contains(id)).collect();
         let near = match new[..] {
             [new] => {
-                presence(explanations, new, 1.0) >= NEAR * presence(explanations, member, 1.0)
+                posterior.presence(new) >= NEAR * posterior.presence(member)
                     || unparted.iter().any(|(of, rival)| *of == member && *rival == new)
             }
             [_, _] => other.probability >= NEAR * likely,
             _ => false,
         };
         if near
-            && other.set.len() == rest.len() + new.len()
-            && rest.iter().all(|id| other.set.contains(id))
+            && other.set().len() == rest.len() + new.len()
+            && rest.iter().all(|id| other.set().contains(id))
             && !new.iter().any(|id| is_term(id))
         {
             new.into_iter().for_each(|id| {
@@ -161,16 +157,21 @@ fn rivals(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::posterior::posterior;
+    use crate::constants::{Constants, PosteriorConstants};
+    use crate::posterior::Fitted;
 
     fn decided(costs: &[(&[&'static str], f64)], circumstances: &Circumstances) -> Decision {
-        let costs = costs.iter().map(|(set, cost)| (set.to_vec(), *cost)).collect();
-        decide(&posterior(costs, 3.0, 0.01), circumstances)
+        let of =
+            |(set, cost): &(&[&'static str], f64)| Fitted { set: set.to_vec(), alone: *cost, cost: *cost };
+        let constants =
+            PosteriorConstants { surprise: 5.0, beside_unknown: 0.75, ..Constants::built_in().posterior };
+        let fitted = costs.iter().map(of).collect();
+        decide(&Posterior::new(fitted, 3.0, &constants), circumstances)
     }
 
     #[test]
     fn verdicts_follow_from_the_posterior() {
-        let usual = Circumstances { beside_unknown: 0.75, ..Circumstances::default() };
+        let usual = Circumstances::default();
         let left = Circumstances { left: 0.4, ..usual.clone() };
         let thin = Circumstances { thin: Some(Thin { why: String::new(), still: false }), ..usual.clone() };
         let still = Circumstances { thin: Some(Thin { why: String::new(), still: true }), ..usual.clone() };
@@ -196,8 +197,8 @@ mod tests {
                 much,
                 Verdict::Unexplained,
             ),
-            (&[(&["unknown_shaft_step", "windage_drag"], 0.0)], left, Verdict::PartlyExplained),
-            (&[(&["unknown_shaft_step", "windage_drag"], 0.0)], usual, Verdict::Explained),
+            (&[(&["unknown_shaft_step", "windage_drag"], 0.0), (&[], 80.0)], left, Verdict::PartlyExplained),
+            (&[(&["unknown_shaft_step", "windage_drag"], 0.0), (&[], 80.0)], usual, Verdict::Explained),
             (
                 &[(&["unknown_shaft_step", "windage_drag"], 0.0), (&["unknown_shaft_step"], 1.0)],
                 left,
@@ -223,12 +224,13 @@ mod tests {
     #[test]
     fn beside_more_than_noise_a_name_is_stated_lower_and_still_believed() {
         let costs: &[(&[&'static str], f64)] = &[(&["windage_drag"], 0.0), (&[], 80.0)];
-        let usual = Circumstances { beside_unknown: 0.75, ..Circumstances::default() };
+        let usual = Circumstances::default();
         let much = Circumstances { more_than_noise: true, ..usual.clone() };
         let (alone, beside) = (decided(costs, &usual), decided(costs, &much));
         assert!((beside.named[0].probability - 0.75 * alone.named[0].probability).abs() < 1e-12);
         // The factor is not counted again where a nameless term stands in the set already.
-        let with_term: &[(&[&'static str], f64)] = &[(&["unknown_shaft_step", "windage_drag"], 0.0)];
+        let with_term: &[(&[&'static str], f64)] =
+            &[(&["unknown_shaft_step", "windage_drag"], 0.0), (&[], 80.0)];
         let (once, twice) = (decided(with_term, &usual), decided(with_term, &much));
         assert!((once.named[0].probability - twice.named[0].probability).abs() < 1e-12);
         assert_eq!(beside.verdict, Verdict::PartlyExplained);
@@ -238,7 +240,7 @@ mod tests {
     fn what_only_a_common_effect_s_odds_part_is_not_told_apart() {
         let costs: &[(&[&'static str], f64)] =
             &[(&["thrust_sensor_lag"], 0.0), (&["clock_skew"], 11.0), (&[], 90.0)];
-        let usual = Circumstances { beside_unknown: 0.75, ..Circumstances::default() };
+        let usual = Circumstances::default();
         assert_eq!(decided(costs, &usual).verdict, Verdict::Explained, "odds of six to one");
         let unparted = vec![("thrust_sensor_lag", "clock_skew")];
         let decision = decided(costs, &Circumstances { unparted, ..usual });
@@ -249,7 +251,7 @@ mod tests {
 
     #[test]
     fn two_effects_in_the_place_of_one_are_its_rivals() {
-        let usual = Circumstances { beside_unknown: 0.75, ..Circumstances::default() };
+        let usual = Circumstances::default();
         let with = |cost: f64| {
             let pair: &[&'static str] = &["coulomb_friction", "torque_channel_bias"];
             decided(&[(&["direction_dependent_friction"], 0.0), (pair, cost), (&[], 90.0)], &usual)
@@ -268,8 +270,9 @@ mod tests {
                 (&["duct_loss", "windage_drag"], 0.0),
                 (&["duct_loss", "coulomb_friction"], 1.0),
                 (&["duct_loss"], 70.0),
+                (&[], 140.0),
             ],
-            &Circumstances { beside_unknown: 0.75, ..Circumstances::default() },
+            &Circumstances::default(),
         );
         let names: Vec<&str> = decision.named.iter().map(|n| n.effect).collect();
         assert_eq!(names, ["duct_loss", "windage_drag", "coulomb_friction"]);

@@ -11,7 +11,7 @@ use serde::Serialize;
 use crate::constants::Constants;
 use crate::decide::NEAR;
 use crate::left;
-use crate::posterior::{Explanation, posterior, told};
+use crate::posterior::{Explanation, Fitted, Posterior};
 use crate::report::Report;
 use crate::search::{Search, Set};
 use crate::traces::Traces;
@@ -105,19 +105,23 @@ pub fn diagnose(
 /// Probabilities of all sets that were fitted. What the baseline alone leaves is no noise of sensors where it is larger than
 /// theirs or follows the machine; where it is likeliest all the same and a set near it leaves none of that, it is set
 /// aside, and it is said that it was: a constant is one fact, however plain it is.
-fn explanations(search: &Search, constants: &Constants) -> (Vec<Explanation>, bool) {
-    let costs: Vec<(Set, f64)> = search.fits.keys().map(|set| (set.clone(), search.cost(set))).collect();
-    let of = |costs| posterior(costs, search.temper(), constants.posterior.surprise);
-    let all = of(costs.clone());
+fn explanations(search: &Search, constants: &Constants) -> (Posterior, bool) {
+    let of = |keep: &dyn Fn(&Set) -> bool| {
+        let kept = search.fits.iter().filter(|(set, _)| keep(set));
+        let fitted =
+            kept.map(|(set, fit)| Fitted { set: set.clone(), alone: fit.cost(), cost: search.cost(set) });
+        Posterior::new(fitted.collect(), search.temper(), &constants.posterior)
+    };
+    let all = of(&|_| true);
     let leaves_more = |set: &Set| left::leaves_more(search.problem, &search.fits[set]);
-    let Some(likeliest) = told(&all).filter(|e| e.set.is_empty() && leaves_more(&e.set)) else {
+    let Some(likeliest) = all.told().filter(|e| e.set().is_empty() && leaves_more(e.set())) else {
         return (all, false);
     };
-    let near = |e: &&Explanation| !e.set.is_empty() && e.probability >= NEAR * likeliest.probability;
-    if !all.iter().filter(near).any(|e| !leaves_more(&e.set)) {
+    let near = |e: &&Explanation| !e.set().is_empty() && e.probability >= NEAR * likeliest.probability;
+    if !all.sets.iter().filter(near).any(|e| !leaves_more(e.set())) {
         return (all, false);
     }
-    (of(costs.into_iter().filter(|(set, _)| !set.is_empty()).collect()), true)
+    (of(&|set| !set.is_empty()), true)
 }
 
 /// Effects that can act here and are no part of the baseline.

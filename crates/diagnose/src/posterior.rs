@@ -4,21 +4,31 @@ use crate::constants::PosteriorConstants;
 use crate::flexible::is_term;
 use crate::search::Set;
 
+/// A set of effects as it was fitted.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fitted {
+    /// The set; empty is the baseline alone.
+    pub set: Set,
+    /// What the recordings and its sizes cost it: twice the negative log of its evidence.
+    pub alone: f64,
+    /// Its cost with the prior odds of its members.
+    pub cost: f64,
+}
+
 /// A set of effects with what speaks for it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Explanation {
-    /// The set; empty is the baseline alone.
-    pub set: Set,
-    /// Its cost: twice the negative log of evidence and prior.
-    pub cost: f64,
-    /// Its probability.
+    /// The set with its costs.
+    pub fitted: Fitted,
+    /// Its probability among the sets that were fitted.
     pub probability: f64,
 }
 
-/// How far a set of so many effects may be believed if it is the likeliest by far. What was not fitted may be right
-/// in the place of each: the odds against it grow as their number.
-pub fn trusted(effects: usize, surprise: f64) -> f64 {
-    1.0 / (1.0 + surprise * effects as f64)
+impl Explanation {
+    /// Its effects.
+    pub const fn set(&self) -> &Set {
+        &self.fitted.set
+    }
 }
 
 /// How far costs count as odds where the likeliest set costs so much less than the baseline. No form is exact, so costs
@@ -27,63 +37,120 @@ pub fn temper(constants: &PosteriorConstants, gain: f64) -> f64 {
     constants.temper.hypot(constants.form_share * gain.max(0.0))
 }
 
-/// Probabilities of sets, likeliest first: in proportion to `exp(-cost / (2 temper))`, as far as each may be [`trusted`].
-pub fn posterior(costs: Vec<(Set, f64)>, temper: f64, surprise: f64) -> Vec<Explanation> {
-    let least = costs.iter().map(|c| c.1).fold(f64::INFINITY, f64::min);
-    let weight = |cost: f64| (-(cost - least) / (2.0 * temper)).exp();
-    let total: f64 = costs.iter().map(|c| weight(c.1)).sum();
-    let mut all: Vec<Explanation> = costs
-        .into_iter()
-        .map(|(set, cost)| {
-            let probability = trusted(set.len(), surprise) * weight(cost) / total;
-            Explanation { set, cost, probability }
-        })
-        .collect();
-    all.sort_by(|a, b| {
-        b.probability
-            .total_cmp(&a.probability)
-            .then(a.cost.total_cmp(&b.cost))
-            .then_with(|| a.set.cmp(&b.set))
-    });
-    all
+/// Odds that something which was not fitted is right in the place of an effect without which the recordings cost so
+/// much more. Among what was fitted a difference of cost counts by its exponential; what an equation that nobody wrote
+/// down would have taken of it is not bounded so, and dies off as a power only.
+pub fn doubt(constants: &PosteriorConstants, gain: f64) -> f64 {
+    (constants.surprise / gain.max(LEAST_GAIN)).powf(constants.surprise_power)
 }
 
-/// The set that is told: the likeliest, unless it needs what has no name and that is no likelier there than not. Then it
-/// is the likeliest that needs nothing without a name.
-pub fn told(explanations: &[Explanation]) -> Option<&Explanation> {
-    let likeliest = explanations.first()?;
-    let term = likeliest.set.iter().find(|id| is_term(id));
-    if term.is_none_or(|term| presence(explanations, term, 1.0) >= 0.5) {
-        return Some(likeliest);
+/// Gains below this are none, whatever the data.
+const LEAST_GAIN: f64 = 1.0;
+
+/// All sets that were fitted, likeliest first.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Posterior {
+    /// The sets.
+    pub sets: Vec<Explanation>,
+    constants: PosteriorConstants,
+}
+
+impl Posterior {
+    /// Probabilities in proportion to `exp(-cost / (2 temper))`.
+    pub fn new(fitted: Vec<Fitted>, temper: f64, constants: &PosteriorConstants) -> Self {
+        let least = fitted.iter().map(|f| f.cost).fold(f64::INFINITY, f64::min);
+        let weight = |cost: f64| (-(cost - least) / (2.0 * temper)).exp();
+        let total: f64 = fitted.iter().map(|f| weight(f.cost)).sum();
+        let of = |fitted: Fitted| Explanation { probability: weight(fitted.cost) / total, fitted };
+        let mut sets: Vec<Explanation> = fitted.into_iter().map(of).collect();
+        sets.sort_by(|a, b| {
+            (a.fitted.cost.total_cmp(&b.fitted.cost)).then_with(|| a.fitted.set.cmp(&b.fitted.set))
+        });
+        Self { sets, constants: *constants }
     }
-    explanations.iter().find(|e| !e.set.iter().any(|id| is_term(id)))
-}
 
-/// Probability that an effect is present: the sum over the sets that hold it, those that need a nameless term
-/// counted by `beside_unknown`.
-pub fn presence(explanations: &[Explanation], effect: &str, beside_unknown: f64) -> f64 {
-    explanations
-        .iter()
-        .filter(|e| e.set.contains(&effect))
-        .map(
-            |e| {
-                if e.set.iter().any(|id| is_term(id)) {
-                    beside_unknown * e.probability
-                } else {
-                    e.probability
-                }
-            },
-        )
-        .sum()
+    /// The set that is told: the likeliest, unless it needs what has no name and that is no likelier there than not. Then
+    /// it is the likeliest that needs nothing without a name.
+    pub fn told(&self) -> Option<&Explanation> {
+        let likeliest = self.sets.first()?;
+        let term = likeliest.set().iter().find(|id| is_term(id));
+        if term.is_none_or(|term| self.presence(term) >= 0.5) {
+            return Some(likeliest);
+        }
+        self.sets.iter().find(|e| !e.set().iter().any(|id| is_term(id)))
+    }
+
+    /// Share that the sets which hold an effect have of all that were fitted.
+    pub fn presence(&self, effect: &str) -> f64 {
+        self.holding(effect).map(|e| e.probability).sum()
+    }
+
+    /// Probability of an effect in a world that the catalogue holds: its sets against all others that were fitted and
+    /// against what was not, in its place ([`doubt`]).
+    pub fn probability(&self, effect: &str) -> f64 {
+        let presence = self.presence(effect);
+        presence / (1.0 + presence * self.doubt_of(effect))
+    }
+
+    /// The same in the world as it is: sets that need a nameless term count by a factor less.
+    pub fn stated(&self, effect: &str) -> f64 {
+        let presence = self.presence(effect);
+        if presence == 0.0 {
+            return 0.0;
+        }
+        let term = |e: &&Explanation| e.set().iter().any(|id| is_term(id));
+        let beside: f64 = self.holding(effect).filter(term).map(|e| e.probability).sum();
+        self.probability(effect) * (1.0 - (1.0 - self.constants.beside_unknown) * beside / presence)
+    }
+
+    /// Probability of a set with all its members in place, [`doubt`] of each counted.
+    pub fn of_set(&self, explanation: &Explanation) -> f64 {
+        let in_place = |id| 1.0 / (1.0 + doubt(&self.constants, self.gain(explanation, id)));
+        explanation.probability * explanation.set().iter().copied().map(in_place).product::<f64>()
+    }
+
+    /// Factor on names beside more error than noise.
+    pub const fn beside_unknown(&self) -> f64 {
+        self.constants.beside_unknown
+    }
+
+    fn holding(&self, effect: &str) -> impl Iterator<Item = &Explanation> {
+        self.sets.iter().filter(move |e| e.set().contains(&effect))
+    }
+
+    fn doubt_of(&self, effect: &str) -> f64 {
+        let likeliest = self.holding(effect).next();
+        likeliest.map_or(f64::INFINITY, |e| doubt(&self.constants, self.gain(e, effect)))
+    }
+
+    /// What the recordings cost more without one of a set's members: the least of what was fitted of the others. None was
+    /// where the baseline is set aside; what is gained is not known then and counts as where odds are even.
+    fn gain(&self, explanation: &Explanation, member: &str) -> f64 {
+        let smaller = |e: &&Explanation| {
+            !e.set().contains(&member) && e.set().iter().all(|id| explanation.set().contains(id))
+        };
+        let least = self.sets.iter().filter(smaller).map(|e| e.fitted.alone).reduce(f64::min);
+        least.map_or(self.constants.surprise, |least| least - explanation.fitted.alone)
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn constants() -> PosteriorConstants {
+        crate::constants::Constants::built_in().posterior
+    }
+
+    fn of(costs: &[(&[&'static str], f64)], temper: f64) -> Posterior {
+        let fitted =
+            costs.iter().map(|(set, cost)| Fitted { set: set.to_vec(), alone: *cost, cost: *cost }).collect();
+        Posterior::new(fitted, temper, &constants())
+    }
+
     #[test]
     fn the_temper_is_the_least_where_little_is_explained_and_a_share_of_much() {
-        let constants = crate::constants::Constants::built_in().posterior;
+        let constants = constants();
         let (least, share) = (constants.temper, constants.form_share);
         assert_eq!(temper(&constants, -3.0), least, "a baseline that nothing betters");
         assert!((temper(&constants, 0.1 * least / share) / least - 1.0).abs() < 0.01);
@@ -92,28 +159,50 @@ mod tests {
 
     #[test]
     fn equal_sets_share_and_a_far_one_has_nothing() {
-        let costs = vec![(vec!["a"], 10.0), (vec!["b"], 10.0), (vec![], 500.0)];
-        let all = posterior(costs, 3.0, 0.04);
-        assert!((presence(&all, "a", 0.7) - 0.5 / 1.04).abs() < 1e-12);
-        assert!((presence(&all, "b", 0.7) - 0.5 / 1.04).abs() < 1e-12);
-        assert!(all[2].probability < 1e-12);
+        let all = of(&[(&["a"], 10.0), (&["b"], 10.0), (&[], 1e4)], 3.0);
+        assert!((all.presence("a") - 0.5).abs() < 1e-9 && (all.presence("b") - 0.5).abs() < 1e-9);
+        assert!(all.sets[2].probability < 1e-12);
+        assert_eq!(all.stated("c"), 0.0, "what was not fitted");
     }
 
     #[test]
     fn what_has_no_name_is_told_where_it_is_likelier_there_than_not() {
-        let at = |cost: f64| {
-            posterior(vec![(vec!["unknown_x"], 0.0), (vec![], cost), (vec!["a"], cost)], 3.0, 0.03)
-        };
-        assert_eq!(told(&at(0.5)).unwrap().set, Set::new());
-        assert_eq!(told(&at(60.0)).unwrap().set, ["unknown_x"]);
-        assert_eq!(told(&[]), None);
+        let at = |cost: f64| of(&[(&["unknown_x"], 0.0), (&[], cost), (&["a"], cost)], 3.0);
+        assert!(at(0.5).told().unwrap().set().is_empty());
+        assert_eq!(*at(60.0).told().unwrap().set(), ["unknown_x"]);
+        assert_eq!(of(&[], 3.0).told(), None);
     }
 
     #[test]
-    fn an_effect_in_every_likely_set_is_as_sure_as_all_of_them() {
-        let costs = vec![(vec!["a", "b"], 0.0), (vec!["a", "c"], 1.0), (vec!["a"], 60.0)];
-        let all = posterior(costs, 3.0, 0.03);
-        assert!((presence(&all, "a", 0.7) - 1.0 / 1.06).abs() < 1e-3, "as two may be trusted");
-        assert!(presence(&all, "b", 0.7) > presence(&all, "c", 0.7));
+    fn without_a_rival_a_name_is_as_sure_as_what_leaving_it_out_costs() {
+        let surprise = constants().surprise;
+        let without = |gain: f64| of(&[(&["a", "b"], 0.0), (&["a"], gain), (&["b"], 1e5), (&[], 1e6)], 1.0);
+        let even = without(surprise);
+        assert!((even.probability("b") - 0.5).abs() < 1e-6, "odds of one to one at the surprise");
+        assert!(even.probability("a") > 0.999, "each by its own");
+        assert!(without(2.0 * surprise).probability("b") > 0.7);
+        assert!(without(0.5 * surprise).probability("b") < 0.3);
+        let set = &even.sets[0];
+        assert!((even.of_set(set) - even.probability("a") * even.probability("b")).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_rival_and_the_doubt_are_not_counted_as_one_factor_each() {
+        let surprise = constants().surprise;
+        let two = of(&[(&["a"], 0.0), (&["b"], 0.0), (&[], surprise)], 1.0);
+        assert!((two.probability("a") - 1.0 / 3.0).abs() < 1e-3, "a, b and what was not fitted");
+    }
+
+    #[test]
+    fn beside_a_nameless_term_a_name_is_stated_lower() {
+        let factor = constants().beside_unknown;
+        let all = of(&[(&["a", "unknown_x"], 0.0), (&["unknown_x"], 1e4), (&["a"], 1e4), (&[], 1e5)], 1.0);
+        assert!((all.stated("a") - factor * all.probability("a")).abs() < 1e-9);
+    }
+
+    #[test]
+    fn where_nothing_smaller_stands_the_odds_are_even() {
+        let all = of(&[(&["a"], 0.0), (&["b"], 90.0)], 1.0);
+        assert!((all.probability("a") - 0.5).abs() < 1e-9);
     }
 }

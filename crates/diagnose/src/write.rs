@@ -9,7 +9,6 @@ use kort_identify::simulate::{Problem, Stack};
 use kort_thruster::effects::Path;
 use kort_thruster::rig::Rig;
 
-use crate::constants::Constants;
 use crate::decide::{Circumstances, Decision, Named, decide};
 use crate::diagnose::Options;
 use crate::experiment;
@@ -18,7 +17,7 @@ use crate::left::{self, Rest};
 use crate::load_steps;
 use crate::locate::{self, locate};
 use crate::place;
-use crate::posterior::{Explanation, presence, told};
+use crate::posterior::{Explanation, Posterior};
 use crate::report::{Alternative, Baseline, Finding, Mismatch, Remainder, Report, SetReport, Verdict};
 use crate::search::{Search, Set};
 use crate::traces::{Traces, traces};
@@ -28,8 +27,7 @@ use crate::words;
 pub struct Writer<'a, 'p> {
     problem: &'a Problem<'p>,
     search: &'a Search<'a, 'p>,
-    explanations: Vec<Explanation>,
-    beside_unknown: f64,
+    posterior: Posterior,
     best: Set,
     baseline: &'a Fit,
     last: &'a Fit,
@@ -54,13 +52,13 @@ impl<'a, 'p> Writer<'a, 'p> {
     /// From a search that is done and its posterior.
     pub fn new(
         search: &'a Search<'a, 'p>,
-        explanations: Vec<Explanation>,
+        posterior: Posterior,
         series: &'a [Series],
         rig: &'a Rig,
         options: &'a Options,
     ) -> Self {
         let problem = search.problem;
-        let best = told(&explanations).map_or_else(Set::new, |e| e.set.clone());
+        let best = posterior.told().map_or_else(Set::new, |e| e.set().clone());
         let (baseline, last) = (&search.fits[&Set::new()], &search.fits[&best]);
         let held = held_out_rows(problem, &[&last.hypothesis]);
         let floor = scores::noise_floor(problem, &problem.residual(&last.hypothesis, &last.values));
@@ -68,8 +66,7 @@ impl<'a, 'p> Writer<'a, 'p> {
             training: problem.without(&held),
             problem,
             search,
-            explanations,
-            beside_unknown: Constants::built_in().posterior.beside_unknown,
+            posterior,
             best,
             baseline,
             last,
@@ -141,10 +138,9 @@ impl<'a, 'p> Writer<'a, 'p> {
             steady: left::steady(problem, self.last, &actions),
             broke_down: false,
             left,
-            beside_unknown: self.beside_unknown,
             more_than_noise: rest.is_some(),
         };
-        let decision = decide(&self.explanations, &circumstances);
+        let decision = decide(&self.posterior, &circumstances);
 
         let baseline_trained = self.trained(self.baseline);
         let last_trained =
@@ -184,12 +180,12 @@ impl<'a, 'p> Writer<'a, 'p> {
                     // In the likeliest set that has it in the member's place, alone or beside another.
                     let rest = self.best.iter().filter(|id| **id != member);
                     let stands_in = |e: &&Explanation| {
-                        e.set.contains(&named.effect)
-                            && !e.set.contains(&member)
-                            && rest.clone().all(|id| e.set.contains(id))
+                        e.set().contains(&named.effect)
+                            && !e.set().contains(&member)
+                            && rest.clone().all(|id| e.set().contains(id))
                     };
-                    let swapped = self.explanations.iter().find(stands_in);
-                    let Some(fit) = swapped.and_then(|e| self.search.fits.get(&e.set)) else { continue };
+                    let swapped = self.posterior.sets.iter().find(stands_in);
+                    let Some(fit) = swapped.and_then(|e| self.search.fits.get(e.set())) else { continue };
                     let heldout = self.score(&smaller_trained, &self.trained(fit));
                     self.finding(named, fit, heldout, None)
                 };
@@ -344,10 +340,10 @@ impl<'a, 'p> Writer<'a, 'p> {
     fn listed(&self) -> Vec<SetReport> {
         let mut reached = 0.0;
         let mut out = Vec::new();
-        for e in &self.explanations {
+        for e in &self.posterior.sets {
             out.push(SetReport {
-                effects: e.set.iter().map(|id| (*id).to_string()).collect(),
-                probability: e.probability,
+                effects: e.set().iter().map(|id| (*id).to_string()).collect(),
+                probability: self.posterior.of_set(e),
             });
             reached += e.probability;
             if reached >= LISTED || e.probability < 1e-3 {
@@ -368,7 +364,7 @@ impl<'a, 'p> Writer<'a, 'p> {
             .filter_map(|e| {
                 let holding = self.search.fits.keys().filter(|set| set.contains(&e.id));
                 let cost = holding.map(|set| self.search.cost(set)).min_by(f64::total_cmp)?;
-                Some((presence(&self.explanations, e.id, self.beside_unknown), cost, e.id))
+                Some((self.posterior.stated(e.id), cost, e.id))
             })
             .collect();
         others.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.total_cmp(&b.1)));

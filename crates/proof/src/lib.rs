@@ -7,7 +7,7 @@
 //! - [`concealed`]: exact changes hidden in measured recordings;
 //! - [`calibrate`]: every probability that was stated, with what became of it, in folds;
 //! - [`temper`]: how far costs count as odds, fitted on some cases and tested on those left out;
-//! - [`trust`]: how far a set is believed by the number of its names;
+//! - [`trust`]: how sure a name may be that no other comes near, by what leaving it out costs;
 //! - [`ledger`]: seeds that were used, so that none is used twice.
 
 pub mod blind;

@@ -37,6 +37,9 @@ pub fn tempers() -> impl Iterator<Item = Temper> {
     LEAST_TEMPERS.into_iter().flat_map(|least| FORM_SHARES.map(|form_share| Temper { least, form_share }))
 }
 
+/// From this share of the odds on a name has no rival to speak of.
+const ALONE: f64 = 0.9;
+
 /// Least probability that counts, so that one miss does not decide alone.
 const LEAST: f64 = 1e-3;
 
@@ -86,27 +89,62 @@ impl Weighed {
         Some(Self { fold, hidden, sets, standing })
     }
 
-    /// Probability of every name under a temper, each set as far as one of so many effects is trusted.
-    pub fn names(&self, temper: Temper, trust: Trust) -> BTreeMap<&str, f64> {
+    /// Probability of every name under a temper: its sets against the others that were fitted, and against what was not,
+    /// by `doubt` of what the recordings cost more without it in the likeliest of its sets.
+    pub fn names(&self, temper: Temper, doubt: Odds) -> BTreeMap<&str, f64> {
+        let believed = self
+            .presences(temper)
+            .into_iter()
+            .map(|(name, presence, gain)| (name, presence / (1.0 + presence * doubt(gain))));
+        believed.collect()
+    }
+
+    /// Every name with the share of the odds that its sets have, and with what the likeliest of them gains by it.
+    fn presences(&self, temper: Temper) -> Vec<(&str, f64, f64)> {
         let least = self.sets.iter().map(|set| set.0).fold(f64::INFINITY, f64::min);
         let baseline = self.sets.iter().find(|set| set.2.is_empty()).map_or(least, |set| set.0);
         let temper = temper.at(baseline - least);
         let cost = |set: &(f64, f64, Vec<String>)| set.0 / (2.0 * temper) + set.1;
-        let least = self.sets.iter().map(cost).fold(f64::INFINITY, f64::min);
-        let weights: Vec<f64> = self.sets.iter().map(|set| (least - cost(set)).exp()).collect();
+        let mut sets: Vec<&(f64, f64, Vec<String>)> = self.sets.iter().collect();
+        sets.sort_by(|a, b| cost(a).total_cmp(&cost(b)));
+        let Some(first) = sets.first().map(|set| cost(set)) else { return Vec::new() };
+        let weights: Vec<f64> = sets.iter().map(|set| (first - cost(set)).exp()).collect();
         let total: f64 = weights.iter().sum();
-        let mut out = BTreeMap::new();
-        for (set, weight) in self.sets.iter().zip(weights) {
+        let mut out: Vec<(&str, f64, f64)> = Vec::new();
+        for (set, weight) in sets.iter().zip(weights) {
             for name in &set.2 {
-                *out.entry(name.as_str()).or_insert(0.0) += trust(set.2.len()) * weight / total;
+                match out.iter_mut().find(|known| known.0 == name) {
+                    Some(known) => known.1 += weight / total,
+                    None => out.push((name, weight / total, self.gain(set, name))),
+                }
             }
         }
         out
     }
 
+    /// What a set's cost grows by without one of its names: to the least of the fitted sets of its others.
+    fn gain(&self, set: &(f64, f64, Vec<String>), name: &str) -> f64 {
+        let smaller = |other: &&(f64, f64, Vec<String>)| {
+            other.2.iter().all(|other| *other != name && set.2.contains(other))
+        };
+        self.sets.iter().filter(smaller).map(|other| other.0 - set.0).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Names that no other comes near, right or wrong: their gains, and whether they are right.
+    pub fn without_rival(&self, temper: Temper) -> Vec<(f64, bool)> {
+        let alone = self.presences(temper).into_iter().filter(|(_, presence, _)| *presence >= ALONE);
+        alone
+            .filter_map(|(name, _, gain)| match self.standing.get(name) {
+                Some(Standing::Hidden) => Some((gain, true)),
+                Some(Standing::Wrong) => Some((gain, false)),
+                _ => None,
+            })
+            .collect()
+    }
+
     /// Logarithmic score, at most zero: of every name that any set holds, and of hidden ones that none does.
-    pub fn score(&self, temper: Temper, trust: Trust) -> f64 {
-        let names = self.names(temper, trust);
+    pub fn score(&self, temper: Temper, doubt: Odds) -> f64 {
+        let names = self.names(temper, doubt);
         let stated = |name: &str| names.get(name).copied().unwrap_or(0.0).min(1.0);
         let wrong = names.keys().filter(|name| self.standing.get(**name) == Some(&Standing::Wrong));
         let akin = self.standing.values().any(|standing| *standing == Standing::Akin);
@@ -121,16 +159,16 @@ impl Weighed {
 }
 
 /// A temper's mean score over cases.
-pub fn mean_score(cases: &[&Weighed], temper: Temper, trust: Trust) -> f64 {
-    cases.iter().map(|case| case.score(temper, trust)).sum::<f64>() / cases.len().max(1) as f64
+pub fn mean_score(cases: &[&Weighed], temper: Temper, doubt: Odds) -> f64 {
+    cases.iter().map(|case| case.score(temper, doubt)).sum::<f64>() / cases.len().max(1) as f64
 }
 
-/// How far a set of so many effects is trusted.
-pub type Trust<'a> = &'a dyn Fn(usize) -> f64;
+/// Odds against a name by what its set gains by it.
+pub type Odds<'a> = &'a dyn Fn(f64) -> f64;
 
 /// The temper that scores best on some cases.
-pub fn best(cases: &[&Weighed], trust: Trust) -> Temper {
-    let scored = tempers().map(|temper| (mean_score(cases, temper, trust), temper));
+pub fn best(cases: &[&Weighed], doubt: Odds) -> Temper {
+    let scored = tempers().map(|temper| (mean_score(cases, temper, doubt), temper));
     let first = Temper { least: LEAST_TEMPERS[0], form_share: FORM_SHARES[0] };
     scored.max_by(|a, b| a.0.total_cmp(&b.0)).map_or(first, |best| best.1)
 }
@@ -151,19 +189,19 @@ pub struct LeftOut {
 }
 
 /// Fits on all folds but one, and tests on that.
-pub fn cross_validate(cases: &[Weighed], in_use: Temper, trust: Trust) -> Vec<LeftOut> {
+pub fn cross_validate(cases: &[Weighed], in_use: Temper, doubt: Odds) -> Vec<LeftOut> {
     let folds: std::collections::BTreeSet<usize> = cases.iter().map(|case| case.fold).collect();
     folds
         .into_iter()
         .map(|fold| {
             let (here, others): (Vec<&Weighed>, Vec<&Weighed>) = cases.iter().partition(|c| c.fold == fold);
-            let temper = best(&others, trust);
+            let temper = best(&others, doubt);
             LeftOut {
                 fold,
                 cases: here.len(),
                 temper,
-                score: mean_score(&here, temper, trust),
-                in_use: mean_score(&here, in_use, trust),
+                score: mean_score(&here, temper, doubt),
+                in_use: mean_score(&here, in_use, doubt),
             }
         })
         .collect()
@@ -190,9 +228,9 @@ mod tests {
 
     #[test]
     fn probabilities_follow_cost_and_rarity() {
-        let p = case(0, 10.0, true).names(flat(1.0), &|_| 1.0)["a"];
+        let p = case(0, 10.0, true).names(flat(1.0), &|_| 0.0)["a"];
         assert!((p - 1.0 / (1.0 + (3.0_f64 - 5.0).exp())).abs() < 1e-12);
-        let half = case(0, 10.0, true).names(Temper { least: 0.0, form_share: 0.2 }, &|_| 1.0)["a"];
+        let half = case(0, 10.0, true).names(Temper { least: 0.0, form_share: 0.2 }, &|_| 0.0)["a"];
         assert!(
             (half - 1.0 / (1.0 + (3.0_f64 - 2.5).exp())).abs() < 1e-12,
             "twice as far off where ten are gained"
@@ -200,14 +238,24 @@ mod tests {
     }
 
     #[test]
+    fn a_name_without_a_rival_is_as_sure_as_what_it_gains() {
+        let sure = case(0, 300.0, true);
+        let p = sure.names(flat(1.0), &|gain| 100.0 / gain)["a"];
+        assert!((p - 0.75).abs() < 1e-9);
+        assert_eq!(sure.without_rival(flat(1.0)), [(300.0, true)]);
+        assert_eq!(case(0, 300.0, false).without_rival(flat(1.0)), [(300.0, false)]);
+        assert!(case(0, 6.0, true).without_rival(flat(1.0)).is_empty(), "nothing hidden is as likely");
+    }
+
+    #[test]
     fn where_large_gains_are_wrong_half_the_time_the_best_temper_is_high() {
         let honest: Vec<Weighed> = (0..20).map(|k| case(k % 2, 30.0, true)).collect();
         let deceived: Vec<Weighed> = (0..20).map(|k| case(k % 2, 30.0, k % 4 < 2)).collect();
-        let all = |cases: &[Weighed]| best(&cases.iter().collect::<Vec<_>>(), &|_| 0.99);
+        let all = |cases: &[Weighed]| best(&cases.iter().collect::<Vec<_>>(), &|_| 0.01);
         let at = |temper: Temper| temper.at(30.0);
         assert!(at(all(&honest)) <= 2.0);
         assert!(at(all(&deceived)) >= 4.0);
-        let left_out = cross_validate(&deceived, flat(1.0), &|_| 0.99);
+        let left_out = cross_validate(&deceived, flat(1.0), &|_| 0.01);
         assert_eq!(left_out.iter().map(|l| l.cases).sum::<usize>(), 20);
         assert!(left_out.iter().all(|l| l.score > l.in_use), "{left_out:?}");
     }

@@ -3,11 +3,13 @@
 use std::path::Path;
 
 use kort_diagnose::constants::Constants;
-use kort_diagnose::posterior::trusted;
+use kort_diagnose::posterior;
 use kort_proof::calibrate::{Fold, fold_of, records};
 use kort_proof::score::Scored;
-use kort_proof::temper::{FORM_SHARES, LEAST_TEMPERS, Temper, Weighed, best, cross_validate, mean_score};
-use kort_proof::trust::{self, Law, SURPRISES, Stated};
+use kort_proof::temper::{
+    FORM_SHARES, LEAST_TEMPERS, Odds, Temper, Weighed, best, cross_validate, mean_score,
+};
+use kort_proof::trust::{self, Doubt, POWERS, SURPRISES};
 use kort_truth::Answer;
 use serde_json::Value;
 
@@ -40,39 +42,24 @@ pub fn write(
     }
     write_text(path, &text)?;
     eprintln!("wrote {count} records to {}", path.display());
-    print_temper(results, by, folds);
-    print_trust(results);
+    print_weighed(results, by, folds);
     Ok(())
 }
 
-/// How often names that have no rival to speak of were right, by how many stand together, and which trust that asks for.
-fn print_trust(results: &[(Scored, Answer, Value)]) {
-    let in_use = Constants::built_in().posterior.surprise;
-    let all: Vec<Stated> = results
-        .iter()
-        .flat_map(|(scored, _, report)| trust::stated(scored, report, |names| trusted(names, in_use)))
-        .collect();
-    eprintln!("names in the set  right  stated without a rival");
-    for (names, right, count) in trust::counted(&all) {
-        eprintln!("{names:16}  {right:5}  {count:22}");
-    }
-    eprintln!("odds against one name  {}", Law::ALL.map(|law| format!("{:>16}", law.name())).join("  "));
-    for surprise in SURPRISES {
-        let of = |law: Law| format!("{:16.2}", trust::score(&all, |names| law.trust(names, surprise)));
-        eprintln!("{surprise:21}  {}", Law::ALL.map(of).join("  "));
-    }
-    let (law, surprise) = trust::best(&all);
-    eprintln!("best {surprise} {}, in use {in_use} {}", law.name(), Law::Number.name());
-}
-
-/// The temper that these cases ask for, and what it is worth on folds left out.
-fn print_temper(results: &[(Scored, Answer, Value)], by: Fold, folds: usize) {
+/// Temper and doubt that these cases ask for.
+fn print_weighed(results: &[(Scored, Answer, Value)], by: Fold, folds: usize) {
     let cases: Vec<Weighed> = results
         .iter()
         .filter_map(|(_, answer, report)| Weighed::of(answer, report, fold_of(answer, by, folds)))
         .collect();
     let odds = Constants::built_in().posterior;
-    let trust = |effects| trusted(effects, odds.surprise);
+    let in_use = Temper { least: odds.temper, form_share: odds.form_share };
+    print_temper(&cases, in_use, &|gain| posterior::doubt(&odds, gain));
+    print_doubt(&cases, in_use, Doubt { surprise: odds.surprise, power: odds.surprise_power });
+}
+
+/// The temper, and what it is worth on folds left out.
+fn print_temper(cases: &[Weighed], in_use: Temper, doubt: Odds) {
     let all: Vec<&Weighed> = cases.iter().collect();
     eprintln!(
         "mean log score of the names in {} cases (0 is best), by least temper and share of the gain",
@@ -80,15 +67,35 @@ fn print_temper(results: &[(Scored, Answer, Value)], by: Fold, folds: usize) {
     );
     eprintln!("        {}", FORM_SHARES.map(|share| format!("{share:7}")).join("  "));
     for least in LEAST_TEMPERS {
-        let of = |form_share| format!("{:7.3}", mean_score(&all, Temper { least, form_share }, &trust));
+        let of = |form_share| format!("{:7.3}", mean_score(&all, Temper { least, form_share }, doubt));
         eprintln!("{least:6}  {}", FORM_SHARES.map(of).join("  "));
     }
     let words = |temper: Temper| format!("{} and {}", temper.least, temper.form_share);
-    let in_use = Temper { least: odds.temper, form_share: odds.form_share };
-    eprintln!("best {}, in use {}", words(best(&all, &trust)), words(in_use));
+    eprintln!("best {}, in use {}", words(best(&all, doubt)), words(in_use));
     eprintln!("fold  cases  fitted on the others  its score here  in use");
-    for left in cross_validate(&cases, in_use, &trust) {
+    for left in cross_validate(cases, in_use, doubt) {
         let (fold, count, temper) = (left.fold, left.cases, words(left.temper));
         eprintln!("{fold:4}  {count:5}  {temper:20}  {:14.3}  {:6.3}", left.score, left.in_use);
     }
+}
+
+/// How often names that no other comes near were right, by what leaving them out costs, and which doubt that asks for.
+fn print_doubt(cases: &[Weighed], temper: Temper, in_use: Doubt) {
+    let names: Vec<(f64, bool)> = cases.iter().flat_map(|case| case.without_rival(temper)).collect();
+    eprintln!("cost without it  right  stated without a rival");
+    for (from, to, right, count) in trust::counted(&names) {
+        eprintln!("{:>15}  {right:5}  {count:22}", format!("{from} to {to}"));
+    }
+    let all: Vec<&Weighed> = cases.iter().collect();
+    eprintln!("mean log score of the names, by the cost of even odds and their power");
+    eprintln!("        {}", POWERS.map(|power| format!("{power:7}")).join("  "));
+    for surprise in SURPRISES {
+        let of = |power| {
+            let doubt = Doubt { surprise, power };
+            format!("{:7.3}", mean_score(&all, temper, &|gain| doubt.odds(gain)))
+        };
+        eprintln!("{surprise:6}  {}", POWERS.map(of).join("  "));
+    }
+    let words = |doubt: Doubt| format!("{} to the power {}", doubt.surprise, doubt.power);
+    eprintln!("best {}, in use {}", words(trust::best(&all, temper)), words(in_use));
 }
