@@ -45,7 +45,8 @@ pub struct PosteriorConstants {
     pub temper: f64,
     /// What the temper grows to as a share of what the likeliest set costs less than the baseline.
     pub form_share: f64,
-    /// What leaving a name out must cost for odds of one to one that nothing which was not fitted is right in its place.
+    /// What leaving a name out must cost for each that stands with it, itself included, for odds of one to one that nothing
+    /// which was not fitted is right in its place.
     pub surprise: f64,
     /// Power with which those odds grow.
     pub surprise_power: f64,

@@ -37,11 +37,12 @@ pub fn temper(constants: &PosteriorConstants, gain: f64) -> f64 {
     constants.temper.hypot(constants.form_share * gain.max(0.0))
 }
 
-/// Odds that something which was not fitted is right in the place of an effect without which the recordings cost so
-/// much more. Among what was fitted a difference of cost counts by its exponential; what an equation that nobody wrote
-/// down would have taken of it is not bounded so, and dies off as a power only.
-pub fn doubt(constants: &PosteriorConstants, gain: f64) -> f64 {
-    (constants.surprise / gain.max(LEAST_GAIN)).powf(constants.surprise_power)
+/// Odds that something which was not fitted is right in the place of one of so many effects, without which the recordings
+/// cost so much more. Among what was fitted a difference of cost counts by its exponential; what an equation that nobody
+/// wrote down would have taken of it is not bounded so, and dies off as a power only. It counts by the number of effects
+/// that stand together: what the forms of the others leave passes for one more.
+pub fn doubt(constants: &PosteriorConstants, effects: usize, gain: f64) -> f64 {
+    (constants.surprise * effects as f64 / gain.max(LEAST_GAIN)).powf(constants.surprise_power)
 }
 
 /// Gains below this are none, whatever the data.
@@ -105,7 +106,7 @@ impl Posterior {
 
     /// Probability of a set with all its members in place, [`doubt`] of each counted.
     pub fn of_set(&self, explanation: &Explanation) -> f64 {
-        let in_place = |id| 1.0 / (1.0 + doubt(&self.constants, self.gain(explanation, id)));
+        let in_place = |id| 1.0 / (1.0 + self.doubt_in(explanation, id));
         explanation.probability * explanation.set().iter().copied().map(in_place).product::<f64>()
     }
 
@@ -120,17 +121,16 @@ impl Posterior {
 
     fn doubt_of(&self, effect: &str) -> f64 {
         let likeliest = self.holding(effect).next();
-        likeliest.map_or(f64::INFINITY, |e| doubt(&self.constants, self.gain(e, effect)))
+        likeliest.map_or(f64::INFINITY, |e| self.doubt_in(e, effect))
     }
 
-    /// What the recordings cost more without one of a set's members: the least of what was fitted of the others. None was
-    /// where the baseline is set aside; what is gained is not known then and counts as where odds are even.
-    fn gain(&self, explanation: &Explanation, member: &str) -> f64 {
-        let smaller = |e: &&Explanation| {
-            !e.set().contains(&member) && e.set().iter().all(|id| explanation.set().contains(id))
-        };
+    /// Doubt of a set's member by what the recordings cost more without it: the least of what was fitted of the others.
+    /// None was where the baseline is set aside; what is gained is not known then and the odds are even.
+    fn doubt_in(&self, explanation: &Explanation, member: &str) -> f64 {
+        let set = explanation.set();
+        let smaller = |e: &&Explanation| e.set().iter().all(|id| *id != member && set.contains(id));
         let least = self.sets.iter().filter(smaller).map(|e| e.fitted.alone).reduce(f64::min);
-        least.map_or(self.constants.surprise, |least| least - explanation.fitted.alone)
+        least.map_or(1.0, |least| doubt(&self.constants, set.len(), least - explanation.fitted.alone))
     }
 }
 
@@ -177,11 +177,11 @@ mod tests {
     fn without_a_rival_a_name_is_as_sure_as_what_leaving_it_out_costs() {
         let surprise = constants().surprise;
         let without = |gain: f64| of(&[(&["a", "b"], 0.0), (&["a"], gain), (&["b"], 1e5), (&[], 1e6)], 1.0);
-        let even = without(surprise);
-        assert!((even.probability("b") - 0.5).abs() < 1e-6, "odds of one to one at the surprise");
+        let even = without(2.0 * surprise);
+        assert!((even.probability("b") - 0.5).abs() < 1e-6, "one to one at twice the surprise of one");
         assert!(even.probability("a") > 0.999, "each by its own");
-        assert!(without(2.0 * surprise).probability("b") > 0.7);
-        assert!(without(0.5 * surprise).probability("b") < 0.3);
+        assert!(without(4.0 * surprise).probability("b") > 0.7);
+        assert!(without(surprise).probability("b") < 0.3);
         let set = &even.sets[0];
         assert!((even.of_set(set) - even.probability("a") * even.probability("b")).abs() < 1e-6);
     }

@@ -90,17 +90,18 @@ impl Weighed {
     }
 
     /// Probability of every name under a temper: its sets against the others that were fitted, and against what was not,
-    /// by `doubt` of what the recordings cost more without it in the likeliest of its sets.
+    /// by `doubt` in the likeliest of its sets.
     pub fn names(&self, temper: Temper, doubt: Odds) -> BTreeMap<&str, f64> {
         let believed = self
             .presences(temper)
             .into_iter()
-            .map(|(name, presence, gain)| (name, presence / (1.0 + presence * doubt(gain))));
+            .map(|(name, presence, (k, gain))| (name, presence / (1.0 + presence * doubt(k, gain))));
         believed.collect()
     }
 
-    /// Every name with the share of the odds that its sets have, and with what the likeliest of them gains by it.
-    fn presences(&self, temper: Temper) -> Vec<(&str, f64, f64)> {
+    /// Every name with the share of the odds that its sets have; of the likeliest of them how many names it has, and what
+    /// it gains by this one.
+    fn presences(&self, temper: Temper) -> Vec<(&str, f64, (usize, f64))> {
         let least = self.sets.iter().map(|set| set.0).fold(f64::INFINITY, f64::min);
         let baseline = self.sets.iter().find(|set| set.2.is_empty()).map_or(least, |set| set.0);
         let temper = temper.at(baseline - least);
@@ -110,12 +111,12 @@ impl Weighed {
         let Some(first) = sets.first().map(|set| cost(set)) else { return Vec::new() };
         let weights: Vec<f64> = sets.iter().map(|set| (first - cost(set)).exp()).collect();
         let total: f64 = weights.iter().sum();
-        let mut out: Vec<(&str, f64, f64)> = Vec::new();
+        let mut out: Vec<(&str, f64, (usize, f64))> = Vec::new();
         for (set, weight) in sets.iter().zip(weights) {
             for name in &set.2 {
                 match out.iter_mut().find(|known| known.0 == name) {
                     Some(known) => known.1 += weight / total,
-                    None => out.push((name, weight / total, self.gain(set, name))),
+                    None => out.push((name, weight / total, (set.2.len(), self.gain(set, name)))),
                 }
             }
         }
@@ -130,13 +131,13 @@ impl Weighed {
         self.sets.iter().filter(smaller).map(|other| other.0 - set.0).fold(f64::INFINITY, f64::min)
     }
 
-    /// Names that no other comes near, right or wrong: their gains, and whether they are right.
+    /// Names that no other comes near, right or wrong: their gains for each name of their set, and whether they are right.
     pub fn without_rival(&self, temper: Temper) -> Vec<(f64, bool)> {
         let alone = self.presences(temper).into_iter().filter(|(_, presence, _)| *presence >= ALONE);
         alone
-            .filter_map(|(name, _, gain)| match self.standing.get(name) {
-                Some(Standing::Hidden) => Some((gain, true)),
-                Some(Standing::Wrong) => Some((gain, false)),
+            .filter_map(|(name, _, (effects, gain))| match self.standing.get(name) {
+                Some(Standing::Hidden) => Some((gain / effects as f64, true)),
+                Some(Standing::Wrong) => Some((gain / effects as f64, false)),
                 _ => None,
             })
             .collect()
@@ -163,8 +164,8 @@ pub fn mean_score(cases: &[&Weighed], temper: Temper, doubt: Odds) -> f64 {
     cases.iter().map(|case| case.score(temper, doubt)).sum::<f64>() / cases.len().max(1) as f64
 }
 
-/// Odds against a name by what its set gains by it.
-pub type Odds<'a> = &'a dyn Fn(f64) -> f64;
+/// Odds against a name by how many stand together and what they gain by it.
+pub type Odds<'a> = &'a dyn Fn(usize, f64) -> f64;
 
 /// The temper that scores best on some cases.
 pub fn best(cases: &[&Weighed], doubt: Odds) -> Temper {
@@ -228,9 +229,9 @@ mod tests {
 
     #[test]
     fn probabilities_follow_cost_and_rarity() {
-        let p = case(0, 10.0, true).names(flat(1.0), &|_| 0.0)["a"];
+        let p = case(0, 10.0, true).names(flat(1.0), &|_, _| 0.0)["a"];
         assert!((p - 1.0 / (1.0 + (3.0_f64 - 5.0).exp())).abs() < 1e-12);
-        let half = case(0, 10.0, true).names(Temper { least: 0.0, form_share: 0.2 }, &|_| 0.0)["a"];
+        let half = case(0, 10.0, true).names(Temper { least: 0.0, form_share: 0.2 }, &|_, _| 0.0)["a"];
         assert!(
             (half - 1.0 / (1.0 + (3.0_f64 - 2.5).exp())).abs() < 1e-12,
             "twice as far off where ten are gained"
@@ -240,7 +241,7 @@ mod tests {
     #[test]
     fn a_name_without_a_rival_is_as_sure_as_what_it_gains() {
         let sure = case(0, 300.0, true);
-        let p = sure.names(flat(1.0), &|gain| 100.0 / gain)["a"];
+        let p = sure.names(flat(1.0), &|_, gain| 100.0 / gain)["a"];
         assert!((p - 0.75).abs() < 1e-9);
         assert_eq!(sure.without_rival(flat(1.0)), [(300.0, true)]);
         assert_eq!(case(0, 300.0, false).without_rival(flat(1.0)), [(300.0, false)]);
@@ -251,11 +252,11 @@ mod tests {
     fn where_large_gains_are_wrong_half_the_time_the_best_temper_is_high() {
         let honest: Vec<Weighed> = (0..20).map(|k| case(k % 2, 30.0, true)).collect();
         let deceived: Vec<Weighed> = (0..20).map(|k| case(k % 2, 30.0, k % 4 < 2)).collect();
-        let all = |cases: &[Weighed]| best(&cases.iter().collect::<Vec<_>>(), &|_| 0.01);
+        let all = |cases: &[Weighed]| best(&cases.iter().collect::<Vec<_>>(), &|_, _| 0.01);
         let at = |temper: Temper| temper.at(30.0);
         assert!(at(all(&honest)) <= 2.0);
         assert!(at(all(&deceived)) >= 4.0);
-        let left_out = cross_validate(&deceived, flat(1.0), &|_| 0.01);
+        let left_out = cross_validate(&deceived, flat(1.0), &|_, _| 0.01);
         assert_eq!(left_out.iter().map(|l| l.cases).sum::<usize>(), 20);
         assert!(left_out.iter().all(|l| l.score > l.in_use), "{left_out:?}");
     }

@@ -54,7 +54,7 @@ fn print_weighed(results: &[(Scored, Answer, Value)], by: Fold, folds: usize) {
         .collect();
     let odds = Constants::built_in().posterior;
     let in_use = Temper { least: odds.temper, form_share: odds.form_share };
-    print_temper(&cases, in_use, &|gain| posterior::doubt(&odds, gain));
+    print_temper(&cases, in_use, &|effects, gain| posterior::doubt(&odds, effects, gain));
     print_doubt(&cases, in_use, Doubt { surprise: odds.surprise, power: odds.surprise_power });
 }
 
@@ -79,20 +79,21 @@ fn print_temper(cases: &[Weighed], in_use: Temper, doubt: Odds) {
     }
 }
 
-/// How often names that no other comes near were right, by what leaving them out costs, and which doubt that asks for.
+/// How often names that no other comes near were right, by what leaving them out costs for each that stands together, and
+/// which doubt that asks for.
 fn print_doubt(cases: &[Weighed], temper: Temper, in_use: Doubt) {
     let names: Vec<(f64, bool)> = cases.iter().flat_map(|case| case.without_rival(temper)).collect();
-    eprintln!("cost without it  right  stated without a rival");
+    eprintln!("cost a name  right  stated without a rival");
     for (from, to, right, count) in trust::counted(&names) {
-        eprintln!("{:>15}  {right:5}  {count:22}", format!("{from} to {to}"));
+        eprintln!("{:>11}  {right:5}  {count:22}", format!("{from} to {to}"));
     }
     let all: Vec<&Weighed> = cases.iter().collect();
-    eprintln!("mean log score of the names, by the cost of even odds and their power");
+    eprintln!("mean log score of the names, by the cost a name of even odds and their power");
     eprintln!("        {}", POWERS.map(|power| format!("{power:7}")).join("  "));
     for surprise in SURPRISES {
         let of = |power| {
             let doubt = Doubt { surprise, power };
-            format!("{:7.3}", mean_score(&all, temper, &|gain| doubt.odds(gain)))
+            format!("{:7.3}", mean_score(&all, temper, &|effects, gain| doubt.odds(effects, gain)))
         };
         eprintln!("{surprise:6}  {}", POWERS.map(of).join("  "));
     }
