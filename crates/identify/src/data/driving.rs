@@ -25,17 +25,22 @@ pub(super) fn choose_driving(series: &Series, rig: &Rig, speed_driven: bool) -> 
     if let Some(command) = commands.iter().find(|c| varies(c)) {
         return Some(Driving::Command(command));
     }
+    // A command that is held all the while drives where nothing else tells more.
+    let held =
+        |name: &&&str| series.column(name).is_some_and(|c| c.iter().any(|v| v.is_finite() && *v != 0.0));
     if varies("current_a") && varies("shaft_speed_rad_s")
         || varies("current_a") && rig.amplifier.kind != AmplifierKind::Speed
     {
-        return Some(Driving::Current);
+        // Noise of its sensor never turned the shaft: what makes it weaker would pass for physics.
+        let noise = series.column("current_a").is_some_and(is_noise);
+        return Some(match commands.iter().find(held) {
+            Some(command) if noise => Driving::Command(command),
+            _ => Driving::Current,
+        });
     }
     // What a shaft that follows its record shows: the propeller's load on a stand.
     let answered = rig.propeller.is_some() && ["thrust_n", "torque_n_m", "flow_m_s"].into_iter().any(varies);
     let powered = rig.motor.winding_resistance_ohm.is_some() && electrical_power(series).is_some();
-    // A command that is held all the while drives all the same where nothing else can be compared.
-    let held =
-        |name: &&&str| series.column(name).is_some_and(|c| c.iter().any(|v| v.is_finite() && *v != 0.0));
     if !varies("shaft_speed_rad_s") {
         // One steady speed is too little to tell anything, and is said to be; it is no broken log.
         series.column("shaft_speed_rad_s")?;
@@ -47,6 +52,17 @@ pub(super) fn choose_driving(series: &Series, rig: &Rig, speed_driven: bool) -> 
         Some(command) => Driving::Command(command),
         None => Driving::Speed,
     })
+}
+
+/// Whether samples hold nothing from one to the next: the mean square of their differences is twice their variance, to
+/// three standard deviations of white noise (von Neumann 1941, Annals of Mathematical Statistics 12:367).
+fn is_noise(column: &[f64]) -> bool {
+    let samples: Vec<f64> = column.iter().copied().filter(|v| v.is_finite()).collect();
+    let n = samples.len() as f64;
+    let mean = samples.iter().sum::<f64>() / n;
+    let variance = samples.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n;
+    let differences = samples.windows(2).map(|pair| (pair[1] - pair[0]).powi(2)).sum::<f64>() / (n - 1.0);
+    differences >= 2.0 * variance * (1.0 - 3.0 / n.sqrt())
 }
 
 /// Electrical power into the motor, W: recorded, or the supply's voltage times its current.
@@ -113,6 +129,33 @@ mod tests {
         assert_eq!(driving(3.0, false), Some(Driving::Command("current_cmd_a")));
         assert_eq!(driving(3.0, true), Some(Driving::Speed));
         assert_eq!(driving(0.0, false), Some(Driving::Speed), "a drive that is off drives nothing");
+    }
+
+    #[test]
+    fn a_held_command_drives_where_the_measured_current_is_noise_about_it() {
+        let rig =
+            Rig::from_toml(include_str!("../../../../config/thrusters/whitcomb-yoerger-1999.toml")).unwrap();
+        let mut seed = 1_u64;
+        let noise: Vec<f64> = (0..2000)
+            .map(|_| {
+                seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                (seed >> 33) as f64 / f64::from(1_u32 << 31) - 0.5
+            })
+            .collect();
+        let of = |command: f64, wander_a: f64| {
+            let current =
+                noise.iter().enumerate().map(|(k, e)| 3.0 + 0.02 * e + wander_a * (0.01 * k as f64).sin());
+            let columns = vec![
+                ("current_cmd_a".into(), vec![command; 2000]),
+                ("current_a".into(), current.collect()),
+                ("shaft_speed_rad_s".into(), noise.iter().map(|e| 40.0 + e).collect()),
+            ];
+            let time_s = (0..2000).map(|k| 0.01 * k as f64).collect();
+            choose_driving(&Series { name: "log".into(), time_s, columns }, &rig, false)
+        };
+        assert_eq!(of(3.0, 0.0), Some(Driving::Command("current_cmd_a")));
+        assert_eq!(of(3.0, 0.02), Some(Driving::Current), "a current that wanders turned the shaft");
+        assert_eq!(of(0.0, 0.0), Some(Driving::Current), "no command is known");
     }
 
     #[test]
