@@ -3,7 +3,7 @@
 use kort_identify::thin::Thin;
 
 use crate::flexible::is_term;
-use crate::posterior::Posterior;
+use crate::posterior::{NEAR, Posterior};
 use crate::report::Verdict;
 use crate::search::Set;
 
@@ -29,8 +29,6 @@ pub struct Decision {
     pub term: Option<&'static str>,
 }
 
-/// A rival stands near a name from this share of its probability on: odds of five to one part them.
-pub(crate) const NEAR: f64 = 0.2;
 /// From this probability on a name is believed.
 const BELIEVED: f64 = 0.7;
 /// A remainder below this share of what was to be explained is of no practical size.

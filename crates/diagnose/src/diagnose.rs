@@ -9,9 +9,8 @@ use kort_thruster::rig::Rig;
 use serde::Serialize;
 
 use crate::constants::Constants;
-use crate::decide::NEAR;
 use crate::left;
-use crate::posterior::{Explanation, Fitted, Posterior};
+use crate::posterior::{Explanation, Fitted, NEAR, Posterior};
 use crate::report::Report;
 use crate::search::{Search, Set};
 use crate::traces::Traces;

@@ -56,9 +56,22 @@ pub struct Posterior {
     constants: PosteriorConstants,
 }
 
+/// What does as well stands within these odds: five to one part two names.
+pub(crate) const NEAR: f64 = 0.2;
+
 impl Posterior {
-    /// Probabilities in proportion to `exp(-cost / (2 temper))`.
+    /// Probabilities in proportion to `exp(-cost / (2 temper))`. What has no name stands in no name's place: where names do
+    /// as well, sets that need it are no explanation.
     pub fn new(fitted: Vec<Fitted>, temper: f64, constants: &PosteriorConstants) -> Self {
+        let mut all = Self::of_all(fitted, temper, constants);
+        if !all.names_do_as_well(temper) {
+            return all;
+        }
+        all.sets.retain(|e| !e.set().iter().any(|id| is_term(id)));
+        Self::of_all(all.sets.into_iter().map(|e| e.fitted).collect(), temper, constants)
+    }
+
+    fn of_all(fitted: Vec<Fitted>, temper: f64, constants: &PosteriorConstants) -> Self {
         let least = fitted.iter().map(|f| f.cost).fold(f64::INFINITY, f64::min);
         let weight = |cost: f64| (-(cost - least) / (2.0 * temper)).exp();
         let total: f64 = fitted.iter().map(|f| weight(f.cost)).sum();
@@ -75,10 +88,19 @@ impl Posterior {
     pub fn told(&self) -> Option<&Explanation> {
         let likeliest = self.sets.first()?;
         let term = likeliest.set().iter().find(|id| is_term(id));
-        if term.is_none_or(|term| self.presence(term) >= 0.5) {
-            return Some(likeliest);
-        }
+        if term.is_none_or(|term| self.presence(term) >= 0.5) { Some(likeliest) } else { self.named() }
+    }
+
+    /// The likeliest set that needs nothing without a name.
+    fn named(&self) -> Option<&Explanation> {
         self.sets.iter().find(|e| !e.set().iter().any(|id| is_term(id)))
+    }
+
+    /// Whether what has no name stands in the place of names that the recordings alone do not part from it.
+    fn names_do_as_well(&self, temper: f64) -> bool {
+        let (Some(likeliest), Some(named)) = (self.sets.first(), self.named()) else { return false };
+        let worse = named.fitted.alone - likeliest.fitted.alone;
+        likeliest != named && !named.set().is_empty() && (-worse / (2.0 * temper)).exp() >= NEAR
     }
 
     /// Share that the sets which hold an effect have of all that were fitted.
@@ -119,9 +141,9 @@ impl Posterior {
         self.sets.iter().filter(move |e| e.set().contains(&effect))
     }
 
+    /// Doubt of an effect in the likeliest set that holds it.
     fn doubt_of(&self, effect: &str) -> f64 {
-        let likeliest = self.holding(effect).next();
-        likeliest.map_or(f64::INFINITY, |e| self.doubt_in(e, effect))
+        self.holding(effect).next().map_or(1.0, |e| self.doubt_in(e, effect))
     }
 
     /// Doubt of a set's member by what the recordings cost more without it: the least of what was fitted of the others.
@@ -162,7 +184,7 @@ mod tests {
         let all = of(&[(&["a"], 10.0), (&["b"], 10.0), (&[], 1e4)], 3.0);
         assert!((all.presence("a") - 0.5).abs() < 1e-9 && (all.presence("b") - 0.5).abs() < 1e-9);
         assert!(all.sets[2].probability < 1e-12);
-        assert_eq!(all.stated("c"), 0.0, "what was not fitted");
+        assert_eq!((all.probability("c"), all.stated("c")), (0.0, 0.0), "what was not fitted");
     }
 
     #[test]
@@ -171,6 +193,14 @@ mod tests {
         assert!(at(0.5).told().unwrap().set().is_empty());
         assert_eq!(*at(60.0).told().unwrap().set(), ["unknown_x"]);
         assert_eq!(of(&[], 3.0).told(), None);
+    }
+
+    #[test]
+    fn what_has_no_name_stands_in_no_name_s_place() {
+        let at = |worse: f64| of(&[(&["unknown_x"], 0.0), (&["a"], worse), (&[], 900.0)], 3.0);
+        assert_eq!(*at(6.0).told().unwrap().set(), ["a"], "odds of e to one");
+        assert!(at(6.0).probability("a") > 0.9, "and is not doubted for it");
+        assert_eq!(*at(12.0).told().unwrap().set(), ["unknown_x"], "of seven to one");
     }
 
     #[test]
