@@ -180,6 +180,15 @@ mod tests {
     }
 
     #[test]
+    fn doubt_is_even_at_the_surprise_and_falls_with_the_power() {
+        let constants = PosteriorConstants { surprise: 50.0, surprise_power: 1.5, ..constants() };
+        assert_eq!(doubt(&constants, 1, 50.0), 1.0);
+        assert_eq!(doubt(&constants, 3, 150.0), 1.0);
+        assert!((doubt(&constants, 1, 200.0) - 0.125).abs() < 1e-12);
+        assert_eq!(doubt(&constants, 1, -3.0), doubt(&constants, 1, 0.0), "a loss is no gain");
+    }
+
+    #[test]
     fn equal_sets_share_and_a_far_one_has_nothing() {
         let all = of(&[(&["a"], 10.0), (&["b"], 10.0), (&[], 1e4)], 3.0);
         assert!((all.presence("a") - 0.5).abs() < 1e-9 && (all.presence("b") - 0.5).abs() < 1e-9);

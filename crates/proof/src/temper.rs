@@ -211,6 +211,7 @@ pub fn cross_validate(cases: &[Weighed], in_use: Temper, doubt: Odds) -> Vec<Lef
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::trust;
 
     const fn flat(least: f64) -> Temper {
         Temper { least, form_share: 0.0 }
@@ -246,6 +247,22 @@ mod tests {
         assert_eq!(sure.without_rival(flat(1.0)), [(300.0, true)]);
         assert_eq!(case(0, 300.0, false).without_rival(flat(1.0)), [(300.0, false)]);
         assert!(case(0, 6.0, true).without_rival(flat(1.0)).is_empty(), "nothing hidden is as likely");
+    }
+
+    #[test]
+    fn the_doubt_that_scores_best_is_even_where_half_the_names_are_wrong() {
+        let mut cases: Vec<Weighed> = (0..20).map(|k| case(0, 30.0, k % 2 == 0)).collect();
+        cases.extend((0..20).map(|_| case(0, 3000.0, true)));
+        let law = |doubt: trust::Doubt, effects: usize, gain: f64| {
+            (doubt.surprise * effects as f64 / gain).powf(doubt.power)
+        };
+        let all: Vec<&Weighed> = cases.iter().collect();
+        let best = trust::best(&all, flat(1.0), &law);
+        assert!((0.5..2.0).contains(&law(best, 1, 30.0)), "{best:?}");
+        assert_eq!(
+            trust::counted(&all.iter().flat_map(|c| c.without_rival(flat(1.0))).collect::<Vec<_>>())[1].3,
+            20
+        );
     }
 
     #[test]

@@ -5,22 +5,17 @@
 
 use crate::temper::{Temper, Weighed, mean_score};
 
-/// Odds against a name: one to one where leaving it out costs `surprise` for each name of its set, falling with a power of
-/// that.
+/// How doubt of a name falls with what it gains.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Doubt {
-    /// The gain of odds of one to one.
+    /// The gain, for each name of a set, of odds of one to one.
     pub surprise: f64,
-    /// The power.
+    /// The power with which odds fall.
     pub power: f64,
 }
 
-impl Doubt {
-    /// Odds against one of so many names that gains so much.
-    pub fn odds(self, effects: usize, gain: f64) -> f64 {
-        (self.surprise * effects as f64 / gain.max(1.0)).powf(self.power)
-    }
-}
+/// Odds against one of so many names that gains so much under a doubt: the diagnosis's own formula, which is handed in.
+pub type Law<'a> = &'a dyn Fn(Doubt, usize, f64) -> f64;
 
 /// Gains of even odds that are tried.
 pub const SURPRISES: [f64; 7] = [5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 40.0];
@@ -39,10 +34,15 @@ pub fn counted(names: &[(f64, bool)]) -> Vec<(f64, f64, usize, usize)> {
     GAINS.windows(2).map(of).collect()
 }
 
+/// Mean score of cases under a doubt.
+pub fn score(cases: &[&Weighed], temper: Temper, doubt: Doubt, law: Law) -> f64 {
+    mean_score(cases, temper, &|effects, gain| law(doubt, effects, gain))
+}
+
 /// The doubt that scores best on some cases.
-pub fn best(cases: &[&Weighed], temper: Temper) -> Doubt {
+pub fn best(cases: &[&Weighed], temper: Temper, law: Law) -> Doubt {
     let tried = POWERS.into_iter().flat_map(|power| SURPRISES.map(|surprise| Doubt { surprise, power }));
-    let worth = |doubt: &Doubt| mean_score(cases, temper, &|effects, gain| doubt.odds(effects, gain));
+    let worth = |doubt: &Doubt| score(cases, temper, *doubt, law);
     let first = Doubt { surprise: SURPRISES[0], power: POWERS[0] };
     tried.max_by(|a, b| worth(a).total_cmp(&worth(b))).unwrap_or(first)
 }
@@ -50,15 +50,6 @@ pub fn best(cases: &[&Weighed], temper: Temper) -> Doubt {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn odds_are_even_at_the_surprise_and_fall_with_the_power() {
-        let doubt = Doubt { surprise: 50.0, power: 1.5 };
-        assert_eq!(doubt.odds(1, 50.0), 1.0);
-        assert_eq!(doubt.odds(3, 150.0), 1.0);
-        assert!((doubt.odds(1, 200.0) - 0.125).abs() < 1e-12);
-        assert!(doubt.odds(1, -3.0) == doubt.odds(1, 0.0), "a loss is no gain");
-    }
 
     #[test]
     fn names_are_counted_by_what_they_gain() {

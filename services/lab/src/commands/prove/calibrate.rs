@@ -2,14 +2,14 @@
 
 use std::path::Path;
 
-use kort_diagnose::constants::Constants;
+use kort_diagnose::constants::{Constants, PosteriorConstants};
 use kort_diagnose::posterior;
 use kort_proof::calibrate::{Fold, fold_of, records};
 use kort_proof::score::Scored;
 use kort_proof::temper::{
     FORM_SHARES, LEAST_TEMPERS, Odds, Temper, Weighed, best, cross_validate, mean_score,
 };
-use kort_proof::trust::{self, Doubt, POWERS, SURPRISES};
+use kort_proof::trust::{self, Doubt, Law, POWERS, SURPRISES};
 use kort_truth::Answer;
 use serde_json::Value;
 
@@ -54,8 +54,13 @@ fn print_weighed(results: &[(Scored, Answer, Value)], by: Fold, folds: usize) {
         .collect();
     let odds = Constants::built_in().posterior;
     let in_use = Temper { least: odds.temper, form_share: odds.form_share };
-    print_temper(&cases, in_use, &|effects, gain| posterior::doubt(&odds, effects, gain));
-    print_doubt(&cases, in_use, Doubt { surprise: odds.surprise, power: odds.surprise_power });
+    let law = |doubt: Doubt, effects, gain| {
+        let tried = PosteriorConstants { surprise: doubt.surprise, surprise_power: doubt.power, ..odds };
+        posterior::doubt(&tried, effects, gain)
+    };
+    let doubt = Doubt { surprise: odds.surprise, power: odds.surprise_power };
+    print_temper(&cases, in_use, &|effects, gain| law(doubt, effects, gain));
+    print_doubt(&cases, in_use, doubt, &law);
 }
 
 /// The temper, and what it is worth on folds left out.
@@ -81,7 +86,7 @@ fn print_temper(cases: &[Weighed], in_use: Temper, doubt: Odds) {
 
 /// How often names that no other comes near were right, by what leaving them out costs for each that stands together, and
 /// which doubt that asks for.
-fn print_doubt(cases: &[Weighed], temper: Temper, in_use: Doubt) {
+fn print_doubt(cases: &[Weighed], temper: Temper, in_use: Doubt, law: Law) {
     let names: Vec<(f64, bool)> = cases.iter().flat_map(|case| case.without_rival(temper)).collect();
     eprintln!("cost a name  right  stated without a rival");
     for (from, to, right, count) in trust::counted(&names) {
@@ -91,12 +96,9 @@ fn print_doubt(cases: &[Weighed], temper: Temper, in_use: Doubt) {
     eprintln!("mean log score of the names, by the cost a name of even odds and their power");
     eprintln!("        {}", POWERS.map(|power| format!("{power:7}")).join("  "));
     for surprise in SURPRISES {
-        let of = |power| {
-            let doubt = Doubt { surprise, power };
-            format!("{:7.3}", mean_score(&all, temper, &|effects, gain| doubt.odds(effects, gain)))
-        };
+        let of = |power| format!("{:7.3}", trust::score(&all, temper, Doubt { surprise, power }, law));
         eprintln!("{surprise:6}  {}", POWERS.map(of).join("  "));
     }
     let words = |doubt: Doubt| format!("{} to the power {}", doubt.surprise, doubt.power);
-    eprintln!("best {}, in use {}", words(trust::best(&all, temper)), words(in_use));
+    eprintln!("best {}, in use {}", words(trust::best(&all, temper, law)), words(in_use));
 }
