@@ -76,8 +76,12 @@ fn what_the_rig_does_not_know_is_found_used_and_gone_back_from() {
         let page = stack.text(&format!("/v1/thrusters/t1/diagnoses/{id}/report")).unwrap();
         assert!(page.starts_with("<!DOCTYPE html>") && page.contains("coulomb"), "{page:.300}");
 
-        // Used under way, and named.
+        // Used under way, and named; a recording that goes on holds both descriptions.
         drive(&mut stack, &[50.0]);
+        let recordings = format!("http://127.0.0.1:{}/v1/recordings", stack.site.port);
+        let named = json!({"name": "across"}).to_string();
+        ureq::post(&recordings).header("Content-Type", "application/json").send(named).unwrap();
+        std::thread::sleep(Duration::from_millis(300));
         let used = stack.expect("POST", "/rig", Some(json!({"diagnosis": id})));
         assert_eq!(
             (&used["applied"], &used["in_force"]["source"]),
@@ -88,11 +92,19 @@ fn what_the_rig_does_not_know_is_found_used_and_gone_back_from() {
         assert!(keys.contains(&"effects.coulomb_friction.coulomb_torque_n_m"), "{keys:?}");
         let state = stack.state().unwrap();
         assert_eq!((&state["rig_revision"], &state["armed"]), (&used["in_force"]["revision"], &json!(true)));
+        std::thread::sleep(Duration::from_millis(1200));
         // It was compared with a revision that is not in force any more.
         let (status, again) = stack.http("POST", "/rig", Some(json!({"diagnosis": id}))).unwrap();
         assert_eq!((status, &again["type"]), (409, &json!("urn:kort:problem:refused")), "{again}");
         let back = stack.expect("POST", "/rig/rollback", None);
         assert_eq!(back["in_force"]["revision"], stated);
+        std::thread::sleep(Duration::from_millis(1200));
+        ureq::delete(format!("{recordings}/across")).call().unwrap();
+        let file = std::fs::read(stack.site.folder.path().join("recordings/across.mcap")).unwrap();
+        let about = kort_recording::Recording::decode("across", file.as_slice(), None).unwrap().about;
+        let told = ["rig_revision", "rig_revision.2", "rig_revision.3"].map(|key| json!(about.get(key)));
+        assert_eq!(told, [stated.clone(), used["in_force"]["revision"].clone(), stated.clone()]);
+        assert!(about["rig.2"].contains("coulomb_friction") && !about["rig"].contains("coulomb_friction"));
         wait("the events", || {
             let events = stack.get("/v1/events")?;
             let kinds: Vec<&str> = events.as_array()?.iter().filter_map(|e| e["kind"].as_str()).collect();

@@ -156,6 +156,11 @@ impl Thruster {
     }
 }
 
+/// Is something there, readable or not? What stands in the place of the default file is no reason for the one built in.
+pub fn is_there(path: &Path) -> bool {
+    path.symlink_metadata().is_ok()
+}
+
 impl Config {
     /// Reads the deployment at `path`; without one the default file if it is there, else the one
     /// built in.
@@ -170,7 +175,7 @@ impl Config {
     /// usual ones there.
     pub fn load_with_all(path: Option<&Path>) -> (Option<Self>, Vec<ConfigError>) {
         let default = Path::new(DEFAULT_PATH);
-        let path = path.or_else(|| default.is_file().then_some(default));
+        let path = path.or_else(|| is_there(default).then_some(default));
         let Some(path) = path else {
             return Self::read(BUILT_IN, None);
         };

@@ -2,10 +2,11 @@
 //! object a line, appended by the gateway and the supervisor alike, and rotated.
 
 use std::fs::{self, File, OpenOptions};
-use std::io::{self, Write};
+use std::io;
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, SystemTime};
 
 use rustix::fs::{FlockOperation, flock};
@@ -15,8 +16,10 @@ use crate::faults::Fault;
 use crate::ours;
 
 mod standing;
+mod unwritten;
 
 pub use standing::Standing;
+use unwritten::Unwritten;
 
 /// A file that grew beyond this is put aside, bytes.
 const FILE_BYTES_MAX: u64 = 1 << 20;
@@ -99,6 +102,8 @@ pub enum EventKind {
     RecordingDeleted,
     /// The service was stopped on request.
     ServiceStopped,
+    /// Events before this one could not be written down and are lost.
+    EventsLost,
 }
 
 impl EventKind {
@@ -201,6 +206,7 @@ fn monotonic_ns() -> u64 {
 #[derive(Clone, Debug)]
 pub struct EventLog {
     folder: PathBuf,
+    unwritten: Arc<Mutex<Unwritten>>,
 }
 
 impl EventLog {
@@ -210,16 +216,29 @@ impl EventLog {
     /// The folder cannot be made.
     pub fn open(folder: &Path) -> io::Result<Self> {
         ours::make_folder(folder)?;
-        Ok(Self { folder: folder.to_owned() })
+        Ok(Self { folder: folder.to_owned(), unwritten: Arc::default() })
     }
 
     /// Appends an event; whoever else appends does not get in between.
     ///
     /// # Errors
-    /// The disk refuses; nothing is written then, or a torn line, which readers skip.
+    /// The disk refuses; the event is kept then, and written at the next try that goes well.
     pub fn append(&self, event: &Event) -> io::Result<()> {
-        let mut line = serde_json::to_vec(event)?;
-        line.push(b'\n');
+        let mut unwritten = self.unwritten.lock().unwrap_or_else(PoisonError::into_inner);
+        unwritten.keep(line(event)?);
+        self.write(&mut unwritten)
+    }
+
+    /// Tries again what the disk did not take.
+    ///
+    /// # Errors
+    /// It does not take it now either.
+    pub fn retry(&self) -> io::Result<()> {
+        let mut unwritten = self.unwritten.lock().unwrap_or_else(PoisonError::into_inner);
+        if unwritten.is_empty() { Ok(()) } else { self.write(&mut unwritten) }
+    }
+
+    fn write(&self, unwritten: &mut Unwritten) -> io::Result<()> {
         let lock = OpenOptions::new()
             .create(true)
             .truncate(false)
@@ -243,7 +262,14 @@ impl EventLog {
         let mut options = OpenOptions::new();
         options.create(true).append(true).mode(0o640).custom_flags(NO_LINK);
         let mut file: File = options.open(self.file(0))?;
-        file.write_all(&line)
+        unwritten.write_to(&mut file)?;
+        if unwritten.lost > 0 {
+            let words = format!("{} events could not be written down and are lost", unwritten.lost);
+            unwritten.lost = 0;
+            unwritten.keep(line(&Event::now(EventKind::EventsLost, None, "event log", words))?);
+            unwritten.write_to(&mut file)?;
+        }
+        Ok(())
     }
 
     /// Every event that is kept, oldest first; lines that cannot be read are left out.
@@ -298,6 +324,12 @@ pub struct Mark {
     bytes: u64,
 }
 
+fn line(event: &Event) -> io::Result<Vec<u8>> {
+    let mut line = serde_json::to_vec(event)?;
+    line.push(b'\n');
+    Ok(line)
+}
+
 fn parse(text: &[u8]) -> impl Iterator<Item = Event> {
     text.split(|b| *b == b'\n').filter_map(|line| serde_json::from_slice(line).ok())
 }
@@ -305,6 +337,7 @@ fn parse(text: &[u8]) -> impl Iterator<Item = Event> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::io::Write;
 
     fn event(detail: &str) -> Event {
         Event::now(EventKind::Armed, Some("t1"), "bench", detail)
@@ -342,8 +375,11 @@ mod tests {
         assert!(log.append(&event("first")).is_err());
         assert_eq!(fs::read_to_string(&theirs).unwrap(), "whole");
         fs::remove_file(log.file(0)).unwrap();
-        log.append(&event("first")).unwrap();
-        assert_eq!(log.read().len(), 1);
+        log.append(&event("second")).unwrap();
+        let read = log.read();
+        assert_eq!(read.iter().map(|e| e.detail.as_str()).collect::<Vec<_>>(), ["first", "second"]);
+        log.retry().unwrap();
+        assert_eq!(log.read().len(), 2, "nothing is written twice");
     }
 
     #[test]

@@ -300,7 +300,7 @@ class Stream:
         try:
             from websockets.asyncio.client import connect
         except ImportError as why:
-            raise ImportError("the stream needs websockets\nhint: pip install 'kort[stream]'") from why
+            raise ImportError("the stream needs websockets\nhint: pip install './python[stream]' in a clone of kort") from why
         parts = urlsplit(client.url)
         scheme = "wss" if parts.scheme == "https" else "ws"
         address = urlunsplit((scheme, parts.netloc, parts.path + _of(thruster, "stream"), f"hz={hz}", ""))

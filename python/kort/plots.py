@@ -19,7 +19,7 @@ def _figure(panels: int, height: float, **more: Any) -> tuple[Any, list[Any]]:
     try:
         import matplotlib.pyplot as plt
     except ImportError as why:
-        raise ImportError("plots need matplotlib\nhint: pip install 'kort[plot]'") from why
+        raise ImportError("plots need matplotlib\nhint: pip install './python[plot]' in a clone of kort") from why
     figure, axes = plt.subplots(
         panels, 1, figsize=(8, max(2.0, height * panels)), squeeze=False, layout="constrained", **more
     )

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
-use kort_proto::config::{Config, DEFAULT_PATH};
+use kort_proto::config::{Config, DEFAULT_PATH, is_there};
 use serde::Serialize;
 
 use crate::{DONE, USAGE};
@@ -76,7 +76,7 @@ pub fn run(args: &Check) -> ExitCode {
     let mut found = Found::default();
     if args.files.is_empty() {
         let default = Path::new(DEFAULT_PATH);
-        deployment(default.is_file().then_some(default), &mut found);
+        deployment(is_there(default).then_some(default), &mut found);
     }
     for file in &args.files {
         match std::fs::read_to_string(file) {

@@ -239,7 +239,10 @@ impl Blames for up::UpError {
             Self::Servo(e) => e.blames_input(),
             Self::Controller(e) => e.blames_input(),
             Self::Gateway(e) => e.blames_input(),
-            Self::Transport(_) | Self::System { .. } | Self::DoesNotStart { .. } => false,
+            Self::Transport(_)
+            | Self::System { .. }
+            | Self::DoesNotStart { .. }
+            | Self::NotStopped { .. } => false,
         }
     }
 }

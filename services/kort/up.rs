@@ -1,6 +1,7 @@
 //! `kort up`: owns the shared memory, runs servo, controller and gateway as child processes,
 //! replaces one that dies or hangs, and stops with thrust at zero first.
 
+mod ending;
 mod error;
 mod inherited;
 mod role;
@@ -16,7 +17,6 @@ use std::time::{Duration, Instant};
 
 use kort_proto::config::Config;
 use kort_proto::events::{Event, EventKind, EventLog};
-use kort_proto::messages::RequestKind;
 use kort_proto::transport::{Deployment, Owner, Restarts, Watched};
 use tracing::{info, warn};
 
@@ -36,9 +36,6 @@ const STOOD_STILL: Duration = Duration::from_millis(500);
 /// How things stand is written down this often while a drive is armed: a service that is killed as a whole tells its
 /// successor by that when it was stopped, and at what thrust.
 const NOTE_EVERY: Duration = Duration::from_millis(100);
-/// How long a thruster may take to come to rest before its drive is switched off, and after.
-const REST_WITHIN: Duration = Duration::from_millis(2500);
-const COAST_WITHIN: Duration = Duration::from_secs(3);
 /// How long a child may take to end.
 const STOP_WITHIN: Duration = Duration::from_secs(2);
 
@@ -81,8 +78,7 @@ pub fn run(config: &Config, deployment: &Deployment) -> Result<(), UpError> {
     );
     let result = service.watch_until(&stop);
     system::stopping();
-    service.end();
-    result
+    result.and(service.end())
 }
 
 /// Everything under the supervisor.
@@ -305,71 +301,6 @@ impl Service {
             self.written_at = Instant::now();
             self.written = now.clone();
             self.scribe.watched(now);
-        }
-    }
-
-    /// Thrust to zero, then every process ends: the gateway first, so that nobody commands any more; the servo last.
-    fn end(mut self) {
-        // A servo that never came up has nothing to set to zero.
-        if self.roles.iter().any(|role| role.name == "servo" && role.child.is_some()) {
-            self.go_to_zero();
-        }
-        self.roles.iter_mut().rev().for_each(Role::end);
-        for watch in &mut self.watches {
-            watch.stood.armed = false;
-        }
-        self.write_down();
-        self.scribe.event(Event::now(
-            EventKind::ServiceStopped,
-            None,
-            "supervisor",
-            "the service was stopped",
-        ));
-        self.scribe.finish();
-        info!("stopped");
-    }
-
-    /// Ramps every thruster down, disarms it at rest, and says what is left of thrust and speed.
-    fn go_to_zero(&mut self) {
-        self.hear();
-        let begun = Instant::now();
-        let mut asked = begun - LOOK_EVERY;
-        // First the controllers brake; whoever is at rest, or does not get there in time, is disarmed.
-        while self.watches.iter().any(|watch| watch.speaks() && watch.stood.armed) {
-            let late = begun.elapsed() >= REST_WITHIN;
-            if begun.elapsed() >= REST_WITHIN + STOP_WITHIN {
-                break;
-            }
-            if asked.elapsed() >= LOOK_EVERY {
-                asked = Instant::now();
-                for watch in self.watches.iter_mut().filter(|watch| watch.stood.armed) {
-                    let kind = if late || watch.at_rest() { RequestKind::Disarm } else { RequestKind::Rest };
-                    watch.ask(kind);
-                }
-            }
-            std::thread::sleep(Duration::from_millis(4));
-            self.hear();
-        }
-        // A shaft that was not braked coasts down.
-        let disarmed = Instant::now();
-        while disarmed.elapsed() < COAST_WITHIN
-            && self.watches.iter().any(|watch| watch.speaks() && !watch.at_rest())
-        {
-            std::thread::sleep(LOOK_EVERY);
-            self.hear();
-        }
-        for watch in &self.watches {
-            let (thruster, words) = (watch.id(), watch.words());
-            match (watch.speaks(), watch.stood.armed, watch.at_rest()) {
-                (false, ..) => warn!(thruster, "the servo does not answer; its end switches the drive off"),
-                (true, true, _) => {
-                    warn!(thruster, "the servo does not disarm; its end switches the drive off")
-                }
-                (true, false, true) => info!(thruster, "thrust at zero ({words}), disarmed"),
-                (true, false, false) => {
-                    warn!(thruster, "disarmed, the drive is off, but the shaft still turns: {words}")
-                }
-            }
         }
     }
 }

@@ -66,6 +66,9 @@ fn recordings_are_tagged_and_the_tuned_controller_is_kept_as_a_file() {
         assert_eq!(page.eval("window.kept[0]"), "t1-thrust_pi.toml");
         let text = page.eval("window.kept[1]").as_str().unwrap().to_owned();
         assert!(text.contains("phase_margin_deg = 61") && text.contains("law = \"thrust_pi\""), "{text}");
+        // An emptied field is no zero.
+        tune(&mut page, "");
+        assert_eq!(page.eval(&format!("{margin}.value")), "61");
         tune(&mut page, "45");
         page.until(&text_is("log", "phase_margin_deg = 45 deg"));
         // A file as the dialog hands it over.
@@ -95,7 +98,9 @@ fn two_thrusters_side_by_side_are_commanded_in_turn_and_stopped_at_once() {
         for (id, newton) in [("t1", 60), ("t2", 15)] {
             page.eval("preview()");
             page.eval(&format!("[...document.querySelectorAll('#mates button')].find((b) => b.ariaLabel === 'choose {id}').click()"));
-            page.until(&format!("thruster === '{id}' && state !== null && state.id === '{id}'"));
+            page.until(&format!("thruster === '{id}' && state !== null"));
+            // Nothing of the one before is shown, or proposed, as this one's.
+            assert_eq!(page.eval("[state.id, Number($('entry').value)]"), json!([id, 0]));
             page.click("take");
             page.until(&text_is("lease-text", "You have the lease"));
             page.click("arm");
@@ -140,6 +145,10 @@ fn two_thrusters_side_by_side_are_commanded_in_turn_and_stopped_at_once() {
             });
         }
         page.until("[...document.querySelectorAll('#mates .armed')].every((chip) => chip.textContent === 'disarmed')");
+        // What was stopped is not said any more once it is armed again.
+        page.click("arm");
+        page.until("state.armed");
+        page.until("$('stop-text').textContent === ''");
         assert_eq!(page.errors, Vec::<String>::new());
     });
 }

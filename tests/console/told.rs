@@ -37,6 +37,21 @@ fn nothing_is_offered_or_shown_that_is_not_so() {
             page.until("$('play').disabled && document.querySelectorAll('#signal-plot canvas').length === 0");
         }
 
+        // The same file, changed meanwhile, is taken anew; a field without a number is no zero.
+        choose(&mut page, "file");
+        for level in [20, 30] {
+            let file = format!(
+                "{{\"name\": \"mine\", \"command\": \"thrust_cmd_n\", \"segments\": [{{\"kind\": \"hold\", \"value\": {level}, \"duration_s\": 2}}]}}"
+            );
+            page.eval(&format!("(() => {{ const chosen = new DataTransfer(); chosen.items.add(new File([{file:?}], 'mine.json')); $('signal-file').files = chosen.files; $('signal-file').dispatchEvent(new Event('change')); }})()"));
+            page.until(&text_is("signal-text", &format!("mine.json: mine: 2.0 s, up to {level}.0 N")));
+            assert_eq!(page.eval("$('signal-file').files.length"), 0);
+        }
+        choose(&mut page, "staircase");
+        page.eval("$('signal-levels').value = ''; preview()");
+        page.until(&text_is("signal-text", "A field is empty"));
+        choose(&mut page, "staircase");
+
         // A chip that is orange has its words.
         let told = |page: &mut Browser, level: Value, alarm: Value, torque: f64| -> String {
             let mismatch = json!({"alarm": alarm, "since_s": 3.0, "agrees": torque.abs() <= 0.05,

@@ -91,3 +91,16 @@ fn the_openapi_document_names_every_route_and_each_answers() {
         assert_eq!(send(port, "GET", "/docs/swagger-ui-bundle.js", &[], b"").status, 200);
     });
 }
+
+#[test]
+fn the_page_of_a_fault_is_a_page_for_a_browser_and_text_for_a_program() {
+    let site = Site::new();
+    let mut gateway = site.spawn("gateway");
+    let read = |accept: &str| send(site.port, "GET", "/v1/faults/4", &[("Accept", accept)], b"").text();
+    let text = read("*/*");
+    assert!(text.contains("## Cause") && !text.contains("<h2>"), "{text}");
+    let page = read("text/html,application/xhtml+xml,*/*;q=0.8");
+    assert!(page.starts_with("<!DOCTYPE html>") && page.contains("<h2>Cause</h2>"), "{page}");
+    kill(gateway.id(), "TERM");
+    wait("the gateway to end", || gateway.try_wait().unwrap());
+}

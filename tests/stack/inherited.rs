@@ -21,6 +21,37 @@ fn again(stack: &mut Stack) {
     stack.wait_until_up();
 }
 
+/// A servo that hangs or dies while the service ends has not switched its drive off: nobody says it has, and the next
+/// service finds the stop latched.
+#[test]
+fn a_servo_that_does_not_end_in_order_is_no_ordered_stop() {
+    common::in_real_time(|| {
+        for signal in ["STOP", "KILL"] {
+            let mut stack = Stack::start();
+            stack.thrust(80.0, LEASE_MS);
+            let servo = stack.process_of("servo");
+            if signal == "STOP" {
+                kill(servo, signal);
+            }
+            kill(stack.supervisor.id(), "INT");
+            if signal == "KILL" {
+                std::thread::sleep(Duration::from_millis(50));
+                kill(servo, signal);
+            }
+            let status = stack.supervisor.wait().unwrap();
+            let log = stack.site.log();
+            assert_eq!(status.code(), Some(1), "{log}");
+            assert!(log.contains("without switching the drive off"), "{log}");
+            stack.supervisor = stack.site.spawn("up");
+            stack.wait_until_up();
+            let fault = wait("the fault", || found(&stack.state()?));
+            assert!(fault["before"]["thrust_n"].as_f64().is_some_and(|n| n > 20.0), "{fault}");
+            let events = stack.get("/v1/events").unwrap().to_string();
+            assert!(events.contains("the servo ended while armed"), "{events}");
+        }
+    });
+}
+
 fn told(stack: &Stack, kind: &str) -> Vec<Value> {
     let events = stack.get("/v1/events").unwrap();
     let of_fault = |e: &&Value| e["kind"] == kind && e["fault"] == 14;

@@ -99,3 +99,15 @@ fn without_the_windings_resistance_the_way_out_is_named() {
     assert!(matches!(&found, DataError::NoResponse { .. }));
     assert!(found.to_string().contains("motor.winding_resistance_ohm"), "{found}");
 }
+
+#[test]
+fn a_command_for_a_drive_of_another_kind_is_named_with_the_kind_that_is_needed() {
+    let mut series = telemetry(0.6);
+    series.columns[0] = ("speed_cmd_rad_s".into(), series.columns[1].1.clone());
+    let found = Prepared::new(&series, &Rig::from_toml(RIG).unwrap(), false).unwrap_err();
+    assert!(
+        matches!(&found, DataError::OtherDrive { column: "speed_cmd_rad_s", kind: "voltage", .. }),
+        "{found}"
+    );
+    assert!(found.to_string().contains("amplifier.kind"), "{found}");
+}

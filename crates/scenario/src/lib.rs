@@ -229,4 +229,26 @@ impl Scenario {
     pub fn from_toml(text: &str) -> Result<Self, ScenarioError> {
         from_toml(text).map_err(|message| ScenarioError::Syntax { message })
     }
+
+    /// Reads a scenario file as people have it: TOML, JSON, or the JSON report of a diagnosis, whose next experiment it
+    /// is then.
+    ///
+    /// # Errors
+    /// [`ScenarioError::Syntax`] with line or key, or that the report asks for no further run.
+    pub fn from_text(text: &str) -> Result<Self, ScenarioError> {
+        if !text.trim_start().starts_with('{') {
+            return Self::from_toml(text);
+        }
+        let fail = |message: String| ScenarioError::Syntax { message };
+        let mut json: serde_json::Value = serde_json::from_str(text).map_err(|e| fail(e.to_string()))?;
+        if let Some(next) = json.get_mut("next_experiment") {
+            json = next.get_mut("scenario").map(serde_json::Value::take).ok_or_else(|| {
+                fail("`next_experiment` is null: this report asks for no further run".into())
+            })?;
+        }
+        serde_json::from_value(json.clone()).map_err(|e| {
+            let tree = toml::Value::try_from(json).ok();
+            fail(tree.as_ref().and_then(complaint::<Self>).unwrap_or_else(|| e.to_string()))
+        })
+    }
 }

@@ -25,6 +25,9 @@ pub struct Measuring {
     thrust_quantum_n: Option<f64>,
     flow_period_s: Option<f64>,
     next_flow_s: f64,
+    /// What nothing measures.
+    without_thrust: bool,
+    without_flow: bool,
 }
 
 impl Measuring {
@@ -42,10 +45,13 @@ impl Measuring {
             thrust_quantum_n: quantum,
             flow_period_s: sensors.flow_rate_hz.map(|hz| 1.0 / hz),
             next_flow_s: 0.0,
+            without_thrust: !sensors.thrust_sensor,
+            without_flow: !sensors.flow_meter,
         }
     }
 
-    /// What is logged of `sensed` at `time_s`; flow is NaN between the flow meter's samples.
+    /// What is logged of `sensed` at `time_s`; flow is NaN between the flow meter's samples, and what the rig has no
+    /// sensor of is NaN throughout.
     pub fn read(&mut self, time_s: f64, sensed: &Sensed) -> Sensed {
         let scale = self.scale;
         let mut read = *sensed;
@@ -68,6 +74,12 @@ impl Measuring {
             }
             None => sensed.flow_m_s + flow_noise,
         };
+        if self.without_thrust {
+            read.thrust_n = f64::NAN;
+        }
+        if self.without_flow {
+            read.flow_m_s = f64::NAN;
+        }
         read
     }
 
@@ -101,6 +113,14 @@ mod tests {
             angle_rad: [0.0; 2],
             reverses: true,
         }
+    }
+
+    #[test]
+    fn what_the_rig_has_no_sensor_of_is_not_measured() {
+        let sensors = Sensors { thrust_sensor: false, flow_meter: false, ..Sensors::IDEAL };
+        let read = Measuring::new(&sensors, scale(), 1.0, 1)
+            .read(0.0, &Sensed { thrust_n: 5.0, ..Sensed::default() });
+        assert!(read.thrust_n.is_nan() && read.flow_m_s.is_nan() && read.current_a.is_finite());
     }
 
     #[test]

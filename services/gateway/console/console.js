@@ -55,7 +55,7 @@ function askToken() {
 async function openPage(event, link) {
   if (!token) return;
   event.preventDefault();
-  const answer = await fetch(link.href, { headers: { Authorization: `Bearer ${token}` } });
+  const answer = await fetch(link.href, { headers: { Authorization: `Bearer ${token}`, Accept: "text/html, */*" } });
   if (!answer.ok) { log(`${link.textContent}: ${answer.status}`, true); return; }
   window.open(URL.createObjectURL(await answer.blob()), "_blank");
 }
@@ -69,8 +69,12 @@ function streamOf(id, hz) {
   const scheme = location.protocol === "https:" ? "wss" : "ws";
   return new WebSocket(`${scheme}://${location.host}/v1/thrusters/${encodeURIComponent(id)}/stream?hz=${hz}`, token ? ["kort", `bearer.${token}`] : ["kort"]);
 }
-function connect() {
+function disconnect() {
   if (socket) { socket.onclose = null; socket.onmessage = null; socket.close(); }
+  socket = null;
+}
+function connect() {
+  disconnect();
   socket = streamOf(thruster, STREAM_HZ);
   socket.onmessage = (message) => {
     const next = JSON.parse(message.data);
@@ -92,7 +96,8 @@ function record(s) {
   const set = s.setpoint || {}, cmd = s.commanded || {}, { parameters, ...est } = s.estimated;
   const estimates = [...Object.entries(est).map(([name, v]) => [`estimated_${name}`, "", v]),
     ...parameters.flatMap((p) => [...(p.name in est ? [] : [[`estimated_${p.name}`, p.unit, p.value]]), [`estimated_${p.name}${DOUBT}`, p.unit, p.std_error]]),
-    ...(s.mismatch?.paths ?? []).map(({ path, level }) => [`mismatch_${path}`, LEVEL, level])];
+    ...(s.mismatch?.paths ?? []).map(({ path, level }) => [`mismatch_${path}`, LEVEL, level]),
+    ...(s.mismatch?.residuals ?? []).map(({ residual, share }) => [`residual_${residual}`, "1", share])];
   const before_s = live.t[live.t.length - 1];
   if (s.time_s - before_s > HOLE_S) loadHistory(before_s, s.time_s).catch(() => {});
   live.push(s.time_s, { ...s.measured, ...cmd, ...estimatesRow(estimates), thrust_cmd_n: set.thrust_n ?? cmd.thrust_cmd_n, speed_cmd_rad_s: set.speed_rad_s ?? cmd.speed_cmd_rad_s });
@@ -103,7 +108,7 @@ function show() {
   const age_s = state ? (performance.now() - heard_ms) / 1000 + (state.age_s ?? 0) : null;
   chip("link", fresh ? "live" : age_s === null ? "no link" : `values are ${age_s.toFixed(1)} s old`, fresh ? "good" : "bad");
   document.body.classList.toggle("stale", !fresh);
-  if (fresh) seenDisarmed();
+  if (fresh) { seenDisarmed(); seenArmed(); }
   $("send").disabled = !fresh || !lease || !state.armed;
   $("zero-button").disabled = !fresh;
   if (state) {
@@ -172,38 +177,45 @@ function chip(id, words, kind) { $(id).textContent = words; $(id).className = `c
 click("take", async () => {
   const takeover = Boolean(state && state.lease);
   if (takeover && !confirm(`Take command from “${state.lease.holder}”? The thruster goes to rest, and they are told.`)) return;
-  const granted = await call("POST", `${base()}/lease`, { holder: $("holder").value, ttl_ms: lease_ttl_ms, takeover });
-  lease = granted.lease_id; taken_ms = performance.now(); log(`lease taken as “${$("holder").value}”`);
+  const of = thruster, granted = await call("POST", `${base()}/lease`, { holder: $("holder").value, ttl_ms: lease_ttl_ms, takeover });
+  if (thruster === of) { lease = granted.lease_id; taken_ms = performance.now(); } else held.set(of, granted.lease_id);
+  log(`lease of ${of} taken as “${$("holder").value}”`);
 });
 click("give", async () => { // forgotten before the answer comes: what is being given up is not renewed
   const given = call("DELETE", `${base()}/lease`);
   lease = null;
   await given; log("lease given up");
 });
-setInterval(() => { if (lease) call("PUT", `${base()}/lease`).catch(() => { lease = null; }); }, RENEW_EVERY_MS);
+// The lease that could not be renewed is gone, not one that was taken or chosen meanwhile.
+setInterval(() => { const sent = lease; if (sent) call("PUT", `${base()}/lease`).catch(() => { if (lease === sent) lease = null; }); }, RENEW_EVERY_MS);
 
 click("arm", async () => { await call("POST", `${base()}/arm`); log("armed"); });
 const disarm = async () => { await call("POST", `${base()}/disarm`); log("disarmed"); };
 click("disarm", disarm);
 // STOP goes out by every way there is, and says whether a servo confirmed it.
-let stopping = null, unconfirmed_ms = null;
+let stopping = null, unconfirmed_ms = null, stopped_ms = null;
 function stopConfirmed(by) {
   if (!stopping) return;
-  clearTimeout(stopping); stopping = null;
+  clearTimeout(stopping); stopping = null; stopped_ms = performance.now();
   $("stop-text").className = "good"; $("stop-text").textContent = "Stopped: confirmed.";
   log(`stop confirmed by ${by}`);
 }
 // A stop that nobody confirmed is an alarm until every thruster is seen disarmed, in a state that came after it.
+const seenStates = () => (fleet.size ? [...fleet.values()] : [{ state, heard_ms }]);
 function seenDisarmed() {
   if (unconfirmed_ms === null) return;
-  const seen = fleet.size ? [...fleet.values()] : [{ state, heard_ms }];
-  if (!seen.every((one) => one.state && !one.state.armed && one.heard_ms > unconfirmed_ms && one.state.age_s !== null && one.state.age_s < STALE_MS / 1000)) return;
-  unconfirmed_ms = null;
+  if (!seenStates().every((one) => one.state && !one.state.armed && one.heard_ms > unconfirmed_ms && one.state.age_s !== null && one.state.age_s < STALE_MS / 1000)) return;
+  unconfirmed_ms = null; stopped_ms = performance.now();
   $("stop-text").className = "good"; $("stop-text").textContent = "Disarmed: the live state says so. The stop itself was not confirmed.";
   log("the live state says disarmed; the stop was not confirmed");
 }
+// What was stopped is said until a thruster is armed again, in a state that was not under way when it stopped.
+function seenArmed() {
+  if (stopped_ms === null || !seenStates().some((one) => one.state?.armed && one.heard_ms > stopped_ms + 1000)) return;
+  stopped_ms = null; $("stop-text").textContent = "";
+}
 function stopAll() {
-  clearTimeout(stopping); unconfirmed_ms = null;
+  clearTimeout(stopping); unconfirmed_ms = null; stopped_ms = null;
   $("stop-text").className = "bad"; $("stop-text").textContent = "Stop sent, not confirmed yet.";
   stopping = setTimeout(() => {
     stopping = null; unconfirmed_ms = performance.now();
@@ -220,11 +232,14 @@ click("clear", async () => { await call("POST", `${base()}/clear-faults`); log("
 const kind = () => document.querySelector("input[name=kind]:checked").value;
 const send = async (value) => {
   if (isStale()) { log("nothing is sent while the values shown are old", true); return; }
-  const applied = await call("PUT", `${base()}/setpoint`, { [kind()]: value });
-  $("entry").value = value; $("slider").value = value;
+  const of = thruster, applied = await call("PUT", `${base()}/setpoint`, { [kind()]: value });
+  if (thruster === of) { $("entry").value = value; $("slider").value = value; }
   return applied;
 };
-click("send", async () => { const value = Number($("entry").value); await send(value); log(`setpoint ${kind()} = ${value}`); });
+click("send", async () => {
+  if ($("entry").value === "") { log("nothing is sent: the setpoint is no number", true); return; }
+  const value = Number($("entry").value), of = thruster; await send(value); log(`setpoint of ${of}: ${kind()} = ${value}`);
+});
 click("zero-button", async () => { $("entry").value = 0; $("slider").value = 0; await send(0); log("setpoint zero"); });
 $("entry").addEventListener("keydown", (event) => { if (event.key === "Enter") $("send").click(); });
 // The slider proposes, Send (or Enter) commands: a key such as End must not mean full thrust by itself.
@@ -239,16 +254,22 @@ function proposeInForce() {
   showKind();
 }
 function showKind() {
+  showBounds();
+  const now = state?.setpoint?.[kind()] ?? 0;
+  $("slider").value = now; $("entry").value = now;
+}
+function showBounds() {
   const bound = limitsOf?.[kind()] ?? 100;
   $("unit").textContent = kind() === "thrust_n" ? "N" : "rad/s";
   const step = bound > 20 ? 0.5 : 0.01, end = Math.floor(bound / step) * step; // steps count from min: zero must be one
   $("slider").min = -end; $("slider").max = end; $("slider").step = step;
-  const now = state?.setpoint?.[kind()] ?? 0;
-  $("slider").value = now; $("entry").value = now; $("entry").min = -bound; $("entry").max = bound;
+  $("entry").min = -bound; $("entry").max = bound;
+  $("slider").value = $("entry").value;
 }
 
 async function loadController() {
-  const answer = await call("GET", `${base()}/controller`);
+  const of = thruster, answer = await call("GET", `${base()}/controller`);
+  if (thruster !== of) return;
   $("controller").dataset.running = answer.controller;
   for (const [id, names, chosen] of [["controller", answer.available, answer.controller], ["observer", answer.observers, answer.observer], ["estimator", answer.estimators, answer.estimator]]) {
     $(id).replaceChildren(...names.map((name) => new Option(name, name, false, name === chosen)));
@@ -256,8 +277,12 @@ async function loadController() {
   $("law-parameters").replaceChildren(...answer.parameters.map((p) => {
     const range = `${p.low} to ${p.high}`;
     const entry = Object.assign(document.createElement("input"), { type: "number", step: "any", value: p.value, min: p.low, max: p.high, ariaLabel: `${p.name} in ${p.unit}, ${range}` });
-    entry.addEventListener("change", () => call("PUT", `${base()}/controller`, { parameters: { [p.name]: Number(entry.value) } })
-      .then(() => log(`${p.name} = ${entry.value} ${p.unit}`)).catch(() => { entry.value = p.value; }));
+    entry.addEventListener("change", () => { // an emptied field is no zero
+      if (entry.value === "") { entry.value = p.value; return; }
+      const value = Number(entry.value);
+      call("PUT", `${base()}/controller`, { parameters: { [p.name]: value } })
+        .then(() => { p.value = value; log(`${p.name} = ${value}${p.unit === "1" ? "" : ` ${p.unit}`}`); }).catch(() => { entry.value = p.value; });
+    });
     const small = Object.assign(document.createElement("small"), { textContent: range });
     return cells([[p.name, document.createElement("br"), small], entry, p.unit]);
   }));
@@ -308,12 +333,13 @@ $("thruster").addEventListener("change", () => choose($("thruster").value));
 async function choose(id) {
   if (lease) held.set(thruster, lease); // what one commands goes on while one looks at another
   thruster = id; lease = held.get(id) ?? null; taken_ms = performance.now(); held.delete(id);
-  state = null; live.clear();
+  disconnect(); state = null; live.clear(); // nothing that is still under way of the one before is shown, or proposed, as this one's
   limitsOf = null; // nobody's, until the thruster told its own: a signal is not previewed within another's
+  connect();
   const { range } = await call("GET", base());
   if (thruster !== id) return; // another was chosen meanwhile
-  limitsOf = range; showKind(); showFields();
-  connect(); loadHistory().catch(() => {}); await loadController();
+  limitsOf = range; showBounds(); showFields();
+  loadHistory().catch(() => {}); await loadController();
 }
 $("login").addEventListener("submit", (event) => {
   event.preventDefault();

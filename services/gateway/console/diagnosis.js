@@ -50,7 +50,8 @@ setInterval(showDiagnosis, 200);
 
 async function loadDiagnosis() {
   if (!thruster || !state) return;
-  const [list, rig] = [await call("GET", diagnosesOf()), await call("GET", `${base()}/rig`)];
+  const of = thruster, [list, rig] = await Promise.all([call("GET", diagnosesOf()), call("GET", `${base()}/rig`)]);
+  if (thruster !== of) return; // another was chosen meanwhile: these are not its
   const newest = list.at(-1) ?? null;
   found = list.findLast((item) => item.state === "done") ?? newest; // what ended otherwise takes nothing away
   $("back").disabled = rig.before === null || isStale();
@@ -69,6 +70,7 @@ async function loadDiagnosis() {
   $("report").replaceChildren(...(found.state === "done" ? [link, " ", place] : []));
   $("page").hidden = true;
   const report = found.state === "done" ? (await call("GET", `${diagnosesOf()}/${found.id}`)).report : null;
+  if (thruster !== of) return;
   proposed = report?.next_experiment ? found.id : null;
   says("next-text", proposed ? `Next experiment: ${report.next_experiment.excitation}, to part ${report.next_experiment.separates.join(" from ").replaceAll("_", " ")}. ${report.next_experiment.why}` : "");
 }
@@ -139,7 +141,8 @@ function showError() {
 
 // What can be diagnosed: the last minutes, or a recording that is done.
 async function offer() {
-  const list = (await call("GET", "/v1/recordings")).filter((item) => item.thruster === thruster && item.state !== "recording");
+  const of = thruster, list = (await call("GET", "/v1/recordings")).filter((item) => item.thruster === of && item.state !== "recording");
+  if (thruster !== of) return;
   const options = [["60", "last minute"], ["300", "last 5 minutes"], ["600", "last 10 minutes"], ...list.map((item) => [`recording ${item.name}`, item.name])];
   const shown = JSON.stringify(options), select = $("diagnosis-of");
   if (select.dataset.shown === shown || document.activeElement === select) return;
@@ -152,6 +155,6 @@ setTimeout(() => { if (thruster) { offer().catch(() => {}); loadDiagnosis().catc
 $("thruster").addEventListener("change", () => {
   found = null; revised = null; proposed = null; $("page").hidden = true;
   for (const id of ["findings", "diagnosis-of"]) delete $(id).dataset.shown;
-  $("findings").replaceChildren(); $("report").replaceChildren(); says("diagnosis-text", "");
+  $("findings").replaceChildren(); $("report").replaceChildren(); says("diagnosis-text", ""); says("next-text", ""); says("rig-text", "");
   offer().catch(() => {});
 });

@@ -260,27 +260,31 @@ const signalsOf = (unit) => SIGNALS.filter((signal) => signal[1] === unit);
 const charts = [...new Set(SIGNALS.map((signal) => signal[1]))].map((unit) => new Chart(unit));
 // A signal that only the stream tells of: it gets its chart, and its place in the picker.
 const known = new Set(SIGNALS.map(([name]) => name));
-function addSignal(name, unit, label) {
+function addSignal(name, unit, label, side) {
   if (known.has(name)) return;
   known.add(name);
-  SIGNALS.push([name, unit, label, HUES[signalsOf(unit).length % HUES.length], [6, 3], false]);
+  const of = side && SIGNALS.find(([main]) => main === side), hue = of ? of[3] : HUES[signalsOf(unit).length % HUES.length];
+  SIGNALS.push([name, unit, label, hue, of ? [1, 3] : [6, 3], false]);
   const chart = charts.find((one) => one.unit === unit);
   if (chart) { chart.signals = signalsOf(unit); if (chart.plot) chart.build(); } else charts.push(new Chart(unit));
   showPicker();
 }
 // Estimates of an instant, [name, unit, value], as a row of columns: what an observer or an estimator gives depends on the rig and the
-// law; of some it shows one standard error to both sides.
+// law; it shows one standard error to both sides of those that have one.
 const DOUBT = "_std_error", SIDES = { estimated_thrust_n: "estimated_thrust", estimated_flow_m_s: "estimated_flow", estimated_ambient_m_s: "estimated_ambient" };
 function estimatesRow(estimates) {
   const row = {}, doubts = {};
   for (const [name, unit, v] of estimates) {
-    if (name.endsWith(DOUBT)) { doubts[name.slice(0, -DOUBT.length)] = v; continue; }
-    if (name.startsWith("mismatch_")) addSignal(name, LEVEL, name.slice(9)); else addSignal(name, unit, `${name.slice(10).replaceAll("_", " ")}, estimated`);
+    if (name.endsWith(DOUBT)) { doubts[name.slice(0, -DOUBT.length)] = [v, unit]; continue; }
+    const words = name.replace(/^(estimated|mismatch)_/, "").replaceAll("_", " ");
+    if (name.startsWith("mismatch_")) addSignal(name, LEVEL, words); else addSignal(name, unit, name.startsWith("estimated_") ? `${words}, estimated` : words);
     row[name] = v;
   }
-  for (const [name, side] of Object.entries(SIDES)) {
-    if ((doubts[name] ?? null) === null || (row[name] ?? null) === null) continue;
-    row[`${side}_low`] = row[name] - doubts[name]; row[`${side}_high`] = row[name] + doubts[name];
+  for (const [name, [doubt, unit]] of Object.entries(doubts)) {
+    const v = row[name] ?? null, side = SIDES[name] ?? name, words = name.slice(10).replaceAll("_", " ");
+    addSignal(`${side}_low`, unit, `${words} − σ`, name); addSignal(`${side}_high`, unit, `${words} + σ`, name);
+    if (doubt === null || v === null) continue;
+    row[`${side}_low`] = v - doubt; row[`${side}_high`] = v + doubt;
   }
   return row;
 }

@@ -14,7 +14,7 @@ const unitOf = (field) => (field.endsWith("_s") ? "s" : field.endsWith("_hz") ? 
 // First values are for a thruster that gives 60 N or 60 rad/s; one that does not begins with three fifths of its range.
 const scale = () => { const bound = limitsOf?.[$("signal-of").value] ?? 60; return bound < 60 ? 0.6 * bound / 60 : 1; };
 const firstOf = (name, first) => (["N", "rad/s"].includes(unitOf(name)) ? Number((first * scale()).toPrecision(3)) : first);
-let previewPlot = null, previewed = 0, scenarioText = null;
+let previewPlot = null, previewed = 0, scenario = null; // the chosen file: its name and text
 
 function showFields() {
   const kind = $("signal-kind").value, fields = KINDS[kind]?.[1] ?? {};
@@ -30,9 +30,11 @@ function showFields() {
 }
 function asked() {
   const kind = $("signal-kind").value, limit = $("signal-limit").value === "" ? {} : { limit: Number($("signal-limit").value) };
-  if (kind === "file") return scenarioText === null ? null : { toml: scenarioText, ...limit };
+  if (kind === "file") return scenario && { toml: scenario.text, ...limit };
   if (kind === "experiment") return proposed ? { diagnosis: proposed, ...limit } : null;
-  const values = Object.fromEntries(Object.keys(KINDS[kind][1]).map((name) => [name, Number($(`signal-${name}`).value)]));
+  const entries = Object.keys(KINDS[kind][1]).map((name) => [name, $(`signal-${name}`).value]);
+  if (entries.some(([, value]) => value === "")) return null; // an emptied field is no zero
+  const values = Object.fromEntries(entries.map(([name, value]) => [name, Number(value)]));
   return { command: $("signal-of").value, segments: KINDS[kind][2]?.(values) ?? [{ kind, ...values }], ...limit };
 }
 let waiting = null;
@@ -41,12 +43,13 @@ function preview() { $("play").dataset.ready = ""; clearTimeout(waiting); waitin
 async function showPreview() {
   const body = asked(), mine = ++previewed;
   if (!limitsOf) return; // showFields asks again once they are there
-  if (!body || !thruster) { noSignal("quiet", $("signal-kind").value === "file" ? "Choose a scenario file." : "There is no diagnosis that proposes an experiment."); return; }
+  if (!body || !thruster) { noSignal("quiet", { file: "Choose a scenario file.", experiment: "There is no diagnosis that proposes an experiment." }[$("signal-kind").value] ?? "A field is empty: every one needs a number."); return; }
   let would;
   try { would = await call("POST", `${base()}/excitation?dry_run=true`, body, true); } catch (error) { if (mine === previewed) noSignal("warn-text", error.message); return; }
   if (mine !== previewed) return;
   const unit = would.command === "thrust_n" ? "N" : "rad/s";
-  says("signal-text", `${would.name}: ${would.duration_s.toFixed(1)} s, up to ${would.peak.toFixed(1)} ${unit}, limit ${would.limit} ${unit}.${would.left_out.length ? ` The thruster brings its own ${would.left_out.join(", ")}.` : ""}`);
+  const from = $("signal-kind").value === "file" ? `${scenario.name}: ` : "";
+  says("signal-text", `${from}${would.name}: ${would.duration_s.toFixed(1)} s, up to ${would.peak.toFixed(1)} ${unit}, limit ${would.limit} ${unit}.${would.left_out.length ? ` The thruster brings its own ${would.left_out.join(", ")}.` : ""}`);
   $("signal-text").className = "quiet";
   $("play").dataset.ready = "yes";
   const css = getComputedStyle(document.documentElement), color = (name) => css.getPropertyValue(name).trim();
@@ -90,4 +93,9 @@ $("signal-kind").value = "staircase";
 $("signal-kind").addEventListener("change", showFields);
 $("signal-of").addEventListener("change", showFields);
 $("signal-limit").addEventListener("input", preview);
-$("signal-file").addEventListener("change", async () => { scenarioText = (await $("signal-file").files[0]?.text()) ?? null; preview(); });
+$("signal-file").addEventListener("change", async () => {
+  const file = $("signal-file").files[0];
+  if (!file) return;
+  $("signal-file").value = ""; // the same file, changed meanwhile, can be chosen again
+  scenario = { name: file.name, text: await file.text() }; preview();
+});

@@ -27,20 +27,25 @@ pub fn check(settings: &Settings) -> Result<(), GatewayError> {
     }
     drop(listener);
     ours(settings)?;
-    type Refused = fn(PathBuf, io::Error) -> GatewayError;
-    let folders: [(&PathBuf, Refused); 5] = [
-        (&settings.recordings, |folder, error| GatewayError::Recordings { folder, error }),
-        (&settings.events, |folder, error| GatewayError::Events { folder, error }),
-        (&settings.rigs, |folder, error| GatewayError::Rigs { folder, error }),
-        (&settings.diagnoses, |folder, error| GatewayError::Diagnoses { folder, error }),
-        (&settings.calibrations, |folder, error| GatewayError::Calibrations { folder, error }),
-    ];
-    for (folder, refused) in folders {
+    for (folder, refused) in folders(settings) {
         can_write(folder).map_err(|error| refused(folder.clone(), error))?;
     }
     tokens(settings)?;
     certificate(settings)?;
     Ok(())
+}
+
+type Refused = fn(PathBuf, io::Error) -> GatewayError;
+
+/// Where the gateway writes, and how it says that it cannot.
+fn folders(settings: &Settings) -> [(&PathBuf, Refused); 5] {
+    [
+        (&settings.recordings, |folder, error| GatewayError::Recordings { folder, error }),
+        (&settings.events, |folder, error| GatewayError::Events { folder, error }),
+        (&settings.rigs, |folder, error| GatewayError::Rigs { folder, error }),
+        (&settings.diagnoses, |folder, error| GatewayError::Diagnoses { folder, error }),
+        (&settings.calibrations, |folder, error| GatewayError::Calibrations { folder, error }),
+    ]
 }
 
 /// Is what the gateway believes, and where it writes what is believed later, in nobody else's hands? Asked before any of it
@@ -50,7 +55,14 @@ pub fn check(settings: &Settings) -> Result<(), GatewayError> {
 /// [`GatewayError::Foreign`] names the first that is not.
 pub(crate) fn ours(settings: &Settings) -> Result<(), GatewayError> {
     let key = settings.tls.as_ref().map(|keys| ("tls.key", &keys.key));
-    let believed = [("tokens", &settings.tokens), ("events", &settings.events), ("rigs", &settings.rigs)];
+    let believed = [
+        ("tokens", &settings.tokens),
+        ("events", &settings.events),
+        ("rigs", &settings.rigs),
+        ("recordings", &settings.recordings),
+        ("diagnoses", &settings.diagnoses),
+        ("calibrations", &settings.calibrations),
+    ];
     for (key, path) in believed.into_iter().chain(key) {
         in_our_hands(path).map_err(|Foreign { path, why }| GatewayError::Foreign { key, path, why })?;
     }
@@ -81,6 +93,12 @@ pub fn check_config(config: &Config) -> Vec<GatewayError> {
         Err(error) => wrong.push(error.into()),
         Ok(settings) => {
             wrong.extend(settings.wrong().into_iter().map(|words| config.error(words).into()));
+            // Nothing is made here; what stands in the place of a folder is no folder later either.
+            let taken =
+                folders(&settings).into_iter().filter(|(folder, _)| folder.exists() && !folder.is_dir());
+            wrong.extend(
+                taken.map(|(folder, refused)| refused(folder.clone(), io::ErrorKind::NotADirectory.into())),
+            );
             wrong.extend(tokens(&settings).err());
             let keys = settings.tls.as_ref().filter(|keys| !keys.self_signed);
             wrong.extend(keys.and_then(|keys| Certificate::open(keys, Vec::new()).err()).map(Into::into));

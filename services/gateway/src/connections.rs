@@ -45,23 +45,38 @@ pub struct Slot {
     pub peer: IpAddr,
     /// Only stop and disarm are answered here.
     pub reserved: bool,
-    /// Milliseconds since the table began at which it fell idle; zero while a request is worked on.
+    /// Milliseconds since the table began at which it fell idle; zero while a request is worked on, [`ENDED`] once it made
+    /// room for another.
     idle_since_ms: AtomicU64,
     began: Instant,
     /// Told to end and make room.
     pub evicted: Notify,
 }
 
+/// Of a connection that has no place any more.
+const ENDED: u64 = u64::MAX;
+
 impl Slot {
-    /// A request is being worked on.
-    pub fn busy(&self) {
-        self.idle_since_ms.store(0, Ordering::Relaxed);
+    /// A request is being worked on; false if this connection has no place any more, and nothing may begin on it.
+    pub fn busy(&self) -> bool {
+        self.turn(0)
     }
 
-    /// It waits for the peer.
-    pub fn idle(&self) {
-        let now_ms = self.began.elapsed().as_millis() as u64;
-        self.idle_since_ms.store(now_ms.max(1), Ordering::Relaxed);
+    /// It waits for the peer; false as [`Self::busy`].
+    pub fn idle(&self) -> bool {
+        self.turn((self.began.elapsed().as_millis() as u64).max(1))
+    }
+
+    fn turn(&self, idle_since_ms: u64) -> bool {
+        let stands = |now: u64| (now != ENDED).then_some(idle_since_ms);
+        self.idle_since_ms.fetch_update(Ordering::Relaxed, Ordering::Relaxed, stands).is_ok()
+    }
+
+    /// Takes its place away, if it still has been idle since then.
+    fn end(&self, idle_since_ms: u64) -> bool {
+        let ended =
+            self.idle_since_ms.compare_exchange(idle_since_ms, ENDED, Ordering::Relaxed, Ordering::Relaxed);
+        ended.inspect(|_| self.evicted.notify_one()).is_ok()
     }
 }
 
@@ -96,26 +111,33 @@ impl Connections {
         let theirs = |slot: &Slot| subnet(slot.peer) == subnet(peer);
         let of_peer = of_all.iter().filter(|slot| theirs(slot)).count();
         let full = of_peer >= self.caps.per_peer || of_all.len() >= self.caps.total;
-        let idlest = |of: &[&Arc<Slot>]| {
+        // Ends the one that has been idle longest; one that falls to work just then keeps its place.
+        let make_room = |of: &[&Arc<Slot>]| loop {
             let candidates = of.iter().filter(|slot| of_peer < self.caps.per_peer || theirs(slot));
-            let waiting = candidates.map(|slot| (slot.idle_since_ms.load(Ordering::Relaxed), slot.number));
-            waiting.filter(|(since_ms, _)| *since_ms > 0).min().map(|(_, number)| number)
+            let since = candidates.map(|slot| (slot.idle_since_ms.load(Ordering::Relaxed), *slot));
+            let waiting = since.filter(|(since_ms, _)| !matches!(*since_ms, 0 | ENDED));
+            match waiting.min_by_key(|(since_ms, slot)| (*since_ms, slot.number)) {
+                Some((since_ms, idle)) if idle.end(since_ms) => break Some(idle.number),
+                Some(_) => {}
+                None => break None,
+            }
         };
-        let (reserved, in_place_of) = match (full, idlest(&of_all)) {
-            (false, _) => (false, None),
-            (true, Some(idle)) => (false, Some(idle)),
+        let (reserved, in_place_of) = if full { (false, make_room(&of_all)) } else { (false, None) };
+        let (reserved, in_place_of) = match in_place_of {
+            None if !full => (reserved, None),
+            Some(ended) => (reserved, Some(ended)),
             // All are at work: what comes now may only stop, in place of another of that kind too.
-            (true, None) if kept_back.len() < self.caps.reserve => (true, None),
-            (true, None) => match idlest(&kept_back) {
-                Some(idle) => (true, Some(idle)),
+            None if kept_back.len() < self.caps.reserve => (true, None),
+            None => match make_room(&kept_back) {
+                Some(ended) => (true, Some(ended)),
                 None => {
                     self.refused.fetch_add(1, Ordering::Relaxed);
                     return None;
                 }
             },
         };
-        if let Some(at) = in_place_of.and_then(|number| open.iter().position(|slot| slot.number == number)) {
-            open.swap_remove(at).evicted.notify_one();
+        if let Some(number) = in_place_of {
+            open.retain(|slot| slot.number != number);
             self.evicted.fetch_add(1, Ordering::Relaxed);
         }
         let slot = Arc::new(Slot {

@@ -147,7 +147,10 @@ fn keep(log: &EventLog, mut mark: Mark, inbox: &Receiver<Event>, events: &Events
     loop {
         let event = match inbox.recv_timeout(LOOK_EVERY) {
             Ok(event) => Some(event),
-            Err(RecvTimeoutError::Timeout) => None,
+            Err(RecvTimeoutError::Timeout) => {
+                let _ = log.retry();
+                None
+            }
             Err(RecvTimeoutError::Disconnected) => return,
         };
         if let Some(event) = event {

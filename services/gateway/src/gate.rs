@@ -141,7 +141,13 @@ pub fn is_open(path: &str) -> bool {
 
 /// Does this bring a thruster to zero?
 fn stops(path: &str) -> bool {
-    path == "/v1/stop" || path.ends_with("/disarm")
+    path == "/v1/stop" || of_thruster(path) == Some("disarm")
+}
+
+/// What of a thruster a path means; a recording may be called as it likes.
+fn of_thruster(path: &str) -> Option<&str> {
+    let (_, what) = path.strip_prefix("/v1/thrusters/")?.split_once('/')?;
+    Some(what)
 }
 
 /// The least role that may do this; none where anybody may.
@@ -150,7 +156,7 @@ fn needed(method: &Method, path: &str) -> Option<Role> {
         _ if is_open(path) => None,
         Method::GET | Method::HEAD | Method::OPTIONS => Some(Role::Viewer),
         // A rig description is configuration.
-        _ if path.ends_with("/rig") || path.ends_with("/rig/rollback") => Some(Role::Admin),
+        _ if matches!(of_thruster(path), Some("rig" | "rig/rollback")) => Some(Role::Admin),
         _ => Some(Role::Pilot),
     }
 }
@@ -202,6 +208,8 @@ mod tests {
         assert_eq!(needed(&Method::POST, "/v1/thrusters/t1/rig"), Some(Role::Admin));
         assert_eq!(needed(&Method::POST, "/v1/thrusters/t1/rig/rollback"), Some(Role::Admin));
         assert_eq!(needed(&Method::GET, "/v1/thrusters/t1/rig"), Some(Role::Viewer));
+        assert_eq!(needed(&Method::DELETE, "/v1/recordings/rig"), Some(Role::Pilot));
+        assert!(stops("/v1/thrusters/t1/disarm") && !stops("/v1/recordings/disarm"));
         assert_eq!(needed(&Method::GET, "/metrics"), Some(Role::Viewer));
         assert_eq!(needed(&Method::GET, "/v1/events"), Some(Role::Viewer));
         assert_eq!(needed(&Method::GET, "/"), None);

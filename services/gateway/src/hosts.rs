@@ -41,8 +41,10 @@ impl Hosts {
                 )
                 .allowed(self.0.iter().cloned()));
         };
-        let Some(origin) = headers.get(header::ORIGIN) else { return Ok(()) };
-        let origin = origin.to_str().unwrap_or("unreadable");
+        let mut origins = headers.get_all(header::ORIGIN).iter();
+        let Some(origin) = origins.next() else { return Ok(()) };
+        let origin =
+            if origins.next().is_some() { "two names" } else { origin.to_str().unwrap_or("unreadable") };
         let own = origin
             .strip_prefix("http://")
             .or_else(|| origin.strip_prefix("https://"))

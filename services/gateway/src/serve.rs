@@ -112,6 +112,8 @@ fn seat(socket: TcpStream, peer: IpAddr, port: &Port) {
     let acceptor = port.certificate.as_ref().map(|certificate| TlsAcceptor::from(certificate.config()));
     tokio::spawn(async move {
         tokio::select! {
+            // Who has no place any more gets no answer first.
+            biased;
             () = slot.evicted.notified() => (),
             () = async {
                 match acceptor {
@@ -136,13 +138,16 @@ where
     let service = hyper::service::service_fn(move |request: hyper::Request<Incoming>| {
         // A request is at work once it is here as a whole: until then it waits for its peer like any other, and makes
         // room where there is none.
-        if http_body::Body::is_end_stream(request.body()) {
-            theirs.busy()
-        } else {
-            theirs.idle()
-        }
+        let placed =
+            if http_body::Body::is_end_stream(request.body()) { theirs.busy() } else { theirs.idle() };
         let (router, slot) = (router.clone(), Arc::clone(&theirs));
         async move {
+            if !placed {
+                // It ends with the next look of its task: no stream begins on it that nobody counts.
+                let mut gone = hyper::Response::new(Answer { body: Body::empty(), idle_after: None });
+                *gone.status_mut() = hyper::StatusCode::SERVICE_UNAVAILABLE;
+                return Ok(gone);
+            }
             let arriving = Arc::clone(&slot);
             let mut request = request.map(|body| Body::new(Arriving { body, slot: arriving }));
             request.extensions_mut().insert(Peer(slot.peer));

@@ -36,6 +36,14 @@ pub enum UpError {
         /// The child.
         name: String,
     },
+    /// A servo ended armed, and nobody switched its drive off.
+    #[error(
+        "{thrusters}: the servo ended while armed, without switching the drive off\nhint: only the drive's own time-out stops it: look at the shaft, cut the supply if it turns"
+    )]
+    NotStopped {
+        /// The thrusters.
+        thrusters: String,
+    },
     /// A child does not start.
     #[error("{name} does not start\nhint: its reason stands above; `kort {name}` alone shows it again")]
     DoesNotStart {

@@ -180,21 +180,24 @@ impl Role {
         Some(Ended { why: status.to_string() })
     }
 
-    /// Ends it: asks, and kills what does not answer.
-    pub fn end(&mut self) {
-        let Some(mut child) = self.child.take() else { return };
+    /// Ends it: asks, and kills what does not answer. Whether it ended by itself, in order.
+    pub fn end(&mut self) -> bool {
+        let Some(mut child) = self.child.take() else { return true };
         if let Some(pid) = i32::try_from(child.id()).ok().and_then(Pid::from_raw) {
             let _ = kill_process(pid, Signal::TERM);
         }
         let end = Instant::now() + STOP_WITHIN;
         while Instant::now() < end {
-            if !matches!(child.try_wait(), Ok(None)) {
-                return;
+            match child.try_wait() {
+                Ok(None) => {}
+                Ok(Some(status)) => return status.success(),
+                Err(_) => return false,
             }
             std::thread::sleep(Duration::from_millis(5));
         }
         warn!(thruster = self.thruster, "{} does not end, killed", self.name);
         let _ = child.kill();
         let _ = child.wait();
+        false
     }
 }

@@ -159,6 +159,15 @@ impl Input {
             let named = |text: &String| format!("{}: {text}", recording.name);
             out.lossy |= !recording.losses.is_empty();
             out.notes.extend(recording.losses.iter().chain(&recording.notes).map(named));
+            if self.rig.is_none()
+                && let Some(since_s) = recording.about.get("rig_since_s.2")
+            {
+                let words = named(&format!(
+                    "another rig description was in force from {since_s} s on; the first one that the file holds is taken, --rig says otherwise"
+                ));
+                eprintln!("warning: {words}");
+                out.notes.push(words);
+            }
             if !recording.unused.is_empty() {
                 out.notes.push(named(&format!(
                     "columns that the column map leaves out: {}",

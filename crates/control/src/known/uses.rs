@@ -281,7 +281,7 @@ fn why(rig: &Rig) -> &'static str {
     if descriptor.nonparametric {
         "it changes freely with time and has no lasting sizes: a rig cannot state it; what it does is left to the observer's ambient flow and unexplained load"
     } else if effect.states() > 0 && !effect.slow() {
-        "its own states are too fast to be followed from what is measured: what it does to the shaft is left to the observer's unexplained load, what it does to the water to its ambient flow"
+        "it has states of its own that no observer carries: what it does to the shaft is left to the observer's unexplained load, what it does to the water to its ambient flow"
     } else if hooks.foil {
         "it depends on depth or on the speed itself, which a table over the angle of attack does not hold: what it does is left to the observer's unexplained load and ambient flow, and to the force sensor"
     } else if hooks == kort_thruster::effects::Hooks::NONE && descriptor.path == Path::Flow {

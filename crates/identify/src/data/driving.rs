@@ -54,6 +54,24 @@ pub(super) fn choose_driving(series: &Series, rig: &Rig, speed_driven: bool) -> 
     })
 }
 
+/// A command that is recorded for a drive of another kind than the rig's, and the rig's kind, where the log has none of its
+/// own.
+pub(super) fn other_drive(series: &Series, rig: &Rig) -> Option<(&'static str, &'static str)> {
+    let all = [
+        (AmplifierKind::Current, "current", &["current_cmd_a"][..]),
+        (AmplifierKind::Voltage, "voltage", &["voltage_cmd_v", "duty_cmd"]),
+        (AmplifierKind::Speed, "speed", &["speed_cmd_rad_s"]),
+    ];
+    let recorded = |columns: &[&'static str]| columns.iter().copied().find(|c| series.column(c).is_some());
+    let (_, kind, own) = all.iter().find(|(kind, ..)| *kind == rig.amplifier.kind)?;
+    let others = all.iter().filter(|(kind, ..)| *kind != rig.amplifier.kind);
+    if recorded(own).is_some() {
+        None
+    } else {
+        Some((others.filter_map(|(.., c)| recorded(c)).next()?, *kind))
+    }
+}
+
 /// Whether samples hold nothing from one to the next: the mean square of their differences is twice their variance, to
 /// three standard deviations of white noise (von Neumann 1941, Annals of Mathematical Statistics 12:367).
 fn is_noise(column: &[f64]) -> bool {

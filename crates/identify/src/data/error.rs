@@ -11,6 +11,18 @@ pub enum DataError {
         /// The recording.
         recording: String,
     },
+    /// A drive of another kind is commanded than the rig has.
+    #[error(
+        "{recording}: {column} is commanded, which a drive of amplifier.kind = \"{kind}\" does not take\nhint: a rig whose drive takes {column} says so in amplifier.kind (shipped with \"speed\": speed-drive)"
+    )]
+    OtherDrive {
+        /// The recording.
+        recording: String,
+        /// The command that is recorded.
+        column: &'static str,
+        /// The drive that the rig states.
+        kind: &'static str,
+    },
     /// Nothing to compare with.
     #[error(
         "{recording}: driven by {driving}, but no measured response beside it: {found}\nhint: record shaft_speed_rad_s, thrust_n, torque_n_m or flow_m_s as well; a log of commands alone can be replayed (kort simulate, a segment of kind \"replay\"), not diagnosed"

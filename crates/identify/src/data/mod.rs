@@ -246,6 +246,9 @@ impl Prepared {
             .filter_map(|r| Channel::new(series, r))
             .collect();
         if !channels.iter().any(|c| c.response != Response::Current) {
+            if let Some((column, kind)) = driving::other_drive(series, rig) {
+                return Err(DataError::OtherDrive { recording, column, kind });
+            }
             let found = instead(series, rig, driving.column());
             return Err(DataError::NoResponse { recording, driving: driving.column(), found });
         }

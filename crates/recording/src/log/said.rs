@@ -94,9 +94,10 @@ fn shifted(topic: &Topic, rows: &Topic, stretch: usize) -> Option<String> {
     ))
 }
 
-/// Other instances of what the map takes, as a second speed controller beside the first.
+/// Other instances of what the map takes, as a second speed controller beside the first, or the same frame on another bus.
 fn kin(log: &Log, used: &[usize]) -> Option<String> {
-    let base = |name: &'_ str| name.split('[').next().unwrap_or_default().to_string();
+    let of_bus = |name: &str| name.rsplit(':').next().unwrap_or_default().to_owned();
+    let base = |name: &str| of_bus(name).split('[').next().unwrap_or_default().to_owned();
     let mine: Vec<String> = used.iter().map(|place| base(&log.topics[*place].name)).collect();
     let others: Vec<String> = left(log, used)
         .filter(|topic| mine.contains(&base(&topic.name)))

@@ -11,6 +11,8 @@ use crate::view::{Setpoint, SetpointRange};
 pub const LONGEST_S: f64 = 3600.0;
 /// Shortest time between two changes of a random signal, s: the controllers are no faster.
 const SHORTEST_S: f64 = 0.005;
+/// Fastest sine, Hz: of one whose half waves are shorter than that nothing is left but a line.
+const FASTEST_HZ: f64 = 0.5 / SHORTEST_S;
 /// Most sines of a multisine.
 const TONES_MAX: u32 = 200;
 /// Instants that the largest value is looked for at.
@@ -200,6 +202,7 @@ fn modest(at: usize, segment: &Segment) -> Result<(), Problem> {
         )
         .hint("correct the value"))
     };
+    let too_fast = |key: &str, hz: f64| refused(key, hz.to_string(), format!("at most {FASTEST_HZ}"));
     match segment {
         Segment::Prbs { each_s: s, .. } | Segment::RandomLevels { shortest_s: s, .. } if *s < SHORTEST_S => {
             let key = if matches!(segment, Segment::Prbs { .. }) { "each_s" } else { "shortest_s" };
@@ -211,6 +214,12 @@ fn modest(at: usize, segment: &Segment) -> Result<(), Problem> {
             if *s > LONGEST_S =>
         {
             refused("duration_s", s.to_string(), format!("at most {LONGEST_S}"))
+        }
+        Segment::Sine { frequency_hz: hz, .. } if *hz > FASTEST_HZ => too_fast("frequency_hz", *hz),
+        Segment::Chirp { to_hz, from_hz, .. } | Segment::Multisine { to_hz, from_hz, .. }
+            if to_hz.max(*from_hz) > FASTEST_HZ =>
+        {
+            too_fast(if to_hz > from_hz { "to_hz" } else { "from_hz" }, to_hz.max(*from_hz))
         }
         Segment::Multisine { tones, .. } if *tones > TONES_MAX => {
             refused("tones", tones.to_string(), format!("at most {TONES_MAX}"))

@@ -78,6 +78,10 @@ pub struct Job {
     thin: Thin,
     state_s: f64,
     law_s: f64,
+    /// The law and its parameters that were written last.
+    law: Vec<u8>,
+    /// The revision of the rig description that the file was told last, and how many it was told.
+    revision: (String, u32),
 }
 
 /// Why a recording ends by itself.
@@ -110,6 +114,7 @@ impl Job {
             End::Disk(error) => error,
         })?;
         let file = create(folder, &now, &subject, began)?;
+        let revision = (subject.rig.in_force().2.revision, 1);
         Ok(Job {
             folder: folder.to_owned(),
             subject,
@@ -128,6 +133,8 @@ impl Job {
             thin: Thin::new(now.rate_hz),
             state_s: f64::NEG_INFINITY,
             law_s: f64::NEG_INFINITY,
+            law: Vec::new(),
+            revision,
         })
     }
 
@@ -174,6 +181,7 @@ impl Job {
             }
             if flushed.elapsed() >= FLUSH_EVERY {
                 flushed = Instant::now();
+                self.note_revision()?;
                 self.file.flush()?;
                 // Not under the lock: a slow disk must not hold up the bus, which counts losses in it.
                 let info = {
@@ -219,14 +227,40 @@ impl Job {
         if time_s - self.state_s >= STATE_EVERY_S {
             self.state_s = time_s;
             self.file.state(time_s, &self.subject.thruster.state_json())?;
-        }
-        if time_s - self.law_s >= LAW_EVERY_S
-            && let Ok(law) = self.subject.thruster.controller()
-        {
-            self.law_s = time_s;
-            self.file.state(time_s, &serde_json::to_vec(&law).unwrap_or_default())?;
+            self.law(time_s)?;
         }
         Ok(())
+    }
+
+    /// The law and its parameters, now and again and whenever they change.
+    fn law(&mut self, time_s: f64) -> io::Result<()> {
+        let Ok(law) = self.subject.thruster.controller() else { return Ok(()) };
+        let law = serde_json::to_vec(&law).unwrap_or_default();
+        if time_s - self.law_s >= LAW_EVERY_S || law != self.law {
+            self.law_s = time_s;
+            self.file.state(time_s, &law)?;
+            self.law = law;
+        }
+        Ok(())
+    }
+
+    /// A rig description that comes while the file grows is told to it, with the time from which it is in force.
+    fn note_revision(&mut self) -> io::Result<()> {
+        let (rig_file, rig, revision) = self.subject.rig.in_force();
+        let (told, count) = &mut self.revision;
+        if *told == revision.revision {
+            return Ok(());
+        }
+        told.clone_from(&revision.revision);
+        *count += 1;
+        let told = [
+            ("rig", rig.to_string()),
+            ("rig_file", rig_file),
+            ("rig_revision", revision.revision),
+            ("rig_number", revision.number.to_string()),
+            ("rig_since_s", format!("{:.3}", self.given.1)),
+        ];
+        self.file.about(told.map(|(name, value)| (format!("{name}.{count}"), value)).into_iter().collect())
     }
 
     fn event(&mut self, at_ns: u64, json: &[u8]) -> io::Result<()> {
@@ -271,6 +305,7 @@ impl Job {
         self.past_s += self.given.1;
         (self.first_ns, self.given) = (None, (0, 0.0));
         (self.state_s, self.law_s) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
+        self.revision = (self.subject.rig.in_force().2.revision, 1);
         Ok(())
     }
 }

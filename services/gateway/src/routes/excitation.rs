@@ -37,7 +37,7 @@ pub struct ExcitationRequest {
     #[serde(default)]
     #[schema(value_type = Option<Vec<Object>>)]
     segments: Option<Vec<Segment>>,
-    /// A whole scenario file, TOML, by thrust, shaft speed or shares; shares are shares of `limit`.
+    /// A whole scenario file, TOML or JSON, by thrust, shaft speed or shares; shares are shares of `limit`.
     #[serde(default)]
     toml: Option<String>,
     /// Name of a diagnosis: the next experiment that it proposes is played and recorded, and the recording diagnosed
@@ -195,8 +195,10 @@ fn wanted(app: &App, id: &str, request: ExcitationRequest) -> Result<Wanted, Pro
             from_scenario(scenario, Some(commanded), limit)
         }
         (None, Some(text), None) => {
-            let scenario = Scenario::from_toml(&text).map_err(|error| {
-                Problem::new(Kind::InvalidField, format!("toml: {error}"))
+            let scenario = Scenario::from_text(&text).map_err(|error| {
+                let words = error.to_string();
+                let detail = words.split("\nhint: ").next().unwrap_or(&words);
+                Problem::new(Kind::InvalidField, format!("toml: {detail}"))
                     .hint("`kort simulate` runs the same files; docs/recordings.md lists their keys")
             })?;
             from_scenario(scenario, command, limit)

@@ -105,7 +105,9 @@ impl Thruster {
         let mut changed: Vec<String> =
             parts.into_iter().filter_map(|(part, name)| Some(format!("{part} = {}", name?))).collect();
         changed.extend(wanted.parameters.iter().map(|(name, value)| format!("{name} = {value}")));
-        self.did(who, lease, EventKind::ControllerChanged, &format!("set {}", changed.join(", ")));
+        if !changed.is_empty() {
+            self.did(who, lease, EventKind::ControllerChanged, &format!("set {}", changed.join(", ")));
+        }
         Ok(())
     }
 }

@@ -69,7 +69,8 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         })?;
         write_text(path, map)?;
     }
-    Ok(Outcome::with_loss(!found.losses.is_empty()))
+    // Of several stretches the longest is read: what is outside is lost.
+    Ok(Outcome::with_loss(!found.losses.is_empty() || found.resets > 0))
 }
 
 fn text(found: &Survey, all: bool) -> String {

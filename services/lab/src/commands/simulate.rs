@@ -103,7 +103,7 @@ pub fn recording(
     noise: Option<f64>,
 ) -> Result<Recording, Failure> {
     let rig = files::read_rig(rig)?;
-    let mut wanted = scenario_of(scenario, text)?;
+    let mut wanted = Scenario::from_text(text).map_err(|e| Failure::in_file(scenario, e))?;
     wanted.seed = seed.unwrap_or(wanted.seed);
     wanted.noise = noise.unwrap_or(wanted.noise);
     let mut files = Files { beside: scenario.parent().map(Path::to_path_buf), lost: false };
@@ -148,27 +148,7 @@ fn write(run: &mut Run, format: Format, path: &Path) -> Result<f64, Failure> {
 
 /// A scenario in TOML or JSON, or the next experiment of a diagnosis report.
 fn read_scenario(wanted: &Path) -> Result<Scenario, Failure> {
-    scenario_of(wanted, &files::scenario_text(wanted)?)
-}
-
-/// The scenario that a text holds; `wanted` stands in errors.
-fn scenario_of(wanted: &Path, text: &str) -> Result<Scenario, Failure> {
-    let fail = |e: &dyn std::fmt::Display| Failure::in_file(wanted, e);
-    if !text.trim_start().starts_with('{') {
-        return Scenario::from_toml(text).map_err(|e| fail(&e));
-    }
-    let mut json: serde_json::Value = serde_json::from_str(text).map_err(|e| fail(&e))?;
-    if let Some(next) = json.get_mut("next_experiment") {
-        json = next.get_mut("scenario").map(serde_json::Value::take).ok_or_else(|| {
-            fail(&"`next_experiment` is null: this report asks for no further run\nhint: choose a scenario yourself")
-        })?;
-    }
-    serde_json::from_value(json.clone()).map_err(|e| {
-        let tree = toml::Value::try_from(json).ok();
-        let said =
-            tree.as_ref().and_then(kort_scenario::complaint::<Scenario>).unwrap_or_else(|| e.to_string());
-        fail(&format!("{said}\nhint: docs/recordings.md lists the keys of a scenario"))
-    })
+    Scenario::from_text(&files::scenario_text(wanted)?).map_err(|e| Failure::in_file(wanted, e))
 }
 
 /// Replays from files and built-in recordings.

@@ -63,14 +63,18 @@ pub fn rehearsal(rehearsal: &Rehearsal) -> String {
                 .collect();
             let mut sizes: Vec<f64> = all.iter().map(|q| (q.value - q.truth).abs() / q.tolerance).collect();
             sizes.sort_by(f64::total_cmp);
-            let mut relative: Vec<f64> = all.iter().map(|q| 100.0 * (q.tolerance / q.truth).abs()).collect();
+            // Of nothing there is no share.
+            let sized = all.iter().filter(|q| q.truth != 0.0);
+            let mut relative: Vec<f64> = sized.map(|q| 100.0 * (q.tolerance / q.truth).abs()).collect();
             relative.sort_by(f64::total_cmp);
             vec![
                 name.to_owned(),
                 format!("{} of {}", all.iter().filter(|q| q.inside).count(), all.len()),
                 number(sizes[sizes.len() / 2]),
                 number(sizes[sizes.len() - 1]),
-                format!("{} %", number(relative[relative.len() / 2])),
+                relative
+                    .get(relative.len() / 2)
+                    .map_or("–".into(), |share| format!("{} %", number(*share))),
             ]
         })
         .collect();
