@@ -41,35 +41,37 @@ impl RestReading {
     }
 }
 
-/// How a sensor answers pulses, as if all were ahead.
+/// How a sensor answers pulses, as if all were ahead: readings, each by what it weighs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Answer {
-    /// Readings.
-    pub count: u32,
-    /// Their sum above the zero, in the signal's unit.
+    /// Sum of the readings above the zero, in the signal's unit times the weight's.
     pub sum: f64,
+    /// Sum of the weights.
+    pub weights: f64,
+    /// Sum of their squares.
+    pub squares: f64,
 }
 
 impl Answer {
-    /// Takes a reading above its zero, under a drive of this sign.
-    pub fn take(&mut self, above_zero: f64, side: f64) {
-        if above_zero.is_finite() {
-            self.count += 1;
-            self.sum += above_zero * side;
+    /// Takes a reading above its zero; the weight has the sign of what should push.
+    pub fn take(&mut self, above_zero: f64, weight: f64) {
+        if above_zero.is_finite() && weight.is_finite() {
+            self.sum += above_zero * weight;
+            self.weights += weight;
+            self.squares += weight * weight;
         }
     }
 
-    /// Mean answer over its standard error, given how the sensor reads at rest; zero without readings.
+    /// The answer over its standard error, given how the sensor reads at rest; zero without readings of any weight.
     pub fn significance(&self, rest: &RestReading) -> f64 {
-        if self.count == 0 || rest.count < 2 {
+        if self.squares <= 0.0 || rest.count < 2 {
             return 0.0;
         }
-        let n = f64::from(self.count);
         let memory = rest.memory.max(1.0);
         // The zero has an error of its own, and a converter's step is no smaller than its digit.
         let one = rest.sigma.max(0.3 * rest.step).max(1e-12);
-        let error = one * (memory / n + memory / f64::from(rest.count)).sqrt();
-        self.sum / n / error
+        let error = one * (memory * (self.squares + self.weights.powi(2) / f64::from(rest.count))).sqrt();
+        self.sum / error
     }
 }
 
@@ -108,6 +110,8 @@ pub struct Facts {
     pub side: f64,
     /// How thrust, flow and blade torque answer pulses ahead, of first and further ones.
     pub answers: [Answer; 3],
+    /// What pushed the water lately, as speed squared with its sign, (rad/s)^2, and when that was, s.
+    pub pushed: (f64, f64),
     /// Breakaway ahead and astern, where it was looked for.
     pub breakaway: [Option<Breakaway>; 2],
     /// Levels of the working range.

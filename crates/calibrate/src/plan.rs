@@ -20,6 +20,8 @@ pub struct Plan {
     pub inertia_kg_m2: f64,
     /// Stated torque at standstill over the drive, N m per unit; NaN for a drive with a speed loop of its own.
     pub torque_per_drive: f64,
+    /// Stated time constant with which the drive follows its command, s.
+    pub lag_s: f64,
     /// Torque constant, N m/A.
     pub torque_constant_nm_a: f64,
     /// Least change of the shaft angle that is motion and not the encoder's last digit, rad.
@@ -50,6 +52,7 @@ impl Plan {
             period_s,
             inertia_kg_m2: p.get(Parameter::InertiaKgM2),
             torque_per_drive,
+            lag_s: p.get(Parameter::TimeConstantS),
             torque_constant_nm_a: kt,
             angle_step_rad: rig
                 .sensors
@@ -67,6 +70,29 @@ impl Plan {
             _ => (angle_rad * self.inertia_kg_m2 / (self.torque_per_drive * drive)).sqrt(),
         };
         lasts.clamp(2.0 * self.period_s, 0.5)
+    }
+
+    /// As [`Self::pulse_s`], for a pulse whose opposite follows at once and lasts this share of it: a speed loop with a
+    /// lag hardly follows a short pulse, and an opposite as long would bring the shaft back to where it was, slowly. Its
+    /// way is the drive times the difference of the two, whatever the lag.
+    pub fn pulse_at_once_s(&self, drive: f64, angle_rad: f64) -> f64 {
+        match self.kind {
+            AmplifierKind::Speed => {
+                // From t^2/(t + lag), within 3 % of the way until it stands.
+                let free_s = angle_rad / drive.abs();
+                let lasts = 0.5 * (free_s + (free_s * (free_s + 4.0 * self.lag_s)).sqrt());
+                lasts.clamp(2.0 * self.period_s, 0.5)
+            }
+            _ => self.pulse_s(drive, angle_rad),
+        }
+    }
+
+    /// That share, above 0 to 1, after which a shaft stands.
+    pub fn opposite(&self, lasts_s: f64) -> f64 {
+        match self.kind {
+            AmplifierKind::Speed => self.lag_s / (lasts_s + self.lag_s),
+            _ => 1.0,
+        }
     }
 
     /// Drive that takes a shaft speed away within about 0.15 s, for a shaft that turns as it is commanded

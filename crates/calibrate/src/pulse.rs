@@ -34,6 +34,8 @@ pub enum Course {
 pub struct Pulse {
     drive: f64,
     lasts_s: f64,
+    /// The second half's share of the first's length.
+    opposite: f64,
     began: Option<(f64, f64)>,
     furthest_rad: f64,
     pause_s: f64,
@@ -51,6 +53,7 @@ impl Pulse {
         Self {
             drive,
             lasts_s: plan.pulse_s(drive, angle_rad),
+            opposite: 1.0,
             began: None,
             furthest_rad: 0.0,
             pause_s,
@@ -59,6 +62,11 @@ impl Pulse {
             ended_s: None,
             turned_s: None,
         }
+    }
+
+    /// A pulse without a pause whose first half lasts this long, or until the shaft has gone half this angle.
+    pub fn lasting(plan: &Plan, lasts_s: f64, drive: f64, angle_rad: f64) -> Self {
+        Self { lasts_s, opposite: plan.opposite(lasts_s), ..Self::new(plan, drive, angle_rad, 0.0) }
     }
 
     /// Its drive.
@@ -85,10 +93,10 @@ impl Pulse {
             self.by_first_rad = moved_rad;
         }
         let Some(turned_s) = self.turned_s else { return under(0.0) };
-        // As long the other way, or until it stands.
+        // Its share the other way, or until it stands.
         let side = (self.furthest_rad * self.drive).signum();
         let ahead = seen.speed_rad_s * side * self.drive.signum();
-        let ends_s = turned_s + ended_s;
+        let ends_s = turned_s + self.opposite * ended_s;
         if since_s < ends_s && !(moves && ahead <= 0.0) {
             return under(-self.drive);
         }

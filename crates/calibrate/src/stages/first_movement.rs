@@ -72,6 +72,9 @@ impl Stage for FirstMovement {
                 }
                 facts.first_drive = first.abs();
                 facts.side = (before_rad * first).signum();
+                // From here on readings weigh by speed, which is another unit, and these had hardly any.
+                facts.answers = Default::default();
+                facts.pushed = (0.0, seen.time_s);
                 Ok(Step::Done)
             }
             // It moved one way and not the other: more is needed for both.

@@ -63,14 +63,27 @@ pub fn unit(kind: AmplifierKind) -> &'static str {
     }
 }
 
-/// Gathers what thrust, flow and blade torque answer to a drive of this sign.
+/// How long water flows on about, s.
+const FLOWS_ON_S: f64 = 1.0;
+
+/// Gathers what thrust, flow and blade torque answer. What pushes goes with speed squared, so a reading weighs as much:
+/// those of a shaft that hardly turns are noise. Before it is known which way the shaft sensor counts, and whether it
+/// counts at all, the sign of the drive is all there is.
 fn hear(seen: &Seen, facts: &mut Facts, side: f64) {
     let row = &seen.fresh;
+    let speed = seen.speed_rad_s * facts.side;
+    let weight = if facts.side == 0.0 { side } else { speed * speed.abs() };
+    // Water takes up what pushes it late and keeps it for a while: after a pulse ahead it may flow ahead all through one
+    // astern.
+    let kept = (-(seen.time_s - facts.pushed.1) / FLOWS_ON_S).exp();
+    facts.pushed = (facts.pushed.0 * kept + weight * (1.0 - kept), seen.time_s);
+    let weights = [weight, if facts.side == 0.0 { side } else { facts.pushed.0 }, weight];
     let zero = |signal: &str| facts.at_rest(signal).mean;
     let above = [
         row.thrust_n - zero("thrust_n"),
         row.flow_m_s - zero("flow_m_s"),
         row.torque_n_m - zero("torque_n_m"),
     ];
-    facts.answers.iter_mut().zip(above).for_each(|(answer, value)| answer.take(value, side));
+    let told = above.into_iter().zip(weights);
+    facts.answers.iter_mut().zip(told).for_each(|(answer, (value, weight))| answer.take(value, weight));
 }

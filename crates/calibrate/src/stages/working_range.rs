@@ -108,6 +108,9 @@ impl Stage for WorkingRange {
         }
         if hold.averaged {
             hear(seen, facts, hold.share.signum());
+            // What did not answer to pulses answers now, and is judged as there, at once, for the thruster pushes: one
+            // witness alone does not tell whether it or the whole thruster is the wrong way round.
+            contradiction(facts)?;
             let left_s = hold.lasts_s - since_s;
             if left_s <= AVERAGED_S {
                 let row = &seen.fresh;
@@ -149,9 +152,6 @@ impl WorkingRange {
         if drive * speed < 0.0 && speed.abs() > STANDS_RAD_S {
             return Err(Stop::OneWay);
         }
-        // What did not answer to pulses answers now, and is judged as there: one witness alone does not tell whether it
-        // or the whole thruster is the wrong way round.
-        contradiction(facts)?;
         let unsure = |k: &usize| facts.measures(WITNESSES[*k]) && facts.sign_of(*k) == 0.0;
         if let Some(k) = (0..3).find(unsure).filter(|_| share.abs() >= LEVELS[1]) {
             return Err(Stop::Silent { signal: WITNESSES[k] });
@@ -196,11 +196,14 @@ mod tests {
             let time_s = f64::from(k) * 1e-3;
             let seen = Seen { time_s, speed_rad_s: 20.0, angle_rad: 0.0, path_rad: 0.0, fresh };
             if let Err(stop) = stage.tick(&plan, &seen, &mut facts) {
-                stopped = Some(stop);
+                stopped = Some((time_s, stop));
                 break;
             }
         }
-        let words = stopped.unwrap().to_string();
+        let (time_s, stop) = stopped.unwrap();
+        // At once, not when the level has been held: it pushes meanwhile.
+        assert!(time_s < 0.01, "{time_s}");
+        let words = stop.to_string();
         assert!(words.contains("pushes astern") && words.contains("`reversed = true`"), "{words}");
         assert!(words.contains("if it does push ahead, `thrust_n` has the wrong sign"), "{words}");
         assert_eq!(facts.answers[1], Answer::default());
