@@ -107,12 +107,13 @@ fn found(reversed: Reversed, stop: Option<&Stop>) -> bool {
     }
 }
 
-/// Every rig that is shipped and pushes, with its file.
+/// Every rig that is shipped and pushes, with a thrust cell and a flow meter, and its file.
 fn pushing() -> Vec<(Rig, String)> {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../config/thrusters");
     let files = std::fs::read_dir(folder).unwrap().map(|file| file.unwrap().path());
     let rigs = files.map(|file| {
-        let rig = Rig::from_toml(&std::fs::read_to_string(&file).unwrap()).unwrap();
+        let mut rig = Rig::from_toml(&std::fs::read_to_string(&file).unwrap()).unwrap();
+        (rig.sensors.thrust_sensor, rig.sensors.flow_meter) = (true, true);
         (rig, file.file_name().unwrap().to_string_lossy().into_owned())
     });
     rigs.filter(|(rig, _)| rig.propeller.is_some()).collect()

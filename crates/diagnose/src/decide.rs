@@ -84,6 +84,12 @@ pub fn decide(posterior: &Posterior, circumstances: &Circumstances) -> Decision 
             });
         }
     }
+    // Names that cannot be parted are an answer where it is likelier one of them than none.
+    let in_doubt = |n: &Named| {
+        let of_place =
+            named.iter().filter(|other| other.effect == n.effect || n.rivals.contains(&other.effect));
+        !n.rivals.is_empty() && of_place.map(|n| n.probability).sum::<f64>() >= 0.5
+    };
     let believed = |n: &Named| posterior.probability(n.effect) >= BELIEVED && n.rivals.is_empty();
     let changes = |n: &Named| !circumstances.steady.contains(&n.effect);
     let verdict = if circumstances.broke_down
@@ -101,7 +107,7 @@ pub fn decide(posterior: &Posterior, circumstances: &Circumstances) -> Decision 
         } else {
             Verdict::NoMismatch
         }
-    } else if named.iter().any(|n| !n.rivals.is_empty()) {
+    } else if named.iter().any(in_doubt) {
         Verdict::Ambiguous
     } else if !named.iter().all(believed) {
         if named.iter().any(believed) { Verdict::PartlyExplained } else { Verdict::Unexplained }
@@ -184,6 +190,8 @@ mod tests {
             (&[(&[], 0.0), (&["windage_drag"], 12.0)], usual, Verdict::NoMismatch),
             (&[(&["windage_drag"], 0.0), (&[], 80.0)], usual, Verdict::Explained),
             (&[(&["windage_drag"], 0.0), (&["duct_loss"], 2.0), (&[], 80.0)], usual, Verdict::Ambiguous),
+            // That it is neither is likelier than both together.
+            (&[(&["windage_drag"], 0.0), (&["duct_loss"], 0.5), (&[], 3.0)], usual, Verdict::Unexplained),
             (&[(&["unknown_shaft_step"], 0.0), (&["windage_drag"], 90.0)], usual, Verdict::Unexplained),
             (
                 &[(&["unknown_shaft_step"], 0.0), (&[], 0.5), (&["windage_drag"], 0.5)],

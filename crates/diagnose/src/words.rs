@@ -55,9 +55,8 @@ pub fn why_not(worse: f64, gained: f64, nothing_found: bool) -> String {
     if nothing_found {
         return format!("adding it costs {worse:.0} more than it gains, in twice the log-evidence");
     }
-    format!(
-        "the best set with it is worse by {worse:.0} (of {gained:.0} gained in all), in twice the log-evidence"
-    )
+    let of = if gained > 0.0 { format!(" (of {gained:.0} gained in all)") } else { String::new() };
+    format!("the best set with it is worse by {worse:.0}{of}, in twice the log-evidence")
 }
 
 /// A nameless term with its numbers.
@@ -256,8 +255,8 @@ pub fn summary(told: &Told) -> String {
                 format!(" {model} also leaves out {}.", named(&sure))
             };
             format!(
-                "{model} leaves something out on the {} path, and this excitation cannot tell which of these it is: {}.{beside}",
-                doubtful.first().map_or("", |f| &f.path),
+                "{model} leaves something out{}, and this excitation cannot tell which of these it is: {}.{beside}",
+                one_path(&doubtful),
                 doubtful.iter().map(|f| plain(&f.effect)).collect::<Vec<_>>().join(" or "),
             )
         }
@@ -317,6 +316,16 @@ fn above_noise(baseline: &Baseline) -> Option<String> {
             100.0 * most.noise_floor
         )
     })
+}
+
+/// The path that these findings share, if they do.
+fn one_path(findings: &[&Finding]) -> String {
+    match findings {
+        [first, rest @ ..] if rest.iter().all(|f| f.path == first.path) => {
+            format!(" on the {} path", first.path)
+        }
+        _ => String::new(),
+    }
 }
 
 /// Names that are not stated and cannot be excluded.

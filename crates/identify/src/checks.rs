@@ -182,19 +182,22 @@ pub fn is_unsigned_speed(series: &Series) -> bool {
     let Some(speed) = series.column("shaft_speed_rad_s") else { return false };
     let below = -ABOUT_REST * largest(speed);
     let never_negative = speed.iter().filter(|v| **v < below).count() <= speed.len() / OUTLIERS;
-    let reversed = REVERSING.iter().any(|name| {
+    let reversed = |name: &&str| {
         series.column(name).is_some_and(|c| {
             let top = largest(c);
             let negative = c.iter().filter(|v| **v < -0.2 * top).count();
             negative > c.len() / 20
         })
-    });
-    never_negative && reversed
+    };
+    // A current brakes as well as it reverses: it tells only where nothing says which way the drive is to turn.
+    let asked = ASKED.iter().any(|name| series.column(name).is_some());
+    never_negative && if asked { ASKED.iter().any(reversed) } else { TAKEN.iter().any(reversed) }
 }
 
-/// Columns whose sign tells the direction.
-const REVERSING: [&str; 6] =
-    ["current_cmd_a", "current_a", "voltage_cmd_v", "duty_cmd", "speed_cmd_rad_s", "thrust_n"];
+/// Columns that say which way the drive is to turn.
+const ASKED: [&str; 3] = ["voltage_cmd_v", "duty_cmd", "speed_cmd_rad_s"];
+/// Columns whose sign tells the direction, or that something brakes.
+const TAKEN: [&str; 3] = ["current_cmd_a", "current_a", "thrust_n"];
 
 fn unsigned_speed(series: &Series, out: &mut Checked) {
     if is_unsigned_speed(series) {
@@ -341,6 +344,10 @@ mod tests {
         assert!(is_unsigned_speed(&log(|s| if s > 0.0 { s } else { -0.01 }, |_| true)));
         assert!(!is_unsigned_speed(&log(|s| s, |_| true)));
         assert!(notes(&log(f64::abs, |_| true)).contains("unsigned_speed_sensor"));
+        // A current that brakes reverses nothing where a command says which way the drive is to turn.
+        let mut braked = log(f64::abs, |_| true);
+        braked.columns.push(("voltage_cmd_v".into(), vec![4.0; braked.time_s.len()]));
+        assert!(!is_unsigned_speed(&braked));
     }
 
     #[test]

@@ -153,8 +153,12 @@ impl Prepared {
             return None;
         }
         let usual_s = gaps.iter().sum::<f64>() / gaps.len() as f64;
+        let (what, of) = match self.driving {
+            Driving::Command(_) => ("the command", "a delay of the drive"),
+            _ => ("what drives the model", "how late a response comes"),
+        };
         Some(format!(
-            "{}: {} of {} steps of the command fall between rows, {usual_s:.3} s apart in the mean; where each lay is fitted, so a delay of the drive within that shows only in part: log the command at the control rate",
+            "{}: {} of {} steps of {what} fall between rows, {usual_s:.3} s apart in the mean; where each lay is fitted, so {of} within that shows only in part: log {what} at the control rate",
             self.name,
             gaps.len(),
             self.edges.len(),

@@ -35,17 +35,24 @@ impl Prepared {
     }
 }
 
-/// The recordings with their measured torques as loads, where every one has them and the rig knows of no other load.
+/// The recordings with their measured torques as loads, where the rig knows of no other: one that has none ran without a
+/// load, as far as anybody says.
 pub fn loaded(recordings: &[Prepared], series: &[Series], rig: &Rig, sign: f64) -> Option<Vec<Prepared>> {
     let dry = rig.propeller.is_none() && matches!(rig.load, Load::None);
     if !dry || recordings.iter().any(|r| r.driving == Driving::Speed) {
         return None;
     }
-    let each = recordings.iter().zip(series).map(|(recording, one)| {
-        let torque = one.column("torque_n_m").filter(|torque| varies(torque))?;
-        Some(recording.with_load(torque, sign))
-    });
-    each.collect()
+    let torque =
+        |one: &'_ Series| one.column("torque_n_m").filter(|torque| varies(torque)).map(<[f64]>::to_vec);
+    let torques: Vec<Option<Vec<f64>>> = series.iter().map(torque).collect();
+    torques.iter().any(Option::is_some).then(|| {
+        let each = recordings.iter().zip(&torques);
+        each.map(|(recording, torque)| match torque {
+            Some(torque) => recording.with_load(torque, sign),
+            None => recording.clone(),
+        })
+        .collect()
+    })
 }
 
 /// What was taken for true.
@@ -58,4 +65,33 @@ pub fn words(sign: f64) -> String {
     format!(
         "torque_n_m is taken for what a load takes from the shaft, measured between the two{turned}; a motor without that load fits worse. Leave the column out if it is the drive's own estimate"
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_without_the_column_ran_without_a_load() {
+        let rig = Rig::from_toml(
+            "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = 0.01\ntorque_constant_nm_a = 1.0\n\
+             [amplifier]\nkind = \"current\"\n[sensors]\n",
+        )
+        .unwrap();
+        let wave = |by: f64| (0..500).map(|k| by * (0.05 * f64::from(k)).sin()).collect::<Vec<f64>>();
+        let run = |torque: bool| Series {
+            name: "run".into(),
+            time_s: (0..500).map(|k| 0.01 * f64::from(k)).collect(),
+            columns: [("current_cmd_a", 2.0), ("shaft_speed_rad_s", 20.0), ("torque_n_m", 0.5)]
+                .into_iter()
+                .filter(|(name, _)| torque || *name != "torque_n_m")
+                .map(|(name, by)| (name.to_owned(), wave(by)))
+                .collect(),
+        };
+        let series = [run(true), run(false)];
+        let runs: Vec<Prepared> = series.iter().map(|one| Prepared::new(one, &rig, false).unwrap()).collect();
+        let with = loaded(&runs, &series, &rig, 1.0).unwrap();
+        assert_eq!(with.iter().map(Prepared::is_loaded).collect::<Vec<_>>(), [true, false]);
+        assert!(loaded(&runs[1..], &series[1..], &rig, 1.0).is_none(), "nothing was recorded of a load");
+    }
 }

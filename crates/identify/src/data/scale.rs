@@ -119,6 +119,17 @@ fn goes_astern(all: &[Prepared], speed_rad_s: f64, command: f64) -> bool {
     speeds.copied().any(|v| v < -TRIFLE * speed_rad_s) || commands.copied().any(|c| c < -TRIFLE * command)
 }
 
+/// Whether every recording holds a shaft speed with its sign, and all of them together one sign.
+fn one_way(series: &[Series]) -> bool {
+    let speeds = series.iter().map(|s| s.column("shaft_speed_rad_s")).collect::<Option<Vec<_>>>();
+    let Some(speeds) = speeds.filter(|_| !series.iter().any(crate::checks::is_unsigned_speed)) else {
+        return false;
+    };
+    let all = || speeds.iter().copied().flatten().copied().filter(|v| v.is_finite());
+    let most = all().fold(0.0_f64, |most, v| most.max(v.abs()));
+    !(all().any(|v| v < -TRIFLE * most) && all().any(|v| v > TRIFLE * most))
+}
+
 /// Share of the largest size below which a sign says nothing.
 const TRIFLE: f64 = 0.02;
 
@@ -147,6 +158,7 @@ pub fn available(model: ModelName, series: &[Series], all: &[Prepared]) -> Avail
         axial_flow_modelled: !matches!(model, ModelName::Model0 | ModelName::Model1),
         turned_rad: angle_known(all).then(|| turned_rad(all)),
         speed_unsigned: series.iter().any(crate::checks::is_unsigned_speed),
+        one_way: one_way(series),
         supply_sag_share: series
             .iter()
             .map(|s| crate::checks::supply_sag(s).map(|sag| sag.share()))

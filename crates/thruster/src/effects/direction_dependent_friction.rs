@@ -1,8 +1,9 @@
 //! Friction that differs by the direction of turning: screws, seals with a lip, gears.
 
-use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, free_shaft};
+use super::{Available, Descriptor, Effect, Hooks, Path, Scale, Spec, free_shaft};
 use crate::plant::{Balance, Local};
 use crate::real::Real;
+use crate::rig::Rig;
 
 /// Catalogue entry.
 pub const DESCRIPTOR: Descriptor = Descriptor {
@@ -32,7 +33,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
         let (dry, viscous) = (0.04 * scale.torque_n_m, 0.02 * scale.torque_n_m / scale.shaft_speed_rad_s);
         vec![vec![dry, 0.5 * dry, viscous, viscous], vec![0.5 * dry, dry, viscous, viscous]]
     },
-    needs: free_shaft,
+    needs,
     build: both!(|values, _| {
         Box::new(DirectionDependentFriction {
             ahead_n_m: values[0],
@@ -42,6 +43,15 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
         })
     }),
 };
+
+/// Of a shaft that turns one way alone dry friction and this are the same.
+fn needs(rig: &Rig, available: &Available) -> Result<(), &'static str> {
+    free_shaft(rig, available)?;
+    if available.one_way {
+        return Err("the shaft turned one way only, so nothing tells how it rubs the other way");
+    }
+    Ok(())
+}
 
 fn parameters(scale: &Scale) -> Vec<Spec> {
     let torque = scale.torque_n_m;

@@ -17,6 +17,8 @@ pub struct Available {
     pub axial_flow_modelled: bool,
     /// Only the size of the shaft speed was recorded: it is never negative although the drive reverses.
     pub speed_unsigned: bool,
+    /// A signed shaft speed was recorded, and it has one sign throughout.
+    pub one_way: bool,
     /// Way of the shaft between its furthest ends, rad, where its angle is known in every recording: the longest of them.
     pub turned_rad: Option<f64>,
     /// Share of the supply lost at the largest load, where every recording holds the supply.

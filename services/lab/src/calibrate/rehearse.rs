@@ -142,8 +142,11 @@ pub fn rehearse(
             one
         })
         .collect::<Result<_, _>>()?;
+    // What a rig has no cell of cannot have the wrong sign.
+    let may_be = |trouble: &Trouble| *trouble != Trouble::ThrustReversed || rig.sensors.thrust_sensor;
     let troubles: Vec<Found> = (0..rigs)
         .flat_map(|k| Trouble::ALL.map(|trouble| (k, trouble)))
+        .filter(|(_, trouble)| may_be(trouble))
         .collect::<Vec<_>>()
         .into_par_iter()
         .map(|(k, trouble)| found(&fitted_out(rig, k), seed + k, drive_max, share, trouble))
