@@ -18,7 +18,7 @@ use std::time::{Duration, Instant};
 use kort_proto::config::Config;
 use kort_proto::events::{Event, EventKind, EventLog};
 use kort_proto::transport::{Deployment, Owner, Restarts, Watched};
-use tracing::{info, warn};
+use tracing::warn;
 
 pub use error::UpError;
 use role::Role;

@@ -42,6 +42,7 @@ fn every_error_is_a_problem_document_with_its_type() {
             ("POST", &lease, &[JSON], r#"{"holder": 7}"#, 422, "invalid-field"),
             ("POST", &lease, &[JSON], r#"{"holder": "a", "ttl_ms": 0.5}"#, 422, "invalid-field"),
             ("POST", &lease, &[JSON], r#"{"holder": ""}"#, 422, "out-of-range"),
+            ("POST", &lease, &[JSON], r#"{"holder": "supervisor"}"#, 422, "out-of-range"),
             ("POST", &lease, &[JSON], r#"{"holder": "a", "ttl_ms": 60001}"#, 422, "out-of-range"),
             ("POST", &lease, &[JSON], r#"{"holder": "a", "ttl_ms": 0}"#, 422, "out-of-range"),
             ("POST", &lease, &[JSON], r#"{"holder": "a", "ttl_ms": -5}"#, 422, "out-of-range"),

@@ -16,6 +16,8 @@ use crate::problem::{Kind, Problem};
 use crate::token::Identity;
 
 const HOLDER_CHARS_MAX: usize = 64;
+/// Who the event log says did what a process of the service does.
+const PROCESSES: [&str; 4] = ["servo", "controller", "gateway", "supervisor"];
 
 pub fn routes() -> OpenApiRouter<Arc<App>> {
     OpenApiRouter::new().routes(routes!(take, renew, give))
@@ -93,6 +95,13 @@ async fn take(
         return Err(Problem::new(
             Kind::OutOfRange,
             format!("holder = {:?} has {chars} characters; allowed are 1 to {HOLDER_CHARS_MAX}, none of them control characters", request.holder),
+        )
+        .hint("a short name that others recognise, for example \"bench\""));
+    }
+    if PROCESSES.contains(&request.holder.as_str()) {
+        return Err(Problem::new(
+            Kind::OutOfRange,
+            format!("holder = {:?} is what the event log calls a process of the service", request.holder),
         )
         .hint("a short name that others recognise, for example \"bench\""));
     }
