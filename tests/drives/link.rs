@@ -29,6 +29,8 @@ pub const FROZEN: Duration = Duration::from_millis(500 + 20);
 const HELD_UP: u64 = Fault::DriveLost.bit()
     | Fault::SensorNotFinite.bit()
     | Fault::AmplifierFault.bit()
+    // A watchdog outside the drive that took the enable away guards nothing until it is seen to act again.
+    | Fault::DriveUnguarded.bit()
     | Fault::CommandTimeout.bit()
     | Fault::LoopStalled.bit();
 /// A rig that the repository describes.
