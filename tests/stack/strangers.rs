@@ -169,6 +169,16 @@ fn what_another_user_could_write_is_neither_believed_nor_gone_on_with() {
         refused(&folder, "may be written by others");
         mode(&folder, 0o755);
     }
+    // Recordings may lie on a disk for all, but not where others could replace them.
+    let recordings = state.join("recordings");
+    fs::create_dir(&recordings).unwrap();
+    let kept = fs::read_to_string(site.config()).unwrap();
+    let elsewhere = kept.lines().filter(|l| !l.starts_with("recordings")).collect::<Vec<_>>().join("\n");
+    let named = format!("[gateway]\nrecordings = \"{}\"\n", recordings.display());
+    fs::write(site.config(), elsewhere.replace("[gateway]\n", &named)).unwrap();
+    mode(&recordings, 0o777);
+    refused(&recordings, "may replace what is in it (mode 777)");
+    mode(&recordings, 0o755);
     if rustix::process::geteuid().is_root() {
         for path in [&state, &tokens, &state.join("events")] {
             chown(path, Some(STRANGER), Some(STRANGER)).unwrap();

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use kort_control::known::uses;
 use kort_proto::config::Config;
-use kort_proto::ours::{Foreign, in_our_hands, make_folder};
+use kort_proto::ours::{Foreign, in_our_hands, make_folder, nobody_else_may_replace};
 use kort_thruster::rig::Rig;
 
 use crate::error::GatewayError;
@@ -59,14 +59,15 @@ pub(crate) fn ours(settings: &Settings) -> Result<(), GatewayError> {
         ("tokens", &settings.tokens),
         ("events", &settings.events),
         ("rigs", &settings.rigs),
-        ("recordings", &settings.recordings),
         ("diagnoses", &settings.diagnoses),
         ("calibrations", &settings.calibrations),
     ];
     for (key, path) in believed.into_iter().chain(key) {
         in_our_hands(path).map_err(|Foreign { path, why }| GatewayError::Foreign { key, path, why })?;
     }
-    Ok(())
+    // Nothing is believed of a recording but by whoever asks for it: a disk for all will do, where nobody replaces what is ours.
+    let foreign = |Foreign { path, why }| GatewayError::Foreign { key: "recordings", path, why };
+    nobody_else_may_replace(&settings.recordings).map_err(foreign)
 }
 
 /// Makes a folder and a file in it, which is gone again: a folder that is there may be one that nothing can be written to.
