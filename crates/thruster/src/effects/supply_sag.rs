@@ -12,7 +12,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     id: "supply_sag",
     path: Path::Drive,
     what: "the bus voltage falls under load through the resistance of cable and battery, and recovers with a lag",
-    equation: "Vbus = f V0 - lag(Rs Ibus), Ibus = |im| |R im + ke Om|/Vbus; Rs [ohm], lag [s], f [1] for a supply not as stated. A voltage drive's output \
+    equation: "Vbus = f V0 - lag(Rs Ibus), Ibus = |im| |R im + ke Om|/V0; Rs [ohm], lag [s], f [1] for a supply not as stated. A voltage drive's output \
                falls in proportion; a current drive meets its voltage limit sooner",
     signature: "on a voltage drive thrust grows more slowly than command; on a current drive only the top is capped; \
                 other loads on the bus show through; thrust over speed squared is unchanged",
@@ -100,21 +100,6 @@ pub(super) fn recorded(available: &Available) -> bool {
 /// Least bus voltage that a power is divided by, V.
 const LEAST_V: f64 = 1e-3;
 
-/// Largest share of the supply that the power would cost at its full voltage, up to which the balance is followed.
-const MOST_SHARE: f64 = 0.16;
-
-/// Share of its voltage that a supply keeps, where the power at full voltage would cost it a share `lost`: `V = V0 - R P/V`,
-/// whose larger root is the one that stands. Near a quarter no voltage carries the power any more; from well before that
-/// on it goes on with its slope.
-fn left<T: Real>(lost: T) -> T {
-    let root = |lost: T| ((lost * -4.0 + 1.0).sqrt() + 1.0) * 0.5;
-    if lost <= T::from(MOST_SHARE) {
-        return root(lost);
-    }
-    let (kept, slope) = (0.8, 2.0 / 0.96);
-    ((lost - MOST_SHARE) * slope + 1.0).recip() * kept
-}
-
 struct SupplySag<T> {
     source_ohm: T,
     recovery_s: T,
@@ -136,28 +121,12 @@ impl<T: Real> Effect<T> for SupplySag<T> {
         // Bus and winding exchange power; a braking drive does not lift the bus here.
         let bus_a = (drive.current_a * winding_v).max(T::ZERO) / drive.supply_v;
         let lost_v = self.sag.step(self.source_ohm * bus_a, self.recovery_s, self.tick_s);
-        let left = left(lost_v / drive.supply_v);
+        let left = (lost_v / drive.supply_v + 1.0).recip();
         drive.supply_v *= left;
         if self.voltage_drive {
             drive.command *= left;
         } else {
             drive.voltage_limited = true;
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::left;
-
-    #[test]
-    fn what_is_left_carries_the_power_and_goes_on_with_its_slope() {
-        for lost in [0.0, 0.01, 0.1, 0.16] {
-            let kept: f64 = left(lost);
-            assert!((kept - (1.0 - lost / kept)).abs() < 1e-12, "{lost}: {kept}");
-        }
-        let slope = |from: f64, to: f64| (left(to) - left(from)) / (to - from);
-        assert!((slope(0.1599, 0.16) - slope(0.16, 0.1601)).abs() < 0.01);
-        assert!((0.0..0.3).contains(&left(1.0)));
     }
 }
