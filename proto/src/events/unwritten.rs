@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::io::{self, Write};
 
-/// Most lines that are kept: an hour of a busy thruster.
+/// Most lines that are kept: a plain choice, some hundreds of kilobytes.
 const KEPT: usize = 1000;
 
 /// What is to be written, oldest first.
