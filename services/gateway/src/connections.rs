@@ -122,10 +122,10 @@ impl Connections {
                 None => break None,
             }
         };
-        let (reserved, in_place_of) = if full { (false, make_room(&of_all)) } else { (false, None) };
+        let in_place_of = if full { make_room(&of_all) } else { None };
         let (reserved, in_place_of) = match in_place_of {
-            None if !full => (reserved, None),
-            Some(ended) => (reserved, Some(ended)),
+            None if !full => (false, None),
+            Some(ended) => (false, Some(ended)),
             // All are at work: what comes now may only stop, in place of another of that kind too.
             None if kept_back.len() < self.caps.reserve => (true, None),
             None => match make_room(&kept_back) {
