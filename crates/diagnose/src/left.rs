@@ -45,7 +45,7 @@ pub fn more_than_noise(problem: &Problem, fit: &Fit, residual: &Stack, floor: &N
     let may_err = problem.spectrum.variances(&fit.floor.levels());
     let following = follows(problem, fit, residual);
     let lasting = lasting(problem, residual);
-    let doubt = problem.spectrum.variances(&problem.doubt);
+    let doubt = problem.spectrum.variances(fit.floor.doubt());
     let mut all = Vec::new();
     for (r, recording) in problem.recordings.iter().enumerate() {
         for (c, channel) in recording.channels.iter().enumerate() {

@@ -31,6 +31,9 @@ const DAMPINGS: usize = 5;
 /// tuning cases ended where they do by this.
 const LONGEST: f64 = 4.0;
 
+/// Lines, in full scales, of a simulation that ran away: it follows nothing, and no noise of any size excuses it.
+const RAN_AWAY: f64 = 1e6;
+
 /// Rounds of placing the command's steps and fitting.
 const PLACINGS: usize = 8;
 
@@ -79,9 +82,9 @@ impl Fit {
         self.noise.misfit + self.penalty + self.price
     }
 
-    /// Whether the simulation broke down.
+    /// Whether the simulation broke down, or ran away.
     pub fn broke_down(&self) -> bool {
-        !self.cost().is_finite()
+        !self.cost().is_finite() || self.lines.amax() > RAN_AWAY
     }
 
     /// The hypothesis, to start from where this fit ended.

@@ -54,7 +54,7 @@ impl Prepared {
     /// By row, in the unit of what drives; none at its steps.
     fn noise_of_what_drives(&self) -> Vec<f64> {
         let values = if self.driving == Driving::Speed { &self.speed_between } else { &self.command };
-        let mut noise: Vec<f64> = (0..values.len()).map(|row| departure(values, row)).collect();
+        let mut noise: Vec<f64> = (0..values.len()).map(|row| departure(&self.time_s, values, row)).collect();
         for edge in &self.edges {
             let to = (edge + BESIDE).min(noise.len());
             noise[edge.saturating_sub(BESIDE).min(to)..to].fill(0.0);
@@ -64,12 +64,22 @@ impl Prepared {
 }
 
 /// What a sample departs by from the cubic through its four neighbours, its sign drawn: of white noise, as large as that.
-fn departure(values: &[f64], row: usize) -> f64 {
-    let Some([a, b, at, c, d]) = row.checked_sub(2).and_then(|from| values.get(from..from + 5)) else {
-        return 0.0;
+fn departure(time_s: &[f64], values: &[f64], row: usize) -> f64 {
+    const NEIGHBOURS: [usize; 4] = [0, 1, 3, 4];
+    let about = |of: &[f64]| -> Option<[f64; 5]> {
+        row.checked_sub(2).and_then(|from| of.get(from..from + 5)?.try_into().ok())
     };
+    let (Some(time_s), Some(values)) = (about(time_s), about(values)) else { return 0.0 };
+    // Lagrange's weights of the neighbours.
+    let weight = |of: usize| -> f64 {
+        let others = NEIGHBOURS.into_iter().filter(|other| *other != of);
+        others.map(|other| (time_s[2] - time_s[other]) / (time_s[of] - time_s[other])).product()
+    };
+    let weights = NEIGHBOURS.map(|of| (weight(of), values[of]));
+    let foretold: f64 = weights.iter().map(|(weight, value)| weight * value).sum();
+    let spread = 1.0 + weights.iter().map(|(weight, _)| weight * weight).sum::<f64>();
     let sign = if evenly(row) < 0.5 { -1.0 } else { 1.0 };
-    sign * (a - 4.0 * b + 6.0 * at - 4.0 * c + d) / 70.0_f64.sqrt()
+    sign * (values[2] - foretold) / spread.sqrt()
 }
 
 /// Departures, none larger in its piece than they are in the quiet ones.
@@ -101,11 +111,16 @@ mod tests {
 
     #[test]
     fn a_cubic_departs_by_nothing_and_noise_by_its_size() {
-        let cubic: Vec<f64> = (0..9).map(|k| f64::from(k).powi(3) - 2.0 * f64::from(k)).collect();
-        assert!((0..9).all(|row| departure(&cubic, row).abs() < 1e-9));
+        let even: Vec<f64> = (0..5000).map(f64::from).collect();
+        // Logged when there was time to: intervals of a half and of five quarters.
+        let uneven: Vec<f64> = (0..5000).map(|k| f64::from(k) + 0.25 * f64::from(k % 3)).collect();
         let noise: Vec<f64> = (0..5000).map(white).collect();
-        let departs = rms((0..5000).map(|row| departure(&noise, row)));
-        assert!((departs / rms(noise) - 1.0).abs() < 0.05, "{departs}");
+        for time_s in [even, uneven] {
+            let cubic: Vec<f64> = time_s[..9].iter().map(|t| t.powi(3) - 2.0 * t).collect();
+            assert!((0..9).all(|row| departure(&time_s, &cubic, row).abs() < 1e-9));
+            let departs = rms((0..5000).map(|row| departure(&time_s, &noise, row)));
+            assert!((departs / rms(noise.iter().copied()) - 1.0).abs() < 0.05, "{departs}");
+        }
     }
 
     #[test]

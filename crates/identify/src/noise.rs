@@ -15,6 +15,8 @@
 #[cfg(test)]
 mod tests;
 
+use std::ops::Range;
+
 use serde::Deserialize;
 
 use crate::spectrum::Band;
@@ -76,12 +78,10 @@ impl Pool {
 /// under Order Restrictions, 1.2; convex in the logarithm of a level).
 fn likeliest(bands: &[Band], powers: &[f64], floor: &Floor, facts: &[f64]) -> Vec<f64> {
     let mut out = Vec::with_capacity(bands.len());
-    let mut first = 0;
-    while first < bands.len() {
-        let last = (first..bands.len()).find(|b| !bands[*b].continues).unwrap_or(bands.len() - 1);
+    for channel in channels(bands) {
         let walk = |b: usize| bands[b].hz.powi(-2);
         let mut pools: Vec<Pool> = Vec::new();
-        for b in first..=last {
+        for b in channel.clone() {
             // What is excused need not be there: a quiet band says that there is no walk.
             let noise = (powers[b] - floor.own[b]).max(powers[b].min(floor.levels[b]));
             let least = floor.levels[b] / walk(b);
@@ -92,8 +92,7 @@ fn likeliest(bands: &[Band], powers: &[f64], floor: &Floor, facts: &[f64]) -> Ve
             pools.push(pool);
         }
         let levels = pools.iter().flat_map(|p| std::iter::repeat_n(p.level(), p.bands));
-        out.extend(levels.zip(first..).map(|(level, b)| level * walk(b) + floor.own[b]));
-        first = last + 1;
+        out.extend(levels.zip(channel).map(|(level, b)| level * walk(b) + floor.own[b]));
     }
     out
 }
@@ -104,8 +103,10 @@ const ROUNDING: f64 = 1e-14;
 /// What no hypothesis is held to account for, by band.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Floor {
-    /// Variance of quantisation, form error of the model and timing.
+    /// Variance of quantisation, form error of the model, timing, and the doubt of what drives.
     levels: Vec<f64>,
+    /// That doubt alone.
+    doubt: Vec<f64>,
     /// Form error of what explains the mismatch, on top of it. It is no noise: it says nothing about frequencies beside
     /// it.
     own: Vec<f64>,
@@ -137,7 +138,8 @@ impl Floor {
             let timing = (std::f64::consts::TAU * band.hz * timing_s).powi(2) * band.signal;
             floor.push(band.quantisation + form + timing + ROUNDING);
         }
-        Self { white: vec![0.0; floor.len()], own: vec![0.0; floor.len()], levels: floor }
+        let none = || vec![0.0; floor.len()];
+        Self { white: none(), own: none(), doubt: none(), levels: floor }
     }
 
     /// Variance by band, in squares of the full scale.
@@ -147,16 +149,42 @@ impl Floor {
 
     /// With the doubt of what drives the model (mean square by band).
     pub fn with_doubt(&self, doubt: &[f64]) -> Self {
-        Self { levels: self.levels.iter().zip(doubt).map(|(f, d)| f + d).collect(), ..self.clone() }
+        let levels = self.levels.iter().zip(doubt).map(|(f, d)| f + d).collect();
+        Self { levels, doubt: doubt.to_vec(), ..self.clone() }
+    }
+
+    /// Doubt of what drives the model, variance by band.
+    pub fn doubt(&self) -> &[f64] {
+        &self.doubt
+    }
+
+    /// Share of the doubt that what is left has room for (mean square by band). What drives may be smoother between its
+    /// samples than the two courses that were simulated: their difference has the shape of the doubt and is no measure
+    /// of its size. All channels were driven alike, so the one tells that has the least left.
+    fn share_of_doubt(&self, bands: &[Band], left: &[f64], criterion: &Criterion) -> f64 {
+        let tells = |b: &usize| !bands[*b].rest && 2.0 * self.doubt[*b] > self.levels[*b];
+        let of_channel = |channel: Range<usize>| {
+            let (sum, facts) = channel.filter(tells).fold((0.0, 0.0), |(sum, n), b| {
+                let facts = criterion.facts(&bands[b]);
+                (sum + facts * (left[b] / self.doubt[b]).min(1.0), n + facts)
+            });
+            // By a standard deviation more: the least of several is rather too small.
+            if facts > 0.0 { sum / facts * (1.0 + (2.0 / facts).sqrt()) } else { 1.0 }
+        };
+        channels(bands).map(of_channel).fold(1.0, f64::min)
     }
 
     /// With the form error of what is to explain a mismatch (mean square by band): its equations are as good as a share
-    /// of it. No more than the signal is to be explained: a model that runs away leaves more than none at all.
+    /// of it. No more than the signal is to be explained: a model that runs away leaves more than none at all. What
+    /// drives is in doubt no further than the mismatch shows.
     pub fn explaining(&self, bands: &[Band], mismatch: &[f64], criterion: &Criterion) -> Self {
         let share = criterion.own_form_error.powi(2);
         let of_band = |(band, left): (&Band, &f64)| share * left.min(band.signal);
+        let kept = self.share_of_doubt(bands, mismatch, criterion);
+        let less = |(level, doubt): (&f64, &f64)| level - (1.0 - kept) * doubt;
         Self {
-            levels: self.levels.clone(),
+            levels: self.levels.iter().zip(&self.doubt).map(less).collect(),
+            doubt: self.doubt.iter().map(|doubt| kept * doubt).collect(),
             own: bands.iter().zip(mismatch).map(of_band).collect(),
             white: white(bands, mismatch),
         }
@@ -167,6 +195,7 @@ impl Floor {
         let lower = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a.min(*b)).collect();
         Self {
             levels: lower(&self.levels, &other.levels),
+            doubt: lower(&self.doubt, &other.doubt),
             own: lower(&self.own, &other.own),
             white: lower(&self.white, &other.white),
         }
@@ -180,15 +209,22 @@ const MANY: usize = 100;
 /// Nothing is white noise in a channel that has no band of many lines.
 fn white(bands: &[Band], powers: &[f64]) -> Vec<f64> {
     let mut out = Vec::with_capacity(bands.len());
-    while out.len() < bands.len() {
-        let first = out.len();
-        let last = (first..bands.len()).find(|b| !bands[*b].continues).unwrap_or(bands.len() - 1);
-        let many = (first..=last).filter(|b| bands[*b].lines.len() >= MANY);
+    for channel in channels(bands) {
+        let many = channel.clone().filter(|b| bands[*b].lines.len() >= MANY);
         let lowest = many.map(|b| powers[b]).fold(f64::INFINITY, f64::min);
-        let level = if lowest.is_finite() { lowest } else { 0.0 };
-        out.resize(last + 1, level);
+        out.resize(channel.end, if lowest.is_finite() { lowest } else { 0.0 });
     }
     out
+}
+
+/// Bands of each channel of each recording.
+fn channels(bands: &[Band]) -> impl Iterator<Item = Range<usize>> {
+    let mut first = 0;
+    std::iter::from_fn(move || {
+        let from = (first < bands.len()).then_some(first)?;
+        first = (from..bands.len()).find(|b| !bands[*b].continues).map_or(bands.len(), |last| last + 1);
+        Some(from..first)
+    })
 }
 
 /// The noise that a residual shows: level and weight by band.

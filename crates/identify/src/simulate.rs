@@ -45,9 +45,7 @@ pub struct Problem<'a> {
     pub spectrum: Spectrum,
     /// Noise floor of any hypothesis.
     pub floor: Floor,
-    /// What of the response is in doubt since nobody recorded what drives between its samples: mean square by band.
-    pub doubt: Vec<f64>,
-    /// Where the doubt is looked at: a hypothesis at its start; where none is, the stated rig.
+    /// Where the doubt of what drives between its samples is looked at: a hypothesis at its start; where none is, the stated rig.
     pub doubted_at: Option<Hypothesis>,
 }
 
@@ -64,30 +62,15 @@ impl<'a> Problem<'a> {
         let floor = Floor::of_signal(&spectrum.bands, &criterion);
         let scale = crate::data::scale(&recordings, rig);
         let stated = Parameters::stated(rig);
-        let doubt = vec![0.0; spectrum.bands.len()];
-        Self {
-            model,
-            rig,
-            stated,
-            recordings,
-            masked,
-            scale,
-            criterion,
-            spectrum,
-            floor,
-            doubt,
-            doubted_at: None,
-        }
-        .doubted()
+        Self { model, rig, stated, recordings, masked, scale, criterion, spectrum, floor, doubted_at: None }
+            .doubted()
     }
 
     /// The problem, with what it owes to how that which drives runs as part of its floor.
     fn doubted(mut self) -> Self {
         self.floor = Floor::of_signal(&self.spectrum.bands, &self.criterion);
-        self.doubt.fill(0.0);
         if let Some(doubt) = self.doubt_of_drivers() {
             self.floor = self.floor.with_doubt(&doubt);
-            self.doubt = doubt;
         }
         self
     }

@@ -41,7 +41,7 @@ impl Prepared {
             plant.step(&Tick { command: *command, ..*tick });
             let truth = plant.truth();
             course.push([truth.shaft_speed_rad_s, truth.axial_m_s, truth.current_a]);
-            decay.push(plant.fastest_decay_1_s() * self.tick_s);
+            decay.push(plant.fastest_decay_1_s(tick.driven) * self.tick_s);
         }
         let smooth = smooth(&course, &self.may_jump(), self.ticks_per_row + 2);
         for ((tick, smooth), decay) in self.stimulus.ticks.iter_mut().zip(&smooth).zip(&decay) {

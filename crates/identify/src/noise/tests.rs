@@ -135,7 +135,7 @@ proptest! {
         k in 0..12_usize,
     ) {
         let levels = floors.iter().map(|d| 10.0_f64.powf(*d)).collect();
-        let floor = Floor { levels, own: vec![0.0; 12], white: vec![0.0; 12] };
+        let floor = Floor { levels, doubt: vec![0.0; 12], own: vec![0.0; 12], white: vec![0.0; 12] };
         let mut powers: Vec<f64> = decades.iter().map(|d| 10.0_f64.powf(*d)).collect();
         let before = Noise::of(&bands(), &powers, &floor, &CRITERION).misfit;
         powers[k] *= less;
@@ -201,4 +201,26 @@ fn many_lines_count_as_few_facts_in_however_many_recordings() {
     assert!((told(&wide) - 30.0 * 100.0_f64.ln()).abs() < 0.1);
     let one_of_four = Band { alike: 400_000, ..wide[0].clone() };
     assert!((told(&vec![one_of_four; 4]) - told(&wide)).abs() < 0.1);
+}
+
+#[test]
+fn what_drives_is_in_doubt_no_further_than_the_mismatch_of_any_channel_shows() {
+    let two: Vec<Band> = bands().into_iter().chain(bands()).collect();
+    let doubted = Floor::of_signal(&two, &CRITERION).with_doubt(&[1e-2; 24]);
+    let kept = |first: f64, second: f64| {
+        let mismatch: Vec<f64> =
+            std::iter::repeat_n(first, 12).chain(std::iter::repeat_n(second, 12)).collect();
+        doubted.explaining(&two, &mismatch, &CRITERION).doubt()[0] / 1e-2
+    };
+    assert_eq!(kept(1.0, 1.0), 1.0, "all of it may be real");
+    assert_eq!(kept(1e-2, 1e-2), 1.0);
+    let facts: f64 = bands().iter().map(|band| CRITERION.facts(band)).sum();
+    assert!((kept(1e-4, 1.0) / (1e-2 * (1.0 + (2.0 / facts).sqrt())) - 1.0).abs() < 1e-9);
+    assert_eq!(kept(1e-4, 1.0), kept(1.0, 1e-4));
+    let plain = Floor::of_signal(&two, &CRITERION);
+    assert_eq!(
+        plain.explaining(&two, &[0.0; 24], &CRITERION).levels(),
+        plain.levels(),
+        "nothing was in doubt"
+    );
 }

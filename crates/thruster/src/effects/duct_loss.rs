@@ -23,7 +23,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
         "water_density",
     ],
     separated_by: "a profile of the flow across the duct; thrust and flow recorded together",
-    reference: "control volume of the duct, equations (2)-(6); Carlton, Marine Propellers and Propulsion",
+    reference: "control volume of the duct, equations (2)-(6); Carlton, Marine Propellers and Propulsion; Idelchik, Handbook of Hydraulic Resistance (inlets)",
     commonness: 0.7,
     shifts_time: false,
     nonparametric: false,
@@ -39,7 +39,9 @@ fn parameters(_: &Scale) -> Vec<Spec> {
     vec![
         Spec::strength("wall_loss", "1", 0.1, -1.0, 4.0).sigma(0.4),
         Spec::strength("duct_thrust", "1", 0.04, -1.5, 1.5).sigma(0.15),
-        Spec::strength("lip_loss_astern", "1", 0.1, -1.0, 4.0).sigma(0.4),
+        // A sharp inlet loses half of its head, one that stands out into the water nearly all of it (Idelchik, Handbook of
+        // Hydraulic Resistance, flow into tubes and conduits).
+        Spec::strength("lip_loss_astern", "1", 0.1, -1.0, 4.0).sigma(0.75),
     ]
 }
 

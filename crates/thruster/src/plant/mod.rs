@@ -297,25 +297,6 @@ impl<T: Real> Plant<T> {
         self.stiff.is_some()
     }
 
-    /// How fast a disturbance of shaft speed and axial flow dies here at most, 1/s: the larger eigenvalue of
-    /// the rates' derivative.
-    pub fn fastest_decay_1_s(&self) -> f64 {
-        let rates = |place: usize, by: f64| {
-            let mut x = self.x;
-            x[place] += T::from(by);
-            let at = Local { shaft_speed_rad_s: x[SPEED], axial_m_s: x[FLOW], ..self.at };
-            let rates = self.rates::<true, true, STATES>(&x, &at, &mut Balance::default());
-            [rates[SPEED].re(), rates[FLOW].re()]
-        };
-        let here = rates(SPEED, 0.0);
-        let [[a, c], [b, d]] = [SPEED, FLOW].map(|place| {
-            let by = 1e-6 * self.x[place].re().abs().max(1e-3);
-            let there = rates(place, by);
-            [(there[0] - here[0]) / by, (there[1] - here[1]) / by]
-        });
-        stiffness::fastest_1_s([[a, b], [c, d]])
-    }
-
     /// One control tick: the command acts from now to the next tick.
     pub fn step(&mut self, tick: &Tick) {
         self.stride(std::slice::from_ref(tick), None);

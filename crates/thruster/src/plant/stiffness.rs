@@ -1,8 +1,10 @@
 //! How fast a stated rig settles: whether explicit steps of a tick follow it, and how many implicit ones a tick takes.
 
+use super::{Balance, Driven, FLOW, Local, Plant, SPEED, STATES};
 use crate::blade::{BladeRow, Swirl};
 use crate::models::{DriveInput, Model, Model2, ModelName};
 use crate::parameters::{Parameter as P, Parameters};
+use crate::real::Real;
 use crate::rig::{AmplifierKind, Rig};
 
 /// Largest product of decay rate and tick that explicit steps are left to: they stay stable to 2.8, and a
@@ -109,6 +111,48 @@ fn bollard_flow_m_s(p: &Parameters, speed_rad_s: f64) -> f64 {
     let (thrust, _) = p.bollard_coefficients();
     let flux = p.get(P::FluxCoefficient) * p.get(P::DensityKgM3) * p.area_m2();
     speed_rad_s * (thrust / flux).max(0.0).sqrt()
+}
+
+impl<T: Real> Plant<T> {
+    /// How fast a disturbance of shaft speed and axial flow dies at most, 1/s, where the plant is now and while this drives it:
+    /// the larger eigenvalue of the rates' derivative. A voltage or a power that stands brakes by the winding too.
+    pub fn fastest_decay_1_s(&self, driven: Driven) -> f64 {
+        let braked_a_s_rad = self.braked_a_s_rad(driven);
+        let rates = |place: usize, by: f64| {
+            let mut x = self.x;
+            x[place] += T::from(by);
+            let less_a = if place == SPEED { braked_a_s_rad * by } else { 0.0 };
+            let at = Local {
+                shaft_speed_rad_s: x[SPEED],
+                axial_m_s: x[FLOW],
+                current_a: self.at.current_a - T::from(less_a),
+                ..self.at
+            };
+            let rates = self.rates::<true, true, STATES>(&x, &at, &mut Balance::default());
+            [rates[SPEED].re(), rates[FLOW].re()]
+        };
+        let here = rates(SPEED, 0.0);
+        let [[a, c], [b, d]] = [SPEED, FLOW].map(|place| {
+            let by = 1e-6 * self.x[place].re().abs().max(1e-3);
+            let there = rates(place, by);
+            [(there[0] - here[0]) / by, (there[1] - here[1]) / by]
+        });
+        fastest_1_s([[a, b], [c, d]])
+    }
+
+    /// How much less current flows for each rad/s that the shaft is faster, A s: once the winding's lag is over.
+    fn braked_a_s_rad(&self, driven: Driven) -> f64 {
+        let kt = self.constants.torque_constant_nm_a.re();
+        let ohm = self.constants.resistance_ohm.re().max(1e-9);
+        match (driven, self.amplifier) {
+            (Driven::Command, AmplifierKind::Voltage) => kt / ohm,
+            (Driven::Power(..), _) => {
+                let current_a = self.at.current_a.re().abs();
+                kt * current_a / (2.0 * ohm * current_a + kt * self.x[SPEED].re().abs()).max(1e-9)
+            }
+            _ => 0.0,
+        }
+    }
 }
 
 /// The largest eigenvalue of a matrix by size.

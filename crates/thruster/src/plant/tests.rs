@@ -141,13 +141,26 @@ fn a_disturbance_dies_at_the_rate_that_is_told() {
     let settle = |by_m_s: f64| {
         let mut plant: Plant = Plant::new(ModelName::Model2, &rig, &parameters, &[], 1e-4);
         plant.start(0.0, 20.0, 0.5 + by_m_s, 0.0, 0.0);
-        let told = plant.fastest_decay_1_s();
+        let told = plant.fastest_decay_1_s(Driven::Command);
         plant.step(&Tick::default());
         (told, plant.truth().axial_m_s)
     };
     let ((told, calm), (_, disturbed)) = (settle(0.0), settle(1e-3));
     let dies = (1.0 - (disturbed - calm) / 1e-3) / 1e-4;
     assert!(told > 0.9 * dies && told < 2.0 * dies, "{told} {dies}");
+}
+
+/// A ball screw's motor on a voltage drive, with hardly any friction: the winding brakes it.
+#[test]
+fn a_voltage_that_stands_brakes() {
+    let rig = "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = 1e-4\ntorque_constant_nm_a = 0.1\n\
+               winding_resistance_ohm = 1.0\n[amplifier]\nkind = \"voltage\"\n[sensors]\n";
+    let rig = Rig::from_toml(rig).expect("a rig");
+    let mut plant: Plant = Plant::new(ModelName::Model2, &rig, &Parameters::stated(&rig), &[], 1e-3);
+    plant.start(0.0, 5.0, 0.0, 0.0, 0.0);
+    let told = plant.fastest_decay_1_s(Driven::Command);
+    assert!((told / (0.1 * 0.1 / 1e-4) - 1.0).abs() < 1e-3, "{told}");
+    assert!(plant.fastest_decay_1_s(Driven::Current(1.0, 1.0)) < 1e-3);
 }
 
 /// A propeller of 76 mm in air on a voltage drive: the flow through the disc settles within a tick.
