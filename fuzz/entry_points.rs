@@ -58,7 +58,10 @@ pub fn description(text: &str) -> Result<(), String> {
         let _ = kind.check(text, Path::new(NAME));
     }
     let table: toml::Table = text.parse().map_err(|e: toml::de::Error| e.to_string())?;
-    Kind::of(&table).check(text, Path::new(NAME)).map_err(|e| located("", e))
+    Kind::of(&table).check(text, Path::new(NAME)).map_err(|wrong| {
+        assert!(!wrong.is_empty(), "refused without a word");
+        wrong.into_iter().map(|words| located("", words)).collect::<Vec<_>>().join("\n")
+    })
 }
 
 /// A deployment, read by every process that takes its part of it.

@@ -119,7 +119,7 @@ fn one(file: &Path, text: &str, found: &mut Found) {
     }
     match described(&table, text, file) {
         Ok(left_out) => found.unused(&name, left_out),
-        Err(words) => found.problems.push(problem(&name, &words)),
+        Err(wrong) => found.problems.extend(wrong.iter().map(|words| problem(&name, words))),
     }
 }
 
@@ -129,15 +129,15 @@ fn described(
     table: &toml::Table,
     text: &str,
     file: &Path,
-) -> Result<Vec<(&'static str, &'static str)>, String> {
+) -> Result<Vec<(&'static str, &'static str)>, Vec<String>> {
     let kind = kort_lab::check::Kind::of(table);
     kind.check(text, file).map(|()| kind.left_out(text))
 }
 
 /// Rigs are read with the deployment that names them.
 #[cfg(not(feature = "lab"))]
-fn described(_: &toml::Table, _: &str, _: &Path) -> Result<Vec<(&'static str, &'static str)>, String> {
-    Err("this kort was built without its laboratory, and reads deployments only\nhint: check it with a whole one".into())
+fn described(_: &toml::Table, _: &str, _: &Path) -> Result<Vec<(&'static str, &'static str)>, Vec<String>> {
+    Err(vec!["this kort was built without its laboratory, and reads deployments only\nhint: check it with a whole one".into()])
 }
 
 /// Everything that servo, controller and gateway would refuse.
@@ -164,7 +164,7 @@ fn services(config: &Config) -> Vec<String> {
     said.extend(kort_servo::problems(config).iter().map(ToString::to_string));
     #[cfg(feature = "controller")]
     for id in config.thrusters.keys() {
-        said.extend(kort_controller::check(config, id).err().map(|e| e.to_string()));
+        said.extend(kort_controller::problems(config, id).iter().map(ToString::to_string));
     }
     #[cfg(feature = "gateway")]
     said.extend(kort_gateway::check_config(config).iter().map(ToString::to_string));

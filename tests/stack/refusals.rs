@@ -279,3 +279,43 @@ fn an_effect_that_no_law_uses_is_named_by_the_check() {
         assert!(unused[0]["why"].as_str().is_some_and(|why| why.contains("observer")), "{report}");
     }
 }
+
+/// A rig description that is wrong in several places is told in full, asked for itself or with the deployment that names
+/// it, in the same words; and the rest of the deployment is looked at all the same.
+#[test]
+fn all_that_is_wrong_with_a_rig_is_said_at_once() {
+    let site = Site::new();
+    let rig = site.folder.path().join("bent.toml");
+    let bent = include_str!("../../config/thrusters/whitcomb-yoerger-1999.toml")
+        .replace("radius_m = 0.13 ", "radius_m = 130 ")
+        .replace("log_rate_hz", "log_rate_hertz")
+        .replace("inertia_kg_m2 = 0.01", "efficiency = 0.9")
+        .replace("\"not recorded\"", "\"no\"");
+    std::fs::write(&rig, format!("{bent}\n[[effects]]\neffect = \"colomb_friction\"\n")).unwrap();
+    let text = std::fs::read_to_string(site.config()).unwrap();
+    let stated = concat!(env!("CARGO_MANIFEST_DIR"), "/config/thrusters/whitcomb-yoerger-1999.toml");
+    let text = text.replace(stated, rig.to_str().unwrap()).replace("velocity_servo", "velocity");
+    std::fs::write(site.config(), text).unwrap();
+    let problems = |file: &std::path::Path| {
+        let out = run(std::process::Command::new(common::KORT).args(["check", "--json"]).arg(file));
+        assert_eq!(out.status.code(), Some(2), "{}", String::from_utf8_lossy(&out.stderr));
+        let report: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+        report["problems"].as_array().unwrap().clone()
+    };
+    let of_rig = problems(&rig);
+    let mut keys: Vec<_> = of_rig.iter().filter_map(|problem| problem["key"].as_str()).collect();
+    keys.sort_unstable();
+    let wanted = [
+        "effects[0].effect",
+        "motor.efficiency",
+        "motor.inertia_kg_m2",
+        "propeller.radius_m",
+        "sensors.ambient_flow",
+        "sensors.log_rate_hertz",
+    ];
+    assert_eq!(keys, wanted, "{of_rig:?}");
+    let mut of_deployment = problems(&site.config());
+    let law = of_deployment.iter().position(|problem| problem["key"] == "thrusters.t1.controller.law");
+    of_deployment.remove(law.expect("the law is looked at too"));
+    assert_eq!(of_deployment, of_rig);
+}

@@ -14,4 +14,4 @@ pub mod tick;
 mod workshop;
 
 #[cfg(feature = "process")]
-pub use process::{ControllerError, check, run};
+pub use process::{ControllerError, check, problems, run};

@@ -71,13 +71,36 @@ pub enum ControllerError {
 /// # Errors
 /// [`ControllerError`] names file, key, value and what is allowed.
 pub fn check(config: &Config, id: &str) -> Result<(), ControllerError> {
-    let thruster = config.thruster(id)?;
-    let (file, text) = config.rig_text(id, thruster)?;
-    let rig = Rig::from_toml(&text).map_err(|error| ControllerError::Rig { file: file.clone(), error })?;
-    let law = law(config, id, thruster)?;
-    Tick::new(&rig, &law, thruster.controller_period_ns(), 0)
-        .map_err(|error| ControllerError::Model { file, error })?;
-    Ok(())
+    problems(config, id).into_iter().next().map_or(Ok(()), Err)
+}
+
+/// Everything that keeps the controller of this thruster from starting; each names file, key, value and what is allowed.
+pub fn problems(config: &Config, id: &str) -> Vec<ControllerError> {
+    let thruster = match config.thruster(id) {
+        Ok(thruster) => thruster,
+        Err(error) => return vec![error.into()],
+    };
+    let mut wrong = Vec::new();
+    let rig = match config.rig_text(id, thruster) {
+        Ok((file, text)) => match Rig::from_toml_with_all(&text) {
+            Ok(rig) => Some((file, rig)),
+            Err(errors) => {
+                let of_rig = |error| ControllerError::Rig { file: file.clone(), error };
+                wrong.extend(errors.into_iter().map(of_rig));
+                None
+            }
+        },
+        Err(error) => {
+            wrong.push(error.into());
+            None
+        }
+    };
+    let law = law(config, id, thruster).map_err(|error| wrong.push(error)).ok();
+    if let (Some((file, rig)), Some(law)) = (rig, law) {
+        let tick = Tick::new(&rig, &law, thruster.controller_period_ns(), 0);
+        wrong.extend(tick.err().map(|error| ControllerError::Model { file, error }));
+    }
+    wrong
 }
 
 /// Runs the controller of one thruster until SIGTERM, SIGINT or SIGHUP. `latched` are faults that its predecessor had latched: they outlive it until somebody clears them.

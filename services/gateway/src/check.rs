@@ -88,8 +88,8 @@ fn can_write(folder: &Path) -> io::Result<()> {
 /// What is wrong with this configuration for a gateway: reads all that it reads, and touches no address. Each names
 /// file, key, value and what is allowed.
 pub fn check_config(config: &Config) -> Vec<GatewayError> {
-    let mut wrong: Vec<GatewayError> =
-        settings::thrusters(config).err().into_iter().map(Into::into).collect();
+    let (_, of_files) = settings::thrusters_with_all(config);
+    let mut wrong: Vec<GatewayError> = of_files.into_iter().map(Into::into).collect();
     match Settings::new_unchecked(config) {
         Err(error) => wrong.push(error.into()),
         Ok(settings) => {
@@ -111,7 +111,7 @@ pub fn check_config(config: &Config) -> Vec<GatewayError> {
 /// Effects of the deployment's rigs that no control law and no observer uses: file of the rig, effect, and why.
 pub fn unused_effects(config: &Config) -> Vec<(String, &'static str, &'static str)> {
     let mut unused = Vec::new();
-    for deployed in settings::thrusters(config).unwrap_or_default() {
+    for deployed in settings::thrusters_with_all(config).0 {
         let (file, text) = deployed.rig;
         let Ok(rig) = Rig::from_toml(&text) else { continue };
         for (effect, why) in uses::left_out(&rig, deployed.heartbeat.as_secs_f64()) {

@@ -304,36 +304,52 @@ fn range(model: Option<&ControlModel>, speed_limit_rad_s: Option<f64>) -> Setpoi
 /// # Errors
 /// [`ConfigError`] if a rig cannot be read.
 pub fn thrusters(config: &Config) -> Result<Vec<Deployed>, ConfigError> {
-    config
-        .thrusters
-        .iter()
-        .map(|(id, thruster)| {
-            let (file, text) = config.rig_text(id, thruster)?;
-            let rig = Rig::from_toml(&text)
-                .map_err(|error| ConfigError { file: file.clone(), message: error.to_string() })?;
-            let heartbeat = Duration::from_nanos(thruster.controller_period_ns());
-            let speed_limit_rad_s = thruster
-                .limits
-                .get("speed_rad_s")
-                .and_then(|v| v.as_float().or(v.as_integer().map(|v| v as f64)));
-            let model = ControlModel::from_rig(&rig, heartbeat.as_secs_f64());
-            let range = range(model.as_ref().ok(), speed_limit_rad_s);
-            let servo_silence = Duration::from_nanos(
-                (5 * thruster.servo_period_ns()).max(2 * thruster.controller_period_ns()),
-            );
-            let drive = rig.amplifier.kind;
-            Ok(Deployed {
-                id: id.clone(),
-                rig: (file, text),
-                servo_silence,
-                range,
-                controller: controller(config, id, thruster)?,
-                heartbeat,
-                drive,
-                speed_limit_rad_s,
-            })
+    let (thrusters, wrong) = thrusters_with_all(config);
+    wrong.into_iter().next().map_or(Ok(thrusters), Err)
+}
+
+/// Those of the thrusters that can be read, and everything that is wrong with the files of the others.
+pub fn thrusters_with_all(config: &Config) -> (Vec<Deployed>, Vec<ConfigError>) {
+    let mut wrong = Vec::new();
+    let read = config.thrusters.iter().filter_map(|(id, thruster)| {
+        let rig = match config.rig_text(id, thruster) {
+            Ok((file, text)) => match Rig::from_toml_with_all(&text) {
+                Ok(rig) => Some((file, text, rig)),
+                Err(errors) => {
+                    let words = errors.iter().map(ToString::to_string);
+                    wrong.extend(words.map(|message| ConfigError { file: file.clone(), message }));
+                    None
+                }
+            },
+            Err(error) => {
+                wrong.push(error);
+                None
+            }
+        };
+        let controller = controller(config, id, thruster).map_err(|error| wrong.push(error)).ok();
+        let ((file, text, rig), controller) = (rig?, controller?);
+        let heartbeat = Duration::from_nanos(thruster.controller_period_ns());
+        let speed_limit_rad_s = thruster
+            .limits
+            .get("speed_rad_s")
+            .and_then(|v| v.as_float().or(v.as_integer().map(|v| v as f64)));
+        let model = ControlModel::from_rig(&rig, heartbeat.as_secs_f64());
+        let range = range(model.as_ref().ok(), speed_limit_rad_s);
+        let servo_silence =
+            Duration::from_nanos((5 * thruster.servo_period_ns()).max(2 * thruster.controller_period_ns()));
+        Some(Deployed {
+            id: id.clone(),
+            rig: (file, text),
+            servo_silence,
+            range,
+            controller,
+            heartbeat,
+            drive: rig.amplifier.kind,
+            speed_limit_rad_s,
         })
-        .collect()
+    });
+    let read = read.collect();
+    (read, wrong)
 }
 
 /// The file of law, observer and estimator; the deployment's law goes before its own.

@@ -35,20 +35,26 @@ impl Kind {
         }
     }
 
-    /// Reads the text as this kind is read; words that name key, value and what is allowed.
+    /// Reads the text as this kind is read; words that name key, value and what is allowed. Of a rig everything that is wrong,
+    /// of the other kinds the first that their readers find.
     ///
     /// # Errors
-    /// What is wrong with it.
-    pub fn check(self, text: &str, path: &Path) -> Result<(), String> {
+    /// What is wrong with it, at least one.
+    pub fn check(self, text: &str, path: &Path) -> Result<(), Vec<String>> {
+        let first = |words: String| vec![words];
         match self {
-            Kind::Rig => Rig::from_toml(text).map(drop).map_err(|e| e.to_string()),
-            Kind::Soak => kort_soak::Scenario::from_toml(text).map(drop),
-            Kind::Scenario => kort_scenario::Scenario::from_toml(text).map(drop).map_err(|e| e.to_string()),
+            Kind::Rig => Rig::from_toml_with_all(text)
+                .map(drop)
+                .map_err(|wrong| wrong.iter().map(ToString::to_string).collect()),
+            Kind::Soak => kort_soak::Scenario::from_toml(text).map(drop).map_err(first),
+            Kind::Scenario => {
+                kort_scenario::Scenario::from_toml(text).map(drop).map_err(|e| first(e.to_string()))
+            }
             Kind::Columns => {
                 let name = path.file_stem().unwrap_or_default().to_string_lossy();
-                ColumnMap::from_toml(&name, text).map(drop).map_err(|e| e.to_string())
+                ColumnMap::from_toml(&name, text).map(drop).map_err(|e| first(e.to_string()))
             }
-            Kind::Controller => ControllerConfig::from_toml(text).map(drop).map_err(|e| e.to_string()),
+            Kind::Controller => ControllerConfig::from_toml(text).map(drop).map_err(|e| first(e.to_string())),
         }
     }
 

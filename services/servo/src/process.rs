@@ -81,9 +81,14 @@ pub fn problems(config: &Config) -> Vec<ServoError> {
 
 /// Everything that keeps the servo of this thruster from starting; what it takes is left in `taken`.
 fn of_one(config: &Config, id: &str, taken: &mut Vec<Taken>) -> Vec<ServoError> {
-    let (thruster, rig) = match rig_of(config, id) {
+    let (thruster, file, text) = match rig_of(config, id) {
         Ok(there) => there,
-        Err(error) => return vec![error],
+        Err(error) => return vec![error.into()],
+    };
+    let of_rig = |error| ServoError::Rig { file: file.clone(), error };
+    let rig = match Rig::from_toml_with_all(&text) {
+        Ok(rig) => rig,
+        Err(errors) => return errors.into_iter().map(of_rig).collect(),
     };
     let mut wrong = Vec::new();
     let settings = Settings::read(config, id, thruster, &rig, &mut wrong);
@@ -98,11 +103,11 @@ fn of_one(config: &Config, id: &str, taken: &mut Vec<Taken>) -> Vec<ServoError> 
     wrong.into_iter().map(Into::into).collect()
 }
 
-fn rig_of<'a>(config: &'a Config, id: &str) -> Result<(&'a Thruster, Rig), ServoError> {
+/// The thruster, and file and text of its rig description.
+fn rig_of<'a>(config: &'a Config, id: &str) -> Result<(&'a Thruster, String, String), ConfigError> {
     let thruster = config.thruster(id)?;
     let (file, text) = config.rig_text(id, thruster)?;
-    let rig = Rig::from_toml(&text).map_err(|error| ServoError::Rig { file, error })?;
-    Ok((thruster, rig))
+    Ok((thruster, file, text))
 }
 
 /// Adds what the devices of a thruster take.
@@ -122,7 +127,8 @@ fn takes(id: &str, drive: Option<&drives::Chosen>, sensors: &[sensors::Chosen], 
 
 /// All that the configuration says of the thruster's servo; nothing is opened yet.
 fn read(config: &Config, id: &str) -> Result<(Settings, drives::Chosen, Vec<sensors::Chosen>), ServoError> {
-    let (thruster, rig) = rig_of(config, id)?;
+    let (thruster, file, text) = rig_of(config, id)?;
+    let rig = Rig::from_toml(&text).map_err(|error| ServoError::Rig { file, error })?;
     let settings = Settings::new(config, id, thruster, &rig)?;
     let (drive, sensors) =
         (drives::choose(config, id, thruster, &rig)?, sensors::choose(config, id, thruster)?);

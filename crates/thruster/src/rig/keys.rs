@@ -59,39 +59,54 @@ pub(super) fn value_error(key: &str, found: impl std::fmt::Display, allowed: &st
     RigError::Value { key: key.into(), found: found.to_string(), allowed: allowed.into(), hint: hint.into() }
 }
 
-pub(super) fn check_keys(table: &toml::Table) -> Result<(), RigError> {
-    let tables: Vec<&str> =
-        ["rig", "propeller", "flow", "motor", "amplifier", "sensors", "load", "run", "effects"].into();
+const TABLES: [&str; 9] =
+    ["rig", "propeller", "flow", "motor", "amplifier", "sensors", "load", "run", "effects"];
+
+/// Tables and keys that kort does not know; what each of them was probably meant to be is left in `meant`, as `table` or
+/// `table.key`.
+pub(super) fn check_keys(table: &toml::Table, wrong: &mut Vec<RigError>, meant: &mut Vec<String>) {
     for (name, value) in table {
-        if !tables.contains(&name.as_str()) {
-            return Err(RigError::UnknownKey {
-                key: name.clone(),
-                hint: nearest(name, tables.iter().copied()),
-            });
+        if !TABLES.contains(&name.as_str()) {
+            let known = TABLES.iter().copied();
+            meant.extend(near(name, known.clone()).map(str::to_owned));
+            wrong.push(RigError::UnknownKey { key: name.clone(), hint: nearest(name, known) });
+            continue;
         }
         // A list, read where its effects are known.
         if name == "effects" {
             continue;
         }
         let Some(inner) = value.as_table() else {
-            return Err(value_error(name, value, "a table", &format!("write [{name}] on a line of its own")));
+            let hint = format!("write [{name}] on a line of its own");
+            wrong.push(value_error(name, value, "a table", &hint));
+            continue;
         };
-        for key in inner.keys() {
-            let known = KEYS.iter().filter(|k| k.0 == name).map(|k| k.1);
-            if !known.clone().any(|k| k == key) {
-                return Err(RigError::UnknownKey { key: format!("{name}.{key}"), hint: nearest(key, known) });
-            }
+        let known = KEYS.iter().filter(|k| k.0 == name).map(|k| k.1);
+        for key in inner.keys().filter(|key| !is_known(name, key)) {
+            meant.extend(near(key, known.clone()).map(|near| format!("{name}.{near}")));
+            wrong.push(RigError::UnknownKey {
+                key: format!("{name}.{key}"),
+                hint: nearest(key, known.clone()),
+            });
         }
     }
-    Ok(())
+}
+
+/// Is it a key of this table, wanted there or not?
+pub(super) fn is_known(table: &str, key: &str) -> bool {
+    KEYS.iter().any(|k| (k.0, k.1) == (table, key))
+}
+
+/// The known word that this one was probably meant to be.
+pub(super) fn near<'a>(word: &str, known: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+    let best = known.max_by(|a, b| strsim::jaro_winkler(a, word).total_cmp(&strsim::jaro_winkler(b, word)));
+    best.filter(|best| strsim::jaro_winkler(best, word) > 0.75)
 }
 
 pub(super) fn nearest<'a>(word: &str, known: impl Iterator<Item = &'a str> + Clone) -> String {
-    let best =
-        known.clone().max_by(|a, b| strsim::jaro_winkler(a, word).total_cmp(&strsim::jaro_winkler(b, word)));
-    match best {
-        Some(b) if strsim::jaro_winkler(b, word) > 0.75 => format!("did you mean `{b}`?"),
-        _ => format!("known here: {}", known.collect::<Vec<_>>().join(", ")),
+    match near(word, known.clone()) {
+        Some(near) => format!("did you mean `{near}`?"),
+        None => format!("known here: {}", known.collect::<Vec<_>>().join(", ")),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::keys::{nearest, value_error};
+use super::keys::{near, nearest, value_error};
 use super::read::quantity;
 use super::{Quantity, Rig, RigError};
 use crate::effects::{self, Descriptor, Scale, Spec};
@@ -49,55 +49,44 @@ impl Rig {
 ///
 /// A strength that is not stated is zero. A shape that is not stated stays at its usual value where what is
 /// stated makes sense without it (a form of the effect), and is missing otherwise.
-pub(super) fn read(table: &toml::Table) -> Result<Vec<KnownEffect>, RigError> {
-    let Some(list) = table.get("effects") else { return Ok(Vec::new()) };
+pub(super) fn read(table: &toml::Table, wrong: &mut Vec<RigError>) -> Vec<KnownEffect> {
+    let mut known = Vec::<KnownEffect>::new();
+    let Some(list) = table.get("effects") else { return known };
     let form = "a list: [[effects]] before each";
     let hint = "write [[effects]], below it effect = \"coulomb_friction\" and its parameters";
-    let list = list.as_array().ok_or_else(|| value_error("effects", "a table or a value", form, hint))?;
+    let Some(list) = list.as_array() else {
+        wrong.push(value_error("effects", "a table or a value", form, hint));
+        return known;
+    };
     if list.len() > MOST {
-        return Err(value_error("effects", list.len(), "at most 8 effects", "keep those that matter most"));
+        wrong.push(value_error("effects", list.len(), "at most 8 effects", "keep those that matter most"));
     }
-    let mut known = Vec::<KnownEffect>::new();
     for (k, entry) in list.iter().enumerate() {
-        let entry =
-            entry.as_table().ok_or_else(|| value_error(&format!("effects[{k}]"), entry, form, hint))?;
-        let one = read_one(&format!("effects[{k}]"), entry)?;
+        let at = format!("effects[{k}]");
+        let Some(entry) = entry.as_table() else {
+            wrong.push(value_error(&at, entry, form, hint));
+            continue;
+        };
+        let Some(one) = read_one(&at, entry, wrong) else { continue };
         if known.iter().any(|other| other.effect == one.effect) {
-            let key = format!("effects[{k}].effect");
-            return Err(value_error(&key, one.effect, "each effect once", "put the values in one entry"));
+            let key = format!("{at}.effect");
+            wrong.push(value_error(&key, one.effect, "each effect once", "put the values in one entry"));
         }
         known.push(one);
     }
-    Ok(known)
+    known
 }
 
-fn read_one(at: &str, entry: &toml::Table) -> Result<KnownEffect, RigError> {
-    let key = format!("{at}.effect");
-    let id = match entry.get("effect") {
-        Some(toml::Value::String(id)) => id,
-        Some(other) => return Err(value_error(&key, other, "a text in quotes", "the effect's identifier")),
-        None => {
-            return Err(RigError::Missing { key, hint: "name it: effect = \"coulomb_friction\"".into() });
-        }
-    };
-    let Some(descriptor) = effects::find(id) else {
-        let ids = effects::ALL.iter().map(|d| d.id);
-        let hint = nearest(id, ids);
-        return Err(value_error(&key, id, "an identifier of the catalogue (`kort explain`)", &hint));
-    };
-    if descriptor.nonparametric {
-        let why = "changes freely with time and has no lasting sizes";
-        return Err(value_error(
-            &key,
-            id,
-            "an effect with lasting sizes",
-            &format!("{id} {why}; leave it out"),
-        ));
-    }
+/// One of the list; none where it is not known which effect it is.
+fn read_one(at: &str, entry: &toml::Table, wrong: &mut Vec<RigError>) -> Option<KnownEffect> {
+    let descriptor = named(at, entry).map_err(|error| wrong.push(error)).ok()?;
     let specs = (descriptor.parameters)(&Scale::ANY);
-    if let Some(odd) = entry.keys().find(|k| *k != "effect" && specs.iter().all(|s| s.name != k.as_str())) {
-        let hint = nearest(odd, specs.iter().map(|s| s.name));
-        return Err(RigError::UnknownKey { key: format!("{at}.{odd}"), hint });
+    let names = specs.iter().map(|s| s.name);
+    // What misspelt keys were meant to be is not missing besides.
+    let mut meant = Vec::new();
+    for odd in entry.keys().filter(|k| *k != "effect" && specs.iter().all(|s| s.name != k.as_str())) {
+        meant.extend(near(odd, names.clone()));
+        wrong.push(RigError::UnknownKey { key: format!("{at}.{odd}"), hint: nearest(odd, names.clone()) });
     }
     let stated: Vec<usize> = (0..specs.len()).filter(|k| entry.contains_key(specs[*k].name)).collect();
     let (mut parameters, mut missing) = (Vec::new(), Vec::new());
@@ -105,7 +94,10 @@ fn read_one(at: &str, entry: &toml::Table) -> Result<KnownEffect, RigError> {
         let value = match entry.get(spec.name) {
             Some(found) => {
                 let key = format!("{at}.{}", spec.name);
-                in_range(&key, quantity(&key, found)?, spec)?
+                let value = quantity(&key, found, wrong);
+                let value = value.and_then(|value| in_range(&key, value, spec, wrong));
+                // Never seen: a rig with which something is wrong is none.
+                value.unwrap_or(Quantity::exact(f64::NAN))
             }
             None if !spec.shape => Quantity::exact(if spec.held { spec.mean } else { 0.0 }),
             None if needed(descriptor, &specs, &stated, k) => {
@@ -116,25 +108,48 @@ fn read_one(at: &str, entry: &toml::Table) -> Result<KnownEffect, RigError> {
         };
         parameters.push((spec.name, value));
     }
+    missing.retain(|spec| !meant.contains(&spec.name));
+    let strength = |k: &Spec| !k.shape && !k.held;
+    let (any, stated) = (specs.iter().any(strength), stated.iter().any(|k| !specs[*k].shape));
     if !missing.is_empty() {
         let keys: Vec<_> = missing.iter().map(|s| format!("{at}.{}", s.name)).collect();
         let unit = |spec: &Spec| if spec.unit == "1" { String::new() } else { format!(" [{}]", spec.unit) };
         let add: Vec<_> = missing.iter().map(|s| format!("{} = …{}", s.name, unit(s))).collect();
-        return Err(RigError::Missing {
+        wrong.push(RigError::Missing {
             key: keys.join("`, `"),
             hint: format!("add {} to the effect", add.join(", ")),
         });
-    }
-    if stated.iter().all(|k| specs[*k].shape) && specs.iter().any(|s| !s.shape && !s.held) {
+    } else if any && !stated && !specs.iter().any(|s| !s.shape && meant.contains(&s.name)) {
         let names: Vec<_> = specs.iter().filter(|s| !s.shape).map(|s| s.name).collect();
         let hint = format!("the effect is nothing without one of {}", names.join(", "));
-        return Err(RigError::Missing { key: format!("{at}.{}", names[0]), hint });
+        wrong.push(RigError::Missing { key: format!("{at}.{}", names[0]), hint });
     }
-    Ok(KnownEffect { effect: descriptor.id, parameters })
+    Some(KnownEffect { effect: descriptor.id, parameters })
+}
+
+/// The effect of the catalogue that an entry names.
+fn named(at: &str, entry: &toml::Table) -> Result<&'static Descriptor, RigError> {
+    let key = format!("{at}.effect");
+    let id = match entry.get("effect") {
+        Some(toml::Value::String(id)) => id,
+        Some(other) => return Err(value_error(&key, other, "a text in quotes", "the effect's identifier")),
+        None => {
+            return Err(RigError::Missing { key, hint: "name it: effect = \"coulomb_friction\"".into() });
+        }
+    };
+    let Some(descriptor) = effects::find(id) else {
+        let hint = nearest(id, effects::ALL.iter().map(|d| d.id));
+        return Err(value_error(&key, id, "an identifier of the catalogue (`kort explain`)", &hint));
+    };
+    if descriptor.nonparametric {
+        let hint = format!("{id} changes freely with time and has no lasting sizes; leave it out");
+        return Err(value_error(&key, id, "an effect with lasting sizes", &hint));
+    }
+    Ok(descriptor)
 }
 
 /// A value whose sign the effect allows; how large it may be depends on the rig.
-fn in_range(key: &str, quantity: Quantity, spec: &Spec) -> Result<Quantity, RigError> {
+fn in_range(key: &str, quantity: Quantity, spec: &Spec, wrong: &mut Vec<RigError>) -> Option<Quantity> {
     let value = quantity.value;
     let (allowed, fits) = if spec.low > 0.0 {
         ("above 0", value > 0.0)
@@ -144,15 +159,11 @@ fn in_range(key: &str, quantity: Quantity, spec: &Spec) -> Result<Quantity, RigE
         ("a finite number", true)
     };
     if fits && value.is_finite() {
-        Ok(quantity)
-    } else {
-        Err(value_error(
-            key,
-            value,
-            &format!("{allowed} [{}]", spec.unit),
-            "`kort explain` tells its equation",
-        ))
+        return Some(quantity);
     }
+    let allowed = format!("{allowed} [{}]", spec.unit);
+    wrong.push(value_error(key, value, &allowed, "`kort explain` tells its equation"));
+    None
 }
 
 /// Whether the shape at this place must be stated, with those that are.
@@ -176,7 +187,9 @@ mod tests {
     fn all_that_an_effect_lacks_is_said_at_once() {
         let lacks = |effect: &Descriptor| {
             let table: toml::Table = format!("effect = \"{}\"", effect.id).parse().unwrap();
-            read_one("effects[0]", &table).err().map(|e| e.to_string())
+            let mut wrong = Vec::new();
+            read_one("effects[0]", &table, &mut wrong);
+            wrong.first().map(RigError::to_string)
         };
         let mut several = 0;
         for effect in effects::ALL {

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::keys::value_error;
+use super::keys::is_known;
 use super::read::Reader;
 use super::{Quantity, RigError};
 use crate::parameters::Parameter;
@@ -70,53 +70,53 @@ impl Load {
     }
 
     /// The section `[load]`; none without one.
-    pub(super) fn read(t: &Reader) -> Result<Self, RigError> {
-        let need = |key| t.need("load", key);
-        let (load, keys): (Self, &[&str]) = match t.text("load", "kind")?.as_deref() {
-            None | Some("none") => (Self::None, &[]),
-            Some("pendulum") => (
-                Self::Pendulum { mass_kg: need("mass_kg")?, length_m: need("length_m")? },
+    pub(super) fn read(t: &mut Reader) -> Self {
+        let kinds = ["none", "pendulum", "two_mass", "fan", "slide"].map(|kind| (kind, kind));
+        let hint = "say what else hangs on the shaft, or leave [load] out";
+        let before = t.wrong.len();
+        let kind = t.choice("load", "kind", &kinds, hint).unwrap_or("none");
+        // Which keys belong to a kind that nobody knows is not known either.
+        if t.wrong.len() > before {
+            return Self::None;
+        }
+        let mut need = |key| t.need("load", key);
+        let (load, keys): (Self, &[&str]) = match kind {
+            "pendulum" => (
+                Self::Pendulum { mass_kg: need("mass_kg"), length_m: need("length_m") },
                 &["mass_kg", "length_m"],
             ),
-            Some("two_mass") => (
+            "two_mass" => (
                 Self::TwoMass {
-                    inertia_kg_m2: need("inertia_kg_m2")?,
-                    stiffness_nm_rad: need("stiffness_nm_rad")?,
-                    damping_nm_s: need("damping_nm_s")?,
+                    inertia_kg_m2: need("inertia_kg_m2"),
+                    stiffness_nm_rad: need("stiffness_nm_rad"),
+                    damping_nm_s: need("damping_nm_s"),
                 },
                 &["inertia_kg_m2", "stiffness_nm_rad", "damping_nm_s"],
             ),
-            Some("fan") => (
-                Self::Fan { fan_coefficient_nm_s2: need("fan_coefficient_nm_s2")? },
+            "fan" => (
+                Self::Fan { fan_coefficient_nm_s2: need("fan_coefficient_nm_s2") },
                 &["fan_coefficient_nm_s2"],
             ),
-            Some("slide") => (
+            "slide" => (
                 Self::Slide {
-                    mass_kg: need("mass_kg")?,
-                    lead_m_rev: need("lead_m_rev")?,
-                    incline_rad: t.quantity("load", "incline_rad")?.unwrap_or(Quantity::exact(0.0)),
+                    mass_kg: need("mass_kg"),
+                    lead_m_rev: need("lead_m_rev"),
+                    incline_rad: t.quantity("load", "incline_rad").unwrap_or(Quantity::exact(0.0)),
                 },
                 &["mass_kg", "lead_m_rev", "incline_rad"],
             ),
-            Some(other) => {
-                return Err(value_error(
-                    "load.kind",
-                    other,
-                    "\"none\", \"pendulum\", \"two_mass\", \"fan\" or \"slide\"",
-                    "say what else hangs on the shaft, or leave [load] out",
-                ));
-            }
+            _ => (Self::None, &[]),
         };
-        // A quantity of another kind of load is a mistake, not something to pass over.
-        match t.keys("load").find(|key| *key != "kind" && !keys.contains(key)) {
-            None => Ok(load),
-            Some(odd) => Err(RigError::UnknownKey {
-                key: format!("load.{odd}"),
-                hint: match keys {
-                    [] => "this kind of load has no quantities; say kind = \"pendulum\", …".into(),
-                    some => format!("this kind of load has {}", some.join(", ")),
-                },
-            }),
-        }
+        // A quantity of another kind of load is a mistake, not something to pass over; one of no kind is told already.
+        let of_another = |key: &&str| *key != "kind" && !keys.contains(key) && is_known("load", key);
+        let odd: Vec<String> = t.keys("load").filter(of_another).map(str::to_owned).collect();
+        t.wrong.extend(odd.into_iter().map(|odd| RigError::UnknownKey {
+            key: format!("load.{odd}"),
+            hint: match keys {
+                [] => "this kind of load has no quantities; say kind = \"pendulum\", …".into(),
+                some => format!("this kind of load has {}", some.join(", ")),
+            },
+        }));
+        load
     }
 }

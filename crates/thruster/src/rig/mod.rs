@@ -292,6 +292,73 @@ torque_constant_nm_a = 1.25
         );
     }
 
+    /// What is wrong with the paper's rig, with these changes: the key of each, in order.
+    fn wrong_keys(changes: &[(&str, &str)], more: &str) -> Vec<String> {
+        let changed = changes.iter().fold(PAPER.to_owned(), |text, (from, to)| {
+            assert!(text.contains(from), "{from}");
+            text.replacen(from, to, 1)
+        });
+        let text = format!("{changed}{more}");
+        let wrong = Rig::from_toml_with_all(&text).unwrap_err();
+        assert_eq!(Rig::from_toml(&text).unwrap_err(), wrong[0]);
+        wrong
+            .iter()
+            .map(|error| match error {
+                RigError::Syntax { message } => message.clone(),
+                RigError::UnknownKey { key, hint }
+                | RigError::Missing { key, hint }
+                | RigError::Value { key, hint, .. } => {
+                    assert!(!hint.is_empty(), "{error}");
+                    key.clone()
+                }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn all_that_is_wrong_is_said_at_once() {
+        let changes = [
+            ("radius_m = 0.13", "radius_m = 130"),
+            ("[flow]", "[flow]\nsalinity = 35"),
+            ("[motor]", "[motor]\nwinding_resistance_ohm = { value = 0, tol = 5, unit = \"ohm\" }"),
+            ("torque_constant_nm_a", "torque_konstant_nm_a"),
+        ];
+        let more = "[amplifier]\nkind = \"curent\"\n[sensors]\ntorque = 5\nthrust = \"gone\"\n\
+            [load]\nkind = \"pendulum\"\nmass_kg = 0\nlead_m_rev = 1\n\
+            [[effects]]\neffect = \"colomb_friction\"\n\
+            [[effects]]\neffect = \"coulomb_friction\"\ncoulomb_torque_n_m = -1\nodd = 2\n";
+        let mut found = wrong_keys(&changes, more);
+        found.sort();
+        let mut wanted = [
+            "propeller.radius_m",
+            "flow.salinity",
+            "motor.winding_resistance_ohm.unit",
+            "motor.winding_resistance_ohm.tol",
+            "amplifier.kind",
+            // Told once: it is not missing besides.
+            "motor.torque_konstant_nm_a",
+            "sensors.torque",
+            "sensors.thrust",
+            "load.mass_kg",
+            "load.length_m",
+            "load.lead_m_rev",
+            "effects[0].effect",
+            "effects[1].coulomb_torque_n_m",
+            "effects[1].odd",
+        ];
+        wanted.sort_unstable();
+        assert_eq!(found, wanted);
+    }
+
+    #[test]
+    fn all_that_is_missing_is_said_at_once() {
+        let all = Rig::from_toml_with_all("[rig]\nname = \"empty\"\n").unwrap_err();
+        let missing = all.iter().filter(|error| matches!(error, RigError::Missing { .. })).count();
+        assert_eq!((all.len(), missing), (10, 10), "{all:?}");
+        // A table under another name is one mistake, not one for each of its keys.
+        assert_eq!(wrong_keys(&[("[motor]", "[moter]")], ""), ["moter"]);
+    }
+
     #[test]
     fn dry_shaft_needs_no_propeller() {
         let rig = Rig::from_toml(
