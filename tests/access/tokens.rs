@@ -86,6 +86,48 @@ fn a_stream_ends_with_the_token_that_opened_it_and_commands_nothing_more() {
     });
 }
 
+/// A lease's id is no name: who commands with somebody else's is told by the token that it was sent with, whichever way
+/// it came, and the holder beside it.
+#[test]
+fn a_command_under_the_lease_of_another_is_told_by_its_sender() {
+    common::in_real_time(|| {
+        let (site, bridge, mut supervisor) = guarded("pilot");
+        let mate = format!("Bearer {}", token(&site, "mate", "pilot"));
+        let path = |what: &str| format!("{T1}/{what}");
+        let body = r#"{"holder": "desk", "ttl_ms": 60000}"#;
+        let (status, grant) = ask(site.port, "POST", &path("lease"), &[("Authorization", &bridge)], body);
+        assert_eq!(status, 201, "{grant}");
+        let lease = grant["lease_id"].as_str().unwrap();
+        let with = |bearer: &str, method: &str, what: &str, body: &str| {
+            let headers = [("Authorization", bearer), ("Lease-Id", lease)];
+            let (status, answer) = ask(site.port, method, &path(what), &headers, body);
+            assert_eq!(status, 200, "{what}: {answer}");
+        };
+        with(&mate, "POST", "arm", "");
+        with(&bridge, "PUT", "setpoint", r#"{"thrust_n": 5.0}"#);
+        with(&mate, "PUT", "setpoint", r#"{"thrust_n": 6.0}"#);
+        let events = wait("the events", || {
+            let (_, events) = ask(site.port, "GET", "/v1/events", &[("Authorization", &bridge)], "");
+            let of = |event: &Value| {
+                let kind = event["kind"].as_str()?.to_owned();
+                Some((kind, event["who"].as_str()?.to_owned(), event["detail"].as_str()?.to_owned()))
+            };
+            let events: Vec<_> = events.as_array()?.iter().filter_map(of).collect();
+            (events.iter().filter(|(kind, ..)| kind == "commanded").count() == 2).then_some(events)
+        });
+        for (kind, who, words) in [
+            ("armed", "mate", "mate under the lease of desk (bridge) armed"),
+            ("commanded", "desk (bridge)", "desk (bridge) commands thrust_n = 5"),
+            ("commanded", "mate", "mate under the lease of desk (bridge) commands thrust_n = 6"),
+        ] {
+            let wanted = (kind.to_owned(), who.to_owned(), words.to_owned());
+            assert!(events.contains(&wanted), "{wanted:?} in {events:?}");
+        }
+        kill(supervisor.id(), "TERM");
+        supervisor.wait().unwrap();
+    });
+}
+
 /// How long a wrong token takes, and a request that shows it.
 fn a_wrong_token(site: &Site) -> (Duration, String) {
     let token = "Bearer chief.00";

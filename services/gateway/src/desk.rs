@@ -9,11 +9,11 @@ use std::time::{Duration, Instant};
 use kort_proto::events::EventKind;
 
 use crate::excitation::Playing;
-use crate::lease::{Lease, LeaseDesk, Wanted};
+use crate::lease::{By, Lease, LeaseDesk, Wanted};
 use crate::problem::{Kind, Problem};
 use crate::view::{Setpoint, SetpointRange};
 
-/// A setpoint that moves is noted this often.
+/// A setpoint that moves is noted this often, of each that gives one.
 const NOTE_EVERY: Duration = Duration::from_secs(1);
 
 /// Something for the event log.
@@ -27,6 +27,15 @@ pub struct Note {
     pub detail: String,
 }
 
+/// What was noted of the setpoints since the thruster rested.
+#[derive(Debug, Default)]
+struct Noted {
+    /// The newest, and who gave it.
+    newest: Option<(String, Setpoint)>,
+    /// When each that gave one was noted last; as many as there are tokens at most.
+    last: Vec<(String, Instant)>,
+}
+
 /// Lease and setpoint of one thruster.
 #[derive(Debug)]
 pub struct Desk {
@@ -34,12 +43,14 @@ pub struct Desk {
     /// Who may command.
     pub lease: LeaseDesk,
     setpoint: Option<Setpoint>,
+    /// Who gave it.
+    by: By,
     given: Option<Instant>,
     generation: u64,
     accepted: u64,
     version: u64,
     notes: Vec<Note>,
-    noted: Option<(Instant, Setpoint)>,
+    noted: Noted,
     /// The test signal that plays, or the last one.
     excitation: Option<Playing>,
 }
@@ -51,12 +62,13 @@ impl Desk {
             thruster: thruster.to_owned(),
             lease: LeaseDesk::default(),
             setpoint: None,
+            by: By::default(),
             given: None,
             generation: 0,
             accepted: 0,
             version: 0,
             notes: Vec::new(),
-            noted: None,
+            noted: Noted::default(),
             excitation: None,
         }
     }
@@ -110,20 +122,27 @@ impl Desk {
         self.lease.renew(&self.thruster, id, now)
     }
 
-    /// Gives command up: at rest.
-    pub fn give(&mut self, id: Option<&str>, now: Instant) -> Result<(), Problem> {
-        let who = self.lease.current(now).map(Lease::who).unwrap_or_default();
+    /// Gives command up: at rest. `token` is what it was asked with, here and below.
+    pub fn give(&mut self, token: &str, id: Option<&str>, now: Instant) -> Result<(), Problem> {
+        let By { who, words } = self.lease.by(token, id);
         self.lease.give(&self.thruster, id, now)?;
         self.version += 1;
         self.rest(now, "command was given up");
-        self.note(EventKind::LeaseGivenUp, &who, format!("{who} gave command up"));
+        self.note(EventKind::LeaseGivenUp, &who, format!("{words} gave command up"));
         Ok(())
     }
 
-    /// Accepts a setpoint from the lease's holder and renews the lease.
-    pub fn command(&mut self, id: Option<&str>, setpoint: Setpoint, now: Instant) -> Result<Lease, Problem> {
+    /// Accepts a setpoint under the lease and renews it.
+    pub fn command(
+        &mut self,
+        token: &str,
+        id: Option<&str>,
+        setpoint: Setpoint,
+        now: Instant,
+    ) -> Result<Lease, Problem> {
         let lease = self.renew(id, now)?;
-        self.end_excitation(now, Some("its holder gave a setpoint"));
+        self.by = self.lease.by(token, id);
+        self.end_excitation(now, Some(&format!("{} gave a setpoint", self.by.words)));
         self.setpoint = Some(setpoint);
         self.given = Some(now);
         self.generation += 1;
@@ -138,7 +157,7 @@ impl Desk {
         if self.setpoint.take().is_some() {
             self.generation += 1;
             self.version += 1;
-            self.noted = None;
+            self.noted = Noted::default();
         }
     }
 
@@ -181,21 +200,30 @@ impl Desk {
         std::mem::take(&mut self.notes)
     }
 
-    /// Notes the setpoint if it changed, at most once a second; the last one is noted in the end.
+    /// Notes the setpoint if it changed or another gave it, of each at most once a second; the last one is noted in the end.
     fn note_setpoint(&mut self, now: Instant) {
         let Some(setpoint) = self.setpoint.filter(|_| self.playing().is_none()) else { return };
-        let due = self
-            .noted
-            .is_none_or(|(at, known)| known != setpoint && now.saturating_duration_since(at) >= NOTE_EVERY);
-        if due {
-            self.noted = Some((now, setpoint));
-            let who = self.lease.holder().unwrap_or_default();
+        let By { who, words } = self.by.clone();
+        if self.noted.newest.as_ref().is_some_and(|(by, known)| *by == who && *known == setpoint) {
+            return;
+        }
+        let last = self.noted.last.iter().find(|(by, _)| *by == who).map(|(_, at)| *at);
+        if last.is_none_or(|at| now.saturating_duration_since(at) >= NOTE_EVERY) {
+            self.noted(now, setpoint);
             let asked = match setpoint {
                 Setpoint::ThrustN(value) => format!("thrust_n = {value}"),
                 Setpoint::SpeedRadS(value) => format!("speed_rad_s = {value}"),
             };
-            self.note(EventKind::Commanded, &who, format!("{who} commands {asked}"));
+            self.note(EventKind::Commanded, &who, format!("{words} commands {asked}"));
         }
+    }
+
+    /// This setpoint of who gave the last one need not be noted any more.
+    fn noted(&mut self, now: Instant, setpoint: Setpoint) {
+        let who = &self.by.who;
+        self.noted.newest = Some((who.clone(), setpoint));
+        self.noted.last.retain(|(by, _)| by != who);
+        self.noted.last.push((who.clone(), now));
     }
 }
 
@@ -241,7 +269,7 @@ mod tests {
         desk.notes();
         for n in 0..250 {
             let now = ms(500 + 10 * n);
-            desk.command(Some(&lease.id), Setpoint::ThrustN(n as f64), now).unwrap();
+            desk.command("local", Some(&lease.id), Setpoint::ThrustN(n as f64), now).unwrap();
         }
         desk.expire(ms(5000));
         let noted: Vec<String> = desk.notes().into_iter().map(|note| note.detail).collect();
@@ -249,11 +277,36 @@ mod tests {
         assert!(noted[3].contains("thrust_n = 249"), "the last one is noted: {noted:?}");
     }
 
+    /// A lease's id is no name: who shows somebody else's is told by the token that it was shown with, at once, and not as
+    /// the holder; the holder is told beside it.
+    #[test]
+    fn who_commands_under_the_lease_of_another_is_told_by_name() {
+        let (mut desk, t0) = (Desk::new("t1"), Instant::now());
+        let ms = |n: u64| t0 + Duration::from_millis(n);
+        let lease =
+            desk.take(&Wanted { token: "chief", ttl_ms: 60_000, ..wants("bridge") }, t0).unwrap();
+        desk.notes();
+        for n in 0..100 {
+            for token in ["chief", "mate"] {
+                desk.command(token, Some(&lease.id), Setpoint::ThrustN(5.0), ms(10 * n)).unwrap();
+            }
+        }
+        let of = |note: Note| (note.who, note.detail);
+        let told: Vec<_> = desk.notes().into_iter().map(of).collect();
+        let mate = ("mate".to_owned(), "mate under the lease of bridge (chief) commands thrust_n = 5".to_owned());
+        let chief = ("bridge (chief)".to_owned(), "bridge (chief) commands thrust_n = 5".to_owned());
+        assert_eq!(told, [chief, mate], "each once in a second");
+        desk.give("mate", Some(&lease.id), ms(2000)).unwrap();
+        let gave = desk.notes().into_iter().map(of).next_back().unwrap();
+        let words = "mate under the lease of bridge (chief) gave command up";
+        assert_eq!(gave, ("mate".to_owned(), words.to_owned()));
+    }
+
     #[test]
     fn who_takes_over_starts_at_rest() {
         let (mut desk, t0) = (Desk::new("t1"), Instant::now());
         let lease = desk.take(&wants("crashed"), t0).unwrap();
-        desk.command(Some(&lease.id), Setpoint::ThrustN(25.0), t0).unwrap();
+        desk.command("local", Some(&lease.id), Setpoint::ThrustN(25.0), t0).unwrap();
         desk.take(&Wanted { takeover: true, ..wants("bridge") }, t0).unwrap();
         assert_eq!(desk.setpoint(), None);
         let last = desk.notes().pop().unwrap();
@@ -269,7 +322,7 @@ mod tests {
     fn a_setpoint_ends_with_its_lease() {
         let (mut desk, t0) = (Desk::new("t1"), Instant::now());
         let lease = desk.take(&wants("bench"), t0).unwrap();
-        desk.command(Some(&lease.id), Setpoint::ThrustN(25.0), t0).unwrap();
+        desk.command("local", Some(&lease.id), Setpoint::ThrustN(25.0), t0).unwrap();
         assert_eq!((desk.setpoint(), desk.accepted()), (Some(Setpoint::ThrustN(25.0)), 1));
         desk.expire(t0 + Duration::from_millis(499));
         assert_eq!(desk.setpoint(), Some(Setpoint::ThrustN(25.0)));
@@ -286,7 +339,7 @@ mod tests {
         let (mut desk, t0) = (Desk::new("t1"), Instant::now());
         let lease = desk.take(&wants("bench"), t0).unwrap();
         let before = desk.version();
-        desk.give(Some(&lease.id), t0).unwrap();
+        desk.give("local", Some(&lease.id), t0).unwrap();
         assert_ne!(desk.version(), before);
     }
 

@@ -43,6 +43,16 @@ impl Lease {
     }
 }
 
+/// Who did something, for the event log: whoever's token it was sent with, which need not be the one that the lease was
+/// taken with.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct By {
+    /// The holder of the lease with its token's name, or the name of another's token.
+    pub who: String,
+    /// The same, with the holder where that is somebody else.
+    pub words: String,
+}
+
 /// The lease of one thruster, taken or free.
 #[derive(Debug, Default)]
 pub struct LeaseDesk {
@@ -62,6 +72,20 @@ impl LeaseDesk {
     /// Name of who had or has it, with its token's where that is another.
     pub fn holder(&self) -> Option<String> {
         self.lease.as_ref().map(Lease::who)
+    }
+
+    /// Who does something with this token and this lease. A lease says who answers for the thruster; what its `Lease-Id` is
+    /// sent with says who does it.
+    pub fn by(&self, token: &str, lease: Option<&str>) -> By {
+        let one = |who: String| By { words: who.clone(), who };
+        match self.lease.as_ref().filter(|held| lease == Some(held.id.as_str())) {
+            Some(held) if held.token == token => one(held.who()),
+            Some(held) => By {
+                who: token.to_owned(),
+                words: format!("{token} under the lease of {}", held.who()),
+            },
+            None => one(token.to_owned()),
+        }
     }
 
     /// Drops a lease whose time is over; true if one was dropped.

@@ -22,7 +22,7 @@ use crate::desk::Desk;
 use crate::events::Events;
 use crate::excitation::ExcitationStep;
 use crate::heard::Heard;
-use crate::lease::{Lease, Wanted};
+use crate::lease::{By, Lease, Wanted};
 use crate::problem::{Kind, Problem};
 use crate::rig::Trial;
 use crate::view::{
@@ -167,8 +167,8 @@ impl Thruster {
     }
 
     /// Gives command up.
-    pub fn give_lease(&self, id: Option<&str>) -> Result<(), Problem> {
-        self.desk().give(id, Instant::now())
+    pub fn give_lease(&self, who: &str, id: Option<&str>) -> Result<(), Problem> {
+        self.desk().give(who, id, Instant::now())
     }
 
     /// Arms, at rest. `who` asks, for the event log; `lease` must be the one in force, if there is one.
@@ -231,12 +231,9 @@ impl Thruster {
     /// Something was done: it is noted, and the lease it was done with lives on.
     pub fn did(&self, who: &str, lease: Option<&str>, kind: EventKind, what: &str) {
         let mut desk = self.desk();
-        let who = match (lease, desk.lease.holder()) {
-            (Some(_), Some(holder)) => holder,
-            _ => who.to_owned(),
-        };
+        let By { who, words } = desk.lease.by(who, lease);
         desk.done(lease, Instant::now());
-        desk.note(kind, &who, format!("{who} {what}"));
+        desk.note(kind, &who, format!("{words} {what}"));
     }
 
     /// The thruster's state, rendered at most once for each sample heard.

@@ -7,12 +7,14 @@ use kort_proto::events::EventKind;
 
 use super::Desk;
 use crate::excitation::{Ended, Playing, Prepared};
+use crate::lease::By;
 use crate::problem::{Kind, Problem};
 
 impl Desk {
-    /// Begins a test signal for the lease's holder, in place of the setpoint. Returns its number.
+    /// Begins a test signal under the lease, in place of the setpoint. Returns its number.
     pub fn excite(
         &mut self,
+        token: &str,
         id: Option<&str>,
         signal: Arc<Prepared>,
         recording: Option<String>,
@@ -25,8 +27,9 @@ impl Desk {
             return Err(Problem::new(Kind::ExcitationActive, words).hint("DELETE …/excitation ends it"));
         }
         self.renew(id, now)?;
-        let who = self.lease.holder().unwrap_or_default();
-        let words = format!("{who} plays {} for {:.1} s", signal.name, signal.duration_s);
+        self.by = self.lease.by(token, id);
+        let By { who, words } = self.by.clone();
+        let words = format!("{words} plays {} for {:.1} s", signal.name, signal.duration_s);
         self.note(EventKind::ExcitationStarted, &who, words);
         let number = self.excitation.as_ref().map_or(1, |last| last.number + 1);
         let playing = Playing { number, signal, who, began: now, recording, ended: None, diagnosis: None };
@@ -57,7 +60,7 @@ impl Desk {
         let Some(zero) = self.playing().map(|playing| playing.signal.commanded.setpoint(0.0)) else { return };
         self.end_excitation(now, why);
         self.setpoint = Some(zero);
-        self.noted = Some((now, zero));
+        self.noted(now, zero);
         self.generation += 1;
     }
 
@@ -120,7 +123,7 @@ mod tests {
             ..Default::default()
         };
         let signal = Prepared::new(crate::excitation::from_scenario(scenario, None, None), RANGE).unwrap();
-        desk.excite(Some(&lease.id), Arc::new(signal), None, t0).unwrap();
+        desk.excite("local", Some(&lease.id), Arc::new(signal), None, t0).unwrap();
         (desk, lease, t0)
     }
 
@@ -136,7 +139,8 @@ mod tests {
             assert!(desk.generation() <= before + 1, "the same setpoint is no new command");
         }
         let again = Arc::clone(&desk.playing().unwrap().signal);
-        assert!(desk.excite(Some(&lease.id), again, None, t0).unwrap_err().is(Kind::ExcitationActive));
+        let refused = desk.excite("local", Some(&lease.id), again, None, t0).unwrap_err();
+        assert!(refused.is(Kind::ExcitationActive));
         desk.advance(t0 + Duration::from_secs(10));
         assert_eq!((desk.setpoint(), desk.playing().is_none()), (Some(Setpoint::ThrustN(0.0)), true));
         desk.advance(t0 + Duration::from_secs(3));
@@ -150,11 +154,13 @@ mod tests {
         type Happens = fn(&mut Desk, &Lease, Instant);
         let happenings: [(Happens, Option<Setpoint>); 6] = [
             (|desk, _, t| desk.rest(t, "x disarmed"), None),
-            (|desk, lease, t| desk.give(Some(&lease.id), t).unwrap(), None),
+            (|desk, lease, t| desk.give("local", Some(&lease.id), t).unwrap(), None),
             (|desk, _, t| desk.expire(t + Duration::from_secs(60)), None),
             (|desk, _, t| drop(desk.take(&Wanted { takeover: true, ..wants("bridge") }, t).unwrap()), None),
             (
-                |desk, lease, t| drop(desk.command(Some(&lease.id), Setpoint::SpeedRadS(3.0), t).unwrap()),
+                |desk, lease, t| {
+                    drop(desk.command("local", Some(&lease.id), Setpoint::SpeedRadS(3.0), t).unwrap());
+                },
                 Some(Setpoint::SpeedRadS(3.0)),
             ),
             (|desk, _, t| desk.end_excitation_at_zero(t, Some("x ended it")), Some(Setpoint::ThrustN(0.0))),

@@ -49,7 +49,7 @@ struct EventView {
     kind: kort_proto::events::EventKind,
     /// The thruster; null where it concerns all.
     thruster: Option<String>,
-    /// Who did it: holder and token, or a process.
+    /// Who did it: holder and token, the token's name where it is not the one that the lease was taken with, or a process.
     who: String,
     /// What exactly, in words.
     detail: String,

@@ -137,7 +137,7 @@ async fn start(
     } else {
         None
     };
-    let begun = thruster.excite(lease_id.as_deref(), Arc::new(signal), recording.clone());
+    let begun = thruster.excite(&who.name, lease_id.as_deref(), Arc::new(signal), recording.clone());
     let number = match (begun, recording.clone()) {
         (Ok(number), _) => number,
         (Err(problem), None) => return Err(problem),

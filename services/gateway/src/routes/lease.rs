@@ -152,9 +152,10 @@ async fn renew(
         (status = 409, description = "`lease-held`, `lease-lost`", body = Problem, content_type = "application/problem+json")))]
 async fn give(
     State(app): State<Arc<App>>,
+    Extension(who): Extension<Identity>,
     Path(id): Path<String>,
     LeaseId(lease_id): LeaseId,
 ) -> Result<StatusCode, Problem> {
-    app.thruster(&id)?.give_lease(lease_id.as_deref())?;
+    app.thruster(&id)?.give_lease(&who.name, lease_id.as_deref())?;
     Ok(StatusCode::NO_CONTENT)
 }

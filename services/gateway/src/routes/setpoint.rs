@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use axum::extract::State;
+use axum::extract::{Extension, State};
 use serde::Serialize;
 use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
@@ -10,6 +10,7 @@ use utoipa_axum::{router::OpenApiRouter, routes};
 use crate::App;
 use crate::extract::{Json, LeaseId, Path};
 use crate::problem::Problem;
+use crate::token::Identity;
 use crate::view::Setpoint;
 
 pub fn routes() -> OpenApiRouter<Arc<App>> {
@@ -42,10 +43,11 @@ struct Accepted {
         (status = 503, description = "`not-ready`: servo or controller is away", body = Problem, content_type = "application/problem+json")))]
 async fn put(
     State(app): State<Arc<App>>,
+    Extension(who): Extension<Identity>,
     Path(id): Path<String>,
     LeaseId(lease_id): LeaseId,
     Json(setpoint): Json<Setpoint>,
 ) -> Result<axum::Json<Accepted>, Problem> {
-    let (lease, now) = app.thruster(&id)?.command(lease_id.as_deref(), setpoint)?;
+    let (lease, now) = app.thruster(&id)?.command(&who.name, lease_id.as_deref(), setpoint)?;
     Ok(axum::Json(Accepted { setpoint, expires_in_ms: lease.expires_in_ms(now) }))
 }

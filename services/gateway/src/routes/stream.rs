@@ -244,7 +244,7 @@ impl Session {
             |field| Problem::new(Kind::InvalidField, format!("missing field `{field}`")).hint(EXAMPLE);
         let setpoint = incoming.setpoint.ok_or_else(|| missing("setpoint"))?;
         let lease = incoming.lease_id.ok_or_else(|| missing("lease_id"))?;
-        self.thruster.command(Some(&lease), setpoint)?;
+        self.thruster.command(&self.who.name, Some(&lease), setpoint)?;
         self.lease = Some(lease);
         Ok(None)
     }

@@ -13,13 +13,18 @@ use crate::problem::{Kind, Problem};
 use crate::view::Setpoint;
 
 impl Thruster {
-    /// Puts a setpoint in force.
-    pub fn command(&self, lease: Option<&str>, setpoint: Setpoint) -> Result<(Lease, Instant), Problem> {
+    /// Puts a setpoint in force. `who` asks, for the event log, here and below.
+    pub fn command(
+        &self,
+        who: &str,
+        lease: Option<&str>,
+        setpoint: Setpoint,
+    ) -> Result<(Lease, Instant), Problem> {
         check_range(setpoint, self.range())?;
         let now = Instant::now();
         let mut desk = self.desk();
         self.may_command(&mut desk, lease, now)?;
-        desk.command(lease, setpoint, now).map(|lease| (lease, now))
+        desk.command(who, lease, setpoint, now).map(|lease| (lease, now))
     }
 
     /// May this lease command now? Under it, armed, without a fault.
@@ -44,6 +49,7 @@ impl Thruster {
     /// Begins a test signal in place of the setpoint; its number.
     pub fn excite(
         &self,
+        who: &str,
         lease: Option<&str>,
         signal: Arc<Prepared>,
         recording: Option<String>,
@@ -51,7 +57,7 @@ impl Thruster {
         let now = Instant::now();
         let mut desk = self.desk();
         self.may_command(&mut desk, lease, now)?;
-        desk.excite(lease, signal, recording, now)
+        desk.excite(who, lease, signal, recording, now)
     }
 
     /// Ends the test signal that plays: zero setpoint, still under the lease.
