@@ -115,7 +115,7 @@ fn it_is_not_armed_without_a_known_time_out_or_against_somebody() {
         case().cannot_be_armed(&vehicle(copter), "no submarine of ArduPilot's");
         let piloted = Make { piloted: true, ..Make::default() };
         case().cannot_be_armed(&vehicle(piloted), "it is armed by somebody else");
-        let other = Case { keys: "motor = 3, identity = \"0011\"", ..case() };
+        let other = Case { keys: "motor = 3, identity = \"0011000000000000\"", ..case() };
         other.cannot_be_armed(&vehicle(Make::default()), "two drives swapped?");
         let absent = Case { keys: "motor = 12", ..case() };
         absent.cannot_be_armed(&vehicle(Make::default()), "no output of it is motor 12");

@@ -62,7 +62,7 @@ fn it_is_not_armed_without_its_time_out() {
         case().cannot_be_armed(&vesc(off), "does not take its settings");
         let old = Make { firmware: (5, 2), ..Make::default() };
         case().cannot_be_armed(&vesc(old), "firmware 5.02");
-        let other = Case { keys: "pole_pairs = 7, identity = \"0011\"", ..case() };
+        let other = Case { keys: "pole_pairs = 7, identity = \"001100000000000000000000\"", ..case() };
         other.cannot_be_armed(&vesc(Make::default()), "two drives swapped?");
     });
 }

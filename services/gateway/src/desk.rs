@@ -283,8 +283,7 @@ mod tests {
     fn who_commands_under_the_lease_of_another_is_told_by_name() {
         let (mut desk, t0) = (Desk::new("t1"), Instant::now());
         let ms = |n: u64| t0 + Duration::from_millis(n);
-        let lease =
-            desk.take(&Wanted { token: "chief", ttl_ms: 60_000, ..wants("bridge") }, t0).unwrap();
+        let lease = desk.take(&Wanted { token: "chief", ttl_ms: 60_000, ..wants("bridge") }, t0).unwrap();
         desk.notes();
         for n in 0..100 {
             for token in ["chief", "mate"] {
@@ -293,7 +292,8 @@ mod tests {
         }
         let of = |note: Note| (note.who, note.detail);
         let told: Vec<_> = desk.notes().into_iter().map(of).collect();
-        let mate = ("mate".to_owned(), "mate under the lease of bridge (chief) commands thrust_n = 5".to_owned());
+        let mate =
+            ("mate".to_owned(), "mate under the lease of bridge (chief) commands thrust_n = 5".to_owned());
         let chief = ("bridge (chief)".to_owned(), "bridge (chief) commands thrust_n = 5".to_owned());
         assert_eq!(told, [chief, mate], "each once in a second");
         desk.give("mate", Some(&lease.id), ms(2000)).unwrap();

@@ -80,10 +80,9 @@ impl LeaseDesk {
         let one = |who: String| By { words: who.clone(), who };
         match self.lease.as_ref().filter(|held| lease == Some(held.id.as_str())) {
             Some(held) if held.token == token => one(held.who()),
-            Some(held) => By {
-                who: token.to_owned(),
-                words: format!("{token} under the lease of {}", held.who()),
-            },
+            Some(held) => {
+                By { who: token.to_owned(), words: format!("{token} under the lease of {}", held.who()) }
+            }
             None => one(token.to_owned()),
         }
     }

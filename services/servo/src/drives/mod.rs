@@ -1,6 +1,7 @@
 //! Drives. One drive, one file, behind one trait; the loop knows no hardware.
 
 pub mod cia402;
+mod forms;
 pub mod iio;
 mod lying;
 pub mod mavlink;
@@ -25,7 +26,8 @@ use moteus::Moteus;
 use odrive::ODrive;
 pub use simulated::Simulated;
 use vesc::Vesc;
-pub use wired::Wired;
+pub(crate) use forms::DEVICE;
+pub use wired::{Own, Wired};
 
 /// A drive: takes commands, and tells what it measures itself.
 ///
@@ -61,6 +63,7 @@ pub const ALL: [&str; 7] = ["simulated", "vesc", "odrive", "moteus", "cia402", "
 /// # Errors
 /// [`ConfigError`] names the kinds there are.
 pub fn choose(config: &Config, id: &str, thruster: &Thruster, rig: &Rig) -> Result<Chosen, ConfigError> {
+    unread(config, id, thruster)?;
     match thruster.amplifier.as_str() {
         "simulated" => Ok(Chosen::Simulated(Box::new(Simulated::new(config, id, thruster, rig)?))),
         "vesc" => {
@@ -88,6 +91,20 @@ pub fn choose(config: &Config, id: &str, thruster: &Thruster, rig: &Rig) -> Resu
             "`thrusters.{id}.amplifier` = \"{other}\" is no drive\nhint: known are \"{}\"",
             ALL.join("\", \"")
         ))),
+    }
+}
+
+/// The section that this drive does not read: it waits for another `amplifier`, and is held to the names of its keys all the
+/// same, for what is misspelt there is found on the day of the change.
+fn unread(config: &Config, id: &str, thruster: &Thruster) -> Result<(), ConfigError> {
+    if thruster.amplifier != "simulated" {
+        return simulated::check_keys(config, &format!("thrusters.{id}.simulation"), thruster);
+    }
+    let section = format!("thrusters.{id}.drive");
+    if thruster.drive.contains_key("dac") {
+        iio::check_keys(config, &section, thruster)
+    } else {
+        wired::check_keys(config, &section, thruster)
     }
 }
 

@@ -53,6 +53,14 @@ struct EffectKeys {
     values: BTreeMap<String, f64>,
 }
 
+/// Whether these are keys of the simulated stand: a section that is not read now.
+///
+/// # Errors
+/// [`ConfigError`] names the first that is none, and the nearest.
+pub(super) fn check_keys(config: &Config, section: &str, thruster: &Thruster) -> Result<(), ConfigError> {
+    config.section::<Simulation>(section, &thruster.simulation).map(drop)
+}
+
 /// The simulated drive.
 pub struct Simulated {
     plant: Plant,

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use kort_proto::config::{Config, ConfigError, Thruster};
 use serde::Deserialize;
 
+use super::forms::Form;
 use crate::claims::Claim;
 use crate::link::Medium;
 
@@ -12,13 +13,13 @@ use crate::link::Medium;
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct Keys {
-    port: PathBuf,
+    port: Option<PathBuf>,
     baud: u32,
     rate_hz: f64,
     timeout_ms: f64,
     reading_life_ms: f64,
     reversed: bool,
-    identity: String,
+    identity: Option<String>,
     pole_pairs: Option<u32>,
     address: Option<u8>,
     bitrate: Option<u32>,
@@ -31,13 +32,13 @@ impl Default for Keys {
     fn default() -> Self {
         let times = Times::default();
         Self {
-            port: PathBuf::new(),
+            port: None,
             baud: 115_200,
             rate_hz: times.rate_hz,
             timeout_ms: times.timeout_ms,
             reading_life_ms: times.reading_life_ms,
             reversed: false,
-            identity: String::new(),
+            identity: None,
             pole_pairs: None,
             address: None,
             bitrate: None,
@@ -114,6 +115,24 @@ const OWN: [(&str, &str, &str); 6] = [
     ("motor", "this drive has one motor", "leave the key out"),
 ];
 
+/// What of the section's keys is a drive's own.
+pub struct Own {
+    /// Those of the keys that not every drive has which this one has.
+    pub keys: &'static [&'static str],
+    /// What leads to it.
+    pub port: Form,
+    /// How its maker's number is written.
+    pub identity: Form,
+}
+
+/// Whether these are keys of a drive on a wire: a section that is not read now.
+///
+/// # Errors
+/// [`ConfigError`] names the first that is none, and the nearest.
+pub(super) fn check_keys(config: &Config, section: &str, thruster: &Thruster) -> Result<(), ConfigError> {
+    config.section::<Keys>(section, &thruster.drive).map(drop)
+}
+
 /// A drive on a wire, as the configuration describes it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Wired {
@@ -148,24 +167,27 @@ pub struct Wired {
 }
 
 impl Wired {
-    /// Reads and checks the section; `own` are those of the keys that not every drive has which this one has.
+    /// Reads and checks the section.
     ///
     /// # Errors
     /// [`ConfigError`] names key, value and what is allowed.
-    pub fn new(config: &Config, id: &str, thruster: &Thruster, own: &[&str]) -> Result<Self, ConfigError> {
+    pub fn new(config: &Config, id: &str, thruster: &Thruster, own: &Own) -> Result<Self, ConfigError> {
         let section = format!("thrusters.{id}.drive");
         let keys: Keys = config.section(&section, &thruster.drive)?;
         let fail = |key: &str, words: String| Err(config.error(format!("`{section}.{key}` {words}")));
         for (key, why, hint) in OWN {
-            if let Some(value) = thruster.drive.get(key).filter(|_| !own.contains(&key)) {
+            if let Some(value) = thruster.drive.get(key).filter(|_| !own.keys.contains(&key)) {
                 return fail(key, format!("= {value}: {why}\nhint: {hint}"));
             }
         }
-        if keys.port.as_os_str().is_empty() {
-            return fail(
-                "port",
-                "is missing\nhint: the drive's device, best by its serial number: /dev/serial/by-id/…".into(),
-            );
+        let Some(port) = keys.port else {
+            return fail("port", format!("is missing; allowed is {}\nhint: {}", own.port.allowed, own.port.hint));
+        };
+        if let Err(words) = own.port.check(&port.to_string_lossy()) {
+            return fail("port", words);
+        }
+        if let Some(Err(words)) = keys.identity.as_deref().map(|number| own.identity.check(number)) {
+            return fail("identity", words);
         }
         if !(1200..=12_000_000).contains(&keys.baud) {
             return fail(
@@ -179,13 +201,13 @@ impl Wired {
             reading_life_ms: keys.reading_life_ms,
         };
         times.check(thruster).map_err(|words| config.error(format!("`{section}.{words}")))?;
-        let identity = keys.identity.to_ascii_lowercase();
+        let identity = keys.identity.unwrap_or_default().to_ascii_lowercase();
         let meant = Some(&identity).filter(|identity| !identity.is_empty());
         let meant = meant.map(|identity| Claim::identity(&thruster.amplifier, identity));
         Ok(Self {
-            claims: [Claim::port(&keys.port)].into_iter().chain(meant).collect(),
-            medium: Medium::Serial { port: keys.port.clone(), baud: keys.baud },
-            port: keys.port,
+            claims: [Claim::port(&port)].into_iter().chain(meant).collect(),
+            medium: Medium::Serial { port: port.clone(), baud: keys.baud },
+            port,
             rate_hz: keys.rate_hz,
             timeout_s: keys.timeout_ms * 1e-3,
             reading_life_ns: times.reading_life_ns(),

@@ -13,6 +13,7 @@ use super::serial_line::SerialLine;
 use super::units::to_si;
 use super::{Channel, place};
 use crate::claims::Claim;
+use crate::drives::DEVICE;
 
 /// Names of the kinds, as `kind` gives them.
 const KINDS: [&str; 2] = ["serial_line", "iio"];
@@ -155,9 +156,10 @@ fn not_read<T>(key: &str, given: Option<&T>, kind: &str) -> Result<(), String> {
 
 fn serial_line(keys: &Keys) -> Result<SerialLine, String> {
     not_read("path", keys.path.as_ref(), "serial_line")?;
-    let port = keys.port.clone().filter(|port| !port.as_os_str().is_empty());
+    let port = keys.port.clone();
     let port =
         port.ok_or("port` is missing\nhint: the instrument's device, for example /dev/ttyUSB0".to_owned())?;
+    DEVICE.check(&port.to_string_lossy()).map_err(|words| format!("port` {words}"))?;
     let baud = keys.baud.unwrap_or(BAUD);
     if !(300..=12_000_000).contains(&baud) {
         return Err(format!("baud` = {baud} is outside 300 to 12000000\nhint: see the instrument's manual"));
@@ -313,7 +315,7 @@ mod tests {
     /// What a source of this kind would not read, and what it cannot do without, is refused by name with a way out.
     #[test]
     fn each_bad_key_is_named_with_a_hint() {
-        let line = "kind = \"serial_line\"\nport = \"p\"\n";
+        let line = "kind = \"serial_line\"\nport = \"/dev/p\"\n";
         let iio = "kind = \"iio\"\npath = \"p\"\n";
         let column = "signals = { thrust_n = { column = 1, unit = \"N\" } }";
         let channel = "signals = { thrust_n = { channel = \"in_voltage0\", scale = 1.0 } }";

@@ -39,7 +39,8 @@ use kort_thruster::rig::Rig;
 
 pub use protocol::Protocol;
 
-use super::{Wired, current_or_speed};
+use super::forms::{DEVICE_OR_INTERFACE, NUMBER_OF_CANOPEN};
+use super::{Own, Wired, current_or_speed};
 use crate::claims::Claim;
 use crate::link::Medium;
 use crate::link::can::Carrier;
@@ -61,6 +62,13 @@ const BITRATES: [(u32, char); 8] = [
 const EXCHANGE_BITS: f64 = 500.0;
 /// Share of the bus that one drive may take.
 const SHARE: f64 = 0.7;
+
+/// What of the section `drive` is its own.
+const OWN: Own = Own {
+    keys: &["address", "bitrate", "units_per_turn", "speed_units"],
+    port: DEVICE_OR_INTERFACE,
+    identity: NUMBER_OF_CANOPEN,
+};
 
 /// A CiA 402 drive as the configuration describes it.
 #[derive(Clone, Debug, PartialEq)]
@@ -87,8 +95,7 @@ impl Cia402 {
     /// # Errors
     /// [`ConfigError`] names key, value and what is allowed.
     pub fn new(config: &Config, id: &str, thruster: &Thruster, rig: &Rig) -> Result<Self, ConfigError> {
-        let own = ["address", "bitrate", "units_per_turn", "speed_units"];
-        let mut wired = Wired::new(config, id, thruster, &own)?;
+        let mut wired = Wired::new(config, id, thruster, &OWN)?;
         let kind = current_or_speed(config, id, thruster, rig)?;
         let fail =
             |key: &str, words: String| Err(config.error(format!("`thrusters.{id}.drive.{key}` {words}")));

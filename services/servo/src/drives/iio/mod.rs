@@ -33,6 +33,8 @@ mod interlock;
 mod serving;
 mod settings;
 
+pub(super) use settings::check_keys;
+
 use std::path::PathBuf;
 
 use kort_proto::messages::DriveKind;

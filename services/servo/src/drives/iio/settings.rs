@@ -7,6 +7,7 @@ use kort_proto::messages::DriveKind;
 use kort_thruster::rig::Rig;
 use serde::Deserialize;
 
+use super::super::forms::NAME;
 use super::super::kind_of;
 use super::super::wired::Times;
 use super::{Counter, Iio, Monitor, Place, Watchdog};
@@ -29,7 +30,7 @@ struct Keys {
     gain_v_per_v: Option<f64>,
     gain_rad_s_per_v: Option<f64>,
     limit_v: Option<f64>,
-    identity: String,
+    identity: Option<String>,
     watchdog: PathBuf,
     enabled: PathBuf,
     current: Option<MonitorKeys>,
@@ -67,7 +68,7 @@ impl Default for Keys {
             gain_v_per_v: None,
             gain_rad_s_per_v: None,
             limit_v: None,
-            identity: String::new(),
+            identity: None,
             watchdog: PathBuf::new(),
             enabled: PathBuf::new(),
             current: None,
@@ -78,6 +79,14 @@ impl Default for Keys {
             reversed: false,
         }
     }
+}
+
+/// Whether these are keys of an analogue amplifier: a section that is not read now.
+///
+/// # Errors
+/// [`ConfigError`] names the first that is none, and the nearest.
+pub fn check_keys(config: &Config, section: &str, thruster: &Thruster) -> Result<(), ConfigError> {
+    config.section::<Keys>(section, &thruster.drive).map(drop)
 }
 
 impl Iio {
@@ -98,6 +107,9 @@ impl Iio {
         // What is wrong with the limits is said where they are read.
         let limits = Settings::new(config, id, thruster, rig).ok().map(|settings| settings.limits);
         let read = || {
+            if let Some(name) = &keys.identity {
+                NAME.check(name).map_err(|words| format!("identity` {words}"))?;
+            }
             let gain = keys.gain(kind)?;
             let limit_v = keys.limit_v.ok_or("limit_v` is missing; it is never guessed\nhint: the largest voltage that the amplifier's input bears, either way, for example 10.0")?;
             within(
@@ -140,7 +152,7 @@ impl Iio {
                 scale_mv: keys.scale_mv,
                 gain,
                 limit_v,
-                identity: keys.identity.clone(),
+                identity: keys.identity.clone().unwrap_or_default(),
                 watchdog: keys.watchdog()?,
                 current: keys.current.as_ref().map(MonitorKeys::read).transpose()?,
                 counter: keys.counter.as_ref().map(CounterKeys::read).transpose()?,

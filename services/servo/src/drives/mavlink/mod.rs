@@ -49,7 +49,8 @@ use kort_thruster::rig::Rig;
 
 pub use protocol::Protocol;
 
-use super::{Wired, kind_of};
+use super::forms::{DEVICE_OR_UDP, NUMBER_OF_36_OR_16};
+use super::{Own, Wired, kind_of};
 use crate::claims::Claim;
 use crate::link::Medium;
 
@@ -59,6 +60,9 @@ const UDP: &str = "udp:";
 const TIMEOUT_S: f64 = 0.51;
 /// Most motors that ArduSub has.
 const MOTORS: u32 = 12;
+
+/// What of the section `drive` is its own.
+const OWN: Own = Own { keys: &["address", "motor"], port: DEVICE_OR_UDP, identity: NUMBER_OF_36_OR_16 };
 
 /// One thruster of an ArduSub vehicle as the configuration describes it.
 #[derive(Clone, Debug, PartialEq)]
@@ -79,7 +83,7 @@ impl Mavlink {
     /// # Errors
     /// [`ConfigError`] names key, value and what is allowed.
     pub fn new(config: &Config, id: &str, thruster: &Thruster, rig: &Rig) -> Result<Self, ConfigError> {
-        let mut wired = Wired::new(config, id, thruster, &["address", "motor"])?;
+        let mut wired = Wired::new(config, id, thruster, &OWN)?;
         let fail =
             |key: &str, words: String| Err(config.error(format!("`thrusters.{id}.drive.{key}` {words}")));
         if kind_of(rig) != DriveKind::Voltage {

@@ -28,7 +28,11 @@ use kort_thruster::rig::Rig;
 
 pub use protocol::Protocol;
 
-use super::{Wired, current_or_speed};
+use super::forms::{DEVICE, NUMBER_OF_24};
+use super::{Own, Wired, current_or_speed};
+
+/// What of the section `drive` is its own.
+const OWN: Own = Own { keys: &["address"], port: DEVICE, identity: NUMBER_OF_24 };
 
 /// A moteus as the configuration describes it.
 #[derive(Clone, Debug, PartialEq)]
@@ -49,7 +53,7 @@ impl Moteus {
     /// # Errors
     /// [`ConfigError`] names key, value and what is allowed.
     pub fn new(config: &Config, id: &str, thruster: &Thruster, rig: &Rig) -> Result<Self, ConfigError> {
-        let wired = Wired::new(config, id, thruster, &["address"])?;
+        let wired = Wired::new(config, id, thruster, &OWN)?;
         let kind = current_or_speed(config, id, thruster, rig)?;
         let address = wired.address.unwrap_or(1);
         if !(1..=126).contains(&address) {

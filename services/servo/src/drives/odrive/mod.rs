@@ -27,7 +27,11 @@ use kort_thruster::rig::Rig;
 
 pub use protocol::Protocol;
 
-use super::{Wired, current_or_speed};
+use super::forms::{DEVICE, NUMBER_OF_12};
+use super::{Own, Wired, current_or_speed};
+
+/// What of the section `drive` is its own.
+const OWN: Own = Own { keys: &[], port: DEVICE, identity: NUMBER_OF_12 };
 
 /// An ODrive as the configuration describes it.
 #[derive(Clone, Debug, PartialEq)]
@@ -44,7 +48,7 @@ impl ODrive {
     /// # Errors
     /// [`ConfigError`] names key, value and what is allowed.
     pub fn new(config: &Config, id: &str, thruster: &Thruster, rig: &Rig) -> Result<Self, ConfigError> {
-        let wired = Wired::new(config, id, thruster, &[])?;
+        let wired = Wired::new(config, id, thruster, &OWN)?;
         let kind = current_or_speed(config, id, thruster, rig)?;
         Ok(Self { wired, kind })
     }

@@ -29,7 +29,11 @@ use kort_thruster::rig::Rig;
 
 pub use protocol::Protocol;
 
-use super::{Wired, kind_of};
+use super::forms::{DEVICE, NUMBER_OF_24};
+use super::{Own, Wired, kind_of};
+
+/// What of the section `drive` is its own.
+const OWN: Own = Own { keys: &["pole_pairs"], port: DEVICE, identity: NUMBER_OF_24 };
 
 /// A VESC as the configuration describes it.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,7 +54,7 @@ impl Vesc {
     /// # Errors
     /// [`ConfigError`] names key, value and what is allowed.
     pub fn new(config: &Config, id: &str, thruster: &Thruster, rig: &Rig) -> Result<Self, ConfigError> {
-        let wired = Wired::new(config, id, thruster, &["pole_pairs"])?;
+        let wired = Wired::new(config, id, thruster, &OWN)?;
         let key = format!("thrusters.{id}.drive.pole_pairs");
         let pole_pairs = match wired.pole_pairs {
             Some(pairs) if (1..=100).contains(&pairs) => f64::from(pairs),
