@@ -9,6 +9,8 @@
 
 #[cfg(feature = "config")]
 pub mod config;
+#[cfg(feature = "config")]
+pub mod cores;
 #[cfg(feature = "events")]
 pub mod events;
 pub mod faults;

@@ -46,6 +46,7 @@ struct Unused {
 struct Report<'a> {
     schema: &'static str,
     problems: &'a [Problem],
+    warnings: &'a [Problem],
     unused_effects: &'a [Unused],
 }
 
@@ -53,6 +54,8 @@ struct Report<'a> {
 #[derive(Default)]
 struct Found {
     problems: Vec<Problem>,
+    /// What is no mistake, and may not be as it is meant.
+    warnings: Vec<Problem>,
     unused: Vec<Unused>,
 }
 
@@ -87,13 +90,17 @@ pub fn run(args: &Check) -> ExitCode {
             }
         }
     }
-    let Found { problems, unused } = found;
+    let Found { problems, warnings, unused } = found;
     if args.json {
-        let report = Report { schema: "kort.check/1", problems: &problems, unused_effects: &unused };
+        let (problems, warnings, unused_effects) = (&problems, &warnings, &unused);
+        let report = Report { schema: "kort.check/1", problems, warnings, unused_effects };
         println!("{}", serde_json::to_string_pretty(&report).unwrap_or_default());
     } else {
         for problem in &problems {
             println!("{problem}");
+        }
+        for warning in &warnings {
+            println!("WARNING: {warning}");
         }
         for Unused { file, effect, why } in &unused {
             println!("{file}: known {effect}: NOT USED: {why}");
@@ -151,6 +158,8 @@ fn deployment(file: Option<&Path>, into: &mut Found) {
             into.problems.push(found);
         }
     }
+    let absent = config.iter().flat_map(kort_proto::cores::absent);
+    into.warnings.extend(absent.map(|words| problem(&name, &words.to_string())));
     #[cfg(feature = "gateway")]
     for (file, effect, why) in config.iter().flat_map(kort_gateway::unused_effects) {
         into.unused(&file, [(effect, why)]);
@@ -192,7 +201,7 @@ fn problem(file: &str, message: &str) -> Problem {
     let key = pointed.map(|(key, _)| key).or_else(named).or(within).map(str::to_owned);
     let after = |words: &[&str]| words.iter().find_map(|words| Some(what.split_once(words)?.1));
     // A colon within a value (an address) is followed by no space, a comma within a list by one.
-    let ends = [" is ", " does ", " asks ", ": ", ";", ", and ", ", but ", "\n"];
+    let ends = [" is ", " does ", " asks ", ": ", ";", ", and ", ", but ", ", which ", "\n"];
     let found = after(&["` = ", "` holds ", "` has "])
         .and_then(|rest| ends.iter().try_fold(rest, |found, end| found.split(end).next()))
         .or(pointed.map(|(_, value)| value))
@@ -204,6 +213,7 @@ fn problem(file: &str, message: &str) -> Problem {
         "allowed are ",
         "known are ",
         "expected one of ",
+        "here are ",
     ]);
     // A type; names of ours mean nothing to others.
     let of_type = || after(&[", expected "]).filter(|kind| pointed.is_some() && !kind.starts_with("struct "));
@@ -276,6 +286,12 @@ mod tests {
                 "gateway.hosts",
                 "\"a:1\"",
                 "names and addresses",
+            ),
+            (
+                "`thrusters.t1.servo.cores` holds 9, which this machine does not have; here are 0-3",
+                "thrusters.t1.servo.cores",
+                "9",
+                "0-3",
             ),
             (
                 "`amplifier.kind` = curent is outside what is allowed: \"current\" or \"speed\"\nhint: say it",

@@ -319,3 +319,28 @@ fn all_that_is_wrong_with_a_rig_is_said_at_once() {
     of_deployment.remove(law.expect("the law is looked at too"));
     assert_eq!(of_deployment, of_rig);
 }
+
+/// A deployment may be looked at on another machine than it is for: what this one has not is said, and no mistake.
+#[test]
+fn cores_that_this_machine_has_not_are_a_warning() {
+    let site = Site::new();
+    let text = std::fs::read_to_string(site.config()).unwrap();
+    let text = text.replace("rate_hz = 500", "rate_hz = 500, cores = [0, 1023]");
+    assert!(text.contains("1023"), "{text}");
+    std::fs::write(site.config(), text).unwrap();
+    let check = |more: &[&str]| {
+        let out = run(std::process::Command::new(common::KORT).arg("check").args(more).arg(site.config()));
+        assert_eq!(out.status.code(), Some(0), "{}", String::from_utf8_lossy(&out.stdout));
+        String::from_utf8_lossy(&out.stdout).into_owned()
+    };
+    let words = check(&[]);
+    assert!(
+        words.contains("WARNING: ") && words.contains("`thrusters.t1.servo.cores` holds 1023"),
+        "{words}"
+    );
+    let report: serde_json::Value = serde_json::from_str(&check(&["--json"])).unwrap();
+    assert_eq!(report["problems"], serde_json::json!([]), "{report}");
+    let warning = &report["warnings"][0];
+    assert_eq!((&warning["key"], &warning["found"]), (&"thrusters.t1.servo.cores".into(), &"1023".into()));
+    assert!(warning["allowed"].as_str().is_some_and(|here| here.starts_with('0')), "{warning}");
+}
