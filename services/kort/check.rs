@@ -161,6 +161,10 @@ fn deployment(file: Option<&Path>, into: &mut Found) {
     let absent = config.iter().flat_map(kort_proto::cores::absent);
     into.warnings.extend(absent.map(|words| problem(&name, &words.to_string())));
     #[cfg(feature = "gateway")]
+    into.warnings.extend(
+        config.iter().filter_map(kort_gateway::doubtful).map(|words| problem(&name, &words.to_string())),
+    );
+    #[cfg(feature = "gateway")]
     for (file, effect, why) in config.iter().flat_map(kort_gateway::unused_effects) {
         into.unused(&file, [(effect, why)]);
     }

@@ -229,7 +229,20 @@ fn beyond_loopback_nothing_starts_without_tokens_and_tls() {
     );
     refused("holds no token");
     let pilot = token(&site, "bridge", "pilot");
+    // Who comes from another machine comes by a name that it does not know: no mistake behind a forwarded port, and said.
+    let nameless = "`gateway.hosts` = [], but `gateway.bind` = 0.0.0.0:";
+    let check = || {
+        let out = run(std::process::Command::new(KORT).arg("check").arg(site.config()));
+        assert_eq!(out.status.code(), Some(0), "{out:?}");
+        String::from_utf8_lossy(&out.stdout).into_owned()
+    };
+    let words = check();
+    assert!(
+        words.contains(nameless) && words.contains("WARNING: ") && words.contains("hint: hosts = ["),
+        "{words}"
+    );
     let mut supervisor = site.spawn("up");
+    wait("the warning", || site.log().contains(nameless).then_some(()));
     // Nobody can go to 0.0.0.0, and the gateway would not know itself by that name.
     let console = format!("console  https://localhost:{}/\n", site.port);
     wait("where the console is", || site.log().contains(&console).then_some(()));

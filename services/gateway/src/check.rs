@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use kort_control::known::uses;
-use kort_proto::config::Config;
+use kort_proto::config::{Config, ConfigError};
 use kort_proto::ours::{Foreign, in_our_hands, make_folder, nobody_else_may_replace};
 use kort_thruster::rig::Rig;
 
@@ -106,6 +106,11 @@ pub fn check_config(config: &Config) -> Vec<GatewayError> {
         }
     }
     wrong
+}
+
+/// What is no mistake of this configuration, and hardly as it is meant; the gateway says it in its log when it starts.
+pub fn doubtful(config: &Config) -> Option<ConfigError> {
+    Settings::new_unchecked(config).ok()?.doubtful().map(|words| config.error(words))
 }
 
 /// Effects of the deployment's rigs that no control law and no observer uses: file of the rig, effect, and why.

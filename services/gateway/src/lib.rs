@@ -61,7 +61,7 @@ use utoipa::openapi::OpenApi;
 use bus::{Bell, Pulse};
 use calibration::Calibrations;
 use check::{certificate, tokens};
-pub use check::{check, check_config, unused_effects};
+pub use check::{check, check_config, doubtful, unused_effects};
 use connections::Connections;
 use diagnosis::Diagnoses;
 use durations::Durations;
@@ -284,6 +284,9 @@ impl Drop for StreamGuard {
 pub fn run(config: &Config, deployment: &Deployment) -> Result<(), GatewayError> {
     let settings = Settings::new(config)?;
     let thrusters = settings::thrusters(config)?;
+    if let Some(words) = doubtful(config) {
+        tracing::warn!("{words}");
+    }
     tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?.block_on(serve(
         config,
         settings,

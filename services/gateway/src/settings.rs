@@ -231,6 +231,17 @@ impl Settings {
         wrong
     }
 
+    /// What is no mistake, and hardly as it is meant: the gateway starts, and says so.
+    pub fn doubtful(&self) -> Option<String> {
+        (self.bind.ip().is_unspecified() && self.hosts.is_empty()).then(|| {
+            format!(
+                "`gateway.hosts` = [], but `gateway.bind` = {} is reached by other names than localhost, 127.0.0.1 and [::1]: whoever asks by one is refused (421 foreign-host)\nhint: hosts = [\"thruster.example.org\", \"192.168.2.2\"], every name and address by which others reach this machine; or bind = \"127.0.0.1:{}\"",
+                self.bind,
+                self.bind.port()
+            )
+        })
+    }
+
     /// Must every request bring a token?
     pub fn asks_for_tokens(&self) -> bool {
         self.why_tokens().is_some()

@@ -27,7 +27,8 @@ impl Form {
 }
 
 /// What a number's hint says of it.
-const TOLD: &str = "the servo's log tells it when the drive answers; leave the key out to take whichever answers";
+const TOLD: &str =
+    "the servo's log tells it when the drive answers; leave the key out to take whichever answers";
 
 /// A serial port, or an USB device that looks like one.
 pub const DEVICE: Form = Form {
@@ -71,7 +72,9 @@ pub const NUMBER_OF_CANOPEN: Form = Form {
 
 /// A device of the kernel's by its file `name`.
 pub const NAME: Form = Form {
-    fits: |name| !name.is_empty() && !name.contains(|c: char| c.is_whitespace() || c.is_control() || c == '/'),
+    fits: |name| {
+        !name.is_empty() && !name.contains(|c: char| c.is_whitespace() || c.is_control() || c == '/')
+    },
     allowed: "a name without blanks and slashes",
     hint: "what the file `name` in the device's folder holds; leave the key out to take whichever is there",
 };

@@ -20,13 +20,13 @@ use crate::devices::{At, Shown};
 use crate::link::Protocol;
 
 use cia402::Cia402;
+pub(crate) use forms::DEVICE;
 use iio::Iio;
 use mavlink::Mavlink;
 use moteus::Moteus;
 use odrive::ODrive;
 pub use simulated::Simulated;
 use vesc::Vesc;
-pub(crate) use forms::DEVICE;
 pub use wired::{Own, Wired};
 
 /// A drive: takes commands, and tells what it measures itself.

@@ -181,7 +181,10 @@ impl Wired {
             }
         }
         let Some(port) = keys.port else {
-            return fail("port", format!("is missing; allowed is {}\nhint: {}", own.port.allowed, own.port.hint));
+            return fail(
+                "port",
+                format!("is missing; allowed is {}\nhint: {}", own.port.allowed, own.port.hint),
+            );
         };
         if let Err(words) = own.port.check(&port.to_string_lossy()) {
             return fail("port", words);

@@ -137,8 +137,9 @@ fn what_two_thrusters_take_is_refused_by_both_names() {
 fn what_may_be_shared_is_shared() {
     let cia402 = |keys: &str| drive("cia402", &format!("units_per_turn = 4096, {keys}"));
     let motor = |n: u32| {
-        let keys =
-            format!("timeout_ms = 510, motor = {n}, port = \"udp:127.0.0.1:14550\", identity = \"0a41000751363532\"");
+        let keys = format!(
+            "timeout_ms = 510, motor = {n}, port = \"udp:127.0.0.1:14550\", identity = \"0a41000751363532\""
+        );
         drive("mavlink", &keys).replace(RIG, VOLTS)
     };
     let flow = "sensors.flow = { kind = \"iio\", path = \"/d\", signals = { flow_m_s = { channel = \"in_voltage0\", scale = 1.0 } } }";
@@ -233,10 +234,7 @@ fn keys_of_a_drive_are_looked_at_before_it_is_opened() {
         (simulated("drive = { prt = \"/dev/p\" }"), "did you mean `port`?"),
         (simulated("drive = { dac = \"/d/out_voltage0\", limit = 3.0 }"), "did you mean `limit_v`?"),
         (simulated("simulation = { sead = 3 }"), "did you mean `seed`?"),
-        (
-            format!("{}\nsimulation = {{ sead = 3 }}", vesc("port = \"/dev/p\"")),
-            "did you mean `seed`?",
-        ),
+        (format!("{}\nsimulation = {{ sead = 3 }}", vesc("port = \"/dev/p\"")), "did you mean `seed`?"),
     ] {
         let said = wrong_anywhere(&lines);
         assert!(said.contains(words) && said.contains("thrusters.t1."), "{words}\n{said}");
