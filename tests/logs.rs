@@ -9,6 +9,8 @@ mod clocks;
 mod lab;
 #[path = "logs/refused.rs"]
 mod refused;
+#[path = "logs/tables.rs"]
+mod tables;
 #[path = "logs/torn.rs"]
 mod torn;
 #[path = "logs/writers.rs"]

@@ -25,6 +25,9 @@ fn a_table_over_midnight_is_read_where_it_is_longest() {
     assert!(words.contains("stale_rows = \"drop\""), "the proposed map parts it as well: {words}");
     let found = columns(&log);
     assert_eq!((&found["resets"], &topic(&found, "")["messages"]), (&1.into(), &3000.into()));
+    // What is counted is told apart from what is read.
+    assert_eq!(topic(&found, "")["messages_read"], 2750);
+    assert!(words.contains("rows: 3000, of which 2750 are read, at 20.0 Hz"), "{words}");
     assert!(near(found["duration_s"].as_f64().unwrap(), 2749.0 * 0.05), "{}", found["duration_s"]);
     assert!(near(topic(&found, "")["from_s"].as_f64().unwrap(), 0.0));
 

@@ -3,6 +3,7 @@
 use std::cmp::Reverse;
 
 use crate::columns::{self, nearest};
+use crate::decimal::with_comma;
 use crate::error::{Place, Problem};
 use crate::log::{Back, longest_is_read};
 use crate::map::{ColumnMap, Mapped, Time};
@@ -31,6 +32,8 @@ const SINCE_1970_S: f64 = 1e8;
 /// Takes rows one by one.
 pub(crate) struct Assembler<'m> {
     source: Vec<String>,
+    /// Texts have a decimal comma.
+    decimal_comma: bool,
     time: TimeColumn,
     select: Option<(usize, &'m str, Vec<String>)>,
     takes: Vec<Take<'m>>,
@@ -67,6 +70,7 @@ impl<'m> Assembler<'m> {
         Ok(Self {
             row: Vec::with_capacity(takes.len()),
             source,
+            decimal_comma: map.is_some_and(|map| map.decimal_comma),
             time,
             select,
             takes,
@@ -197,10 +201,14 @@ impl<'m> Assembler<'m> {
             return Ok(f64::NAN);
         }
         let column = || self.source[index].clone();
-        match text.parse::<f64>() {
-            Ok(x) if x.is_finite() => Ok(x),
-            Ok(_) => Err(Problem::NotFinite { place, column: column(), text: text.into() }),
-            Err(_) => {
+        let number = if self.decimal_comma { with_comma(text) } else { text.parse().ok() };
+        match number {
+            Some(x) if x.is_finite() => Ok(x),
+            Some(_) => Err(Problem::NotFinite { place, column: column(), text: text.into() }),
+            None if self.decimal_comma && text.contains('.') => {
+                Err(Problem::PointBesideComma { place, column: column(), text: text.into() })
+            }
+            None => {
                 let text = text.chars().take(40).collect();
                 Err(Problem::NotANumber { place, column: column(), text })
             }

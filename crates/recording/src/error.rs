@@ -4,6 +4,9 @@ use std::fmt;
 
 use thiserror::Error;
 
+use crate::decimal::has_comma;
+use crate::log::propose::symbol;
+
 /// An unusable recording.
 #[derive(Debug, Error, Clone, PartialEq)]
 #[error("{file}: {problem}\nhint: {}", problem.hint())]
@@ -159,6 +162,18 @@ pub enum Problem {
         /// The cell.
         text: String,
     },
+    /// A decimal point where the column map says that the decimal mark is a comma.
+    #[error(
+        "{place}, column `{column}`: \"{text}\" has a point, and the column map says decimal = \",\"; allowed: 1234,5 without a mark for thousands"
+    )]
+    PointBesideComma {
+        /// Where.
+        place: Place,
+        /// Which column.
+        column: String,
+        /// The cell.
+        text: String,
+    },
     /// NaN or infinity written out.
     #[error(
         "{place}, column `{column}`: \"{text}\" is not finite; allowed: a finite decimal number, or an empty cell for \"not sampled then\""
@@ -268,11 +283,20 @@ impl Problem {
                     .into()
             }
             Problem::RowLength { .. } => {
-                "cells are parted by commas; a decimal comma or a comma in a text must be quoted".into()
+                "cells are parted by commas, or what the column map's `delimiter` says; a decimal comma or a comma in a text must be quoted there".into()
             }
             Problem::TimeEmpty { .. } => "fill in the time, or remove the row".into(),
             Problem::TimeNotIncreasing { .. } => {
                 "sort the rows and remove repeated stamps; separate runs belong in separate files; a column map may say [time] stale_rows = \"drop\"".into()
+            }
+            Problem::NotANumber { text, .. } if has_comma(text) => {
+                "a decimal comma is read where the column map says decimal = \",\"; `kort columns LOG` proposes such a map".into()
+            }
+            Problem::NotANumber { place: Place::Line(2), text, .. } if symbol(text).is_some() => {
+                "a row of units below names of our own must repeat the units that they end in; other names come in through a column map: `kort columns LOG` proposes one".into()
+            }
+            Problem::PointBesideComma { .. } => {
+                "write the file without marks for thousands and with one decimal mark throughout, or correct `decimal` in the map".into()
             }
             Problem::NotANumber { .. } => {
                 "a text column can be left out by a column map (--columns NAME)".into()

@@ -9,6 +9,7 @@
 
 mod assemble;
 pub mod columns;
+mod decimal;
 mod error;
 pub mod formats;
 pub mod log;

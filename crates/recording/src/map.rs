@@ -12,7 +12,7 @@ use serde::Deserialize;
 use thiserror::Error;
 
 use crate::columns::nearest;
-use crate::units::Unit;
+use crate::units::{self, Unit};
 
 use ask::Asked;
 
@@ -25,6 +25,8 @@ pub struct ColumnMap {
     pub description: String,
     /// What parts the cells of a CSV file.
     pub delimiter: u8,
+    /// Its numbers have a decimal comma.
+    pub decimal_comma: bool,
     /// Where the instants come from.
     pub time: Time,
     /// What the user said of the log: names and values.
@@ -248,6 +250,19 @@ impl ColumnMap {
             let sign = column.sign_of.as_ref().map(|(sign, _)| sign.as_str());
             std::iter::once(column.source.as_str()).chain(sign).map(|source| (source, column.optional))
         })
+    }
+
+    /// Source columns that are taken as they stand, stamps too, with the unit that they are read in.
+    pub(crate) fn units_as_they_stand(&self) -> impl Iterator<Item = (&str, &Unit)> {
+        let time = match &self.time {
+            Time::Column { source, to_s, .. } => units::UNITS
+                .iter()
+                .find(|u| u.si == "s" && u.factor == *to_s)
+                .map(|unit| (source.as_str(), unit)),
+            Time::Clock { .. } | Time::Settled { .. } => None,
+        };
+        let plain = |c: &&Mapped| c.scale == 1.0 && c.offset == 0.0 && c.table.is_empty();
+        time.into_iter().chain(self.columns.iter().filter(plain).map(|c| (c.source.as_str(), &c.unit)))
     }
 
     /// Names of the shipped maps.

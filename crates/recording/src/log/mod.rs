@@ -52,6 +52,8 @@ pub(crate) struct Log {
     pub clock: &'static str,
     /// What parts the cells of a table.
     pub delimiter: u8,
+    /// Numbers of a table have a decimal comma.
+    pub decimal_comma: bool,
     /// In the order of their first message.
     pub topics: Vec<Topic>,
     /// How often the clock began anew.
@@ -137,6 +139,7 @@ pub(crate) fn same_source(a: &str, b: &str) -> bool {
 }
 
 /// Takes a log's messages as a decoder finds them.
+#[derive(Clone)]
 pub(crate) struct Gather<'w> {
     log: Log,
     wanted: Option<&'w [String]>,
@@ -182,6 +185,11 @@ impl<'w> Gather<'w> {
     /// What parts the cells of a table.
     pub fn delimiter(&mut self, delimiter: u8) {
         self.log.delimiter = delimiter;
+    }
+
+    /// Numbers of a table have a decimal comma.
+    pub fn decimal_comma(&mut self) {
+        self.log.decimal_comma = true;
     }
 
     /// A unit that the format tells late.

@@ -143,19 +143,21 @@ pub(super) fn unit_in(name: &str) -> Option<&'static Unit> {
 }
 
 /// A unit by its symbol, as other programs spell it.
-pub(super) fn symbol(text: &str) -> Option<&'static Unit> {
+pub(crate) fn symbol(text: &str) -> Option<&'static Unit> {
     // `output[1]` is the second output, not one without a dimension.
     if text.bytes().all(|b| b.is_ascii_digit()) {
         return None;
     }
     let ours = match text {
-        "RPM" => "rpm",
+        "RPM" | "r/min" | "rev/min" | "U/min" | "1/min" | "min^-1" | "min-1" => "rpm",
         "°C" | "degC" | "℃" => "C",
         "µs" | "μs" | "usec" | "microseconds" => "us",
         "sec" | "seconds" => "s",
         "msec" | "milliseconds" => "ms",
         "deg/s" | "degree/s" | "deg/sec" => "deg/s",
-        "m/s/s" | "m/s2" => "m/s^2",
+        "°" => "deg",
+        "Ω" | "Ohm" => "ohm",
+        "m/s/s" | "m/s2" | "m/s²" => "m/s^2",
         "Nm" | "N·m" | "N*m" => "N m",
         "g" => "gf",
         "kt" | "knots" => "knot",
@@ -258,6 +260,9 @@ fn toml(log: &Log, chosen: &Chosen, table: bool) -> String {
     );
     if table && log.delimiter != b',' {
         let _ = writeln!(out, "delimiter = {:?}", char::from(log.delimiter).to_string());
+    }
+    if log.decimal_comma {
+        out += "decimal = \",\"   # in the whole file\n";
     }
     out += "\n[time]\n";
     if !table {

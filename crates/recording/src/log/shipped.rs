@@ -93,7 +93,8 @@ fn suits(map: &ColumnMap, log: &Log, table: bool) -> bool {
     let there = |source: &str| is_in(log, source);
     let stamps = match &map.time {
         Time::Clock { .. } => !table,
-        Time::Column { source, .. } => table && there(source),
+        // A map that says nothing of a decimal comma reads none.
+        Time::Column { source, .. } => table && there(source) && (!log.decimal_comma || map.decimal_comma),
         Time::Settled { .. } => table,
     };
     stamps

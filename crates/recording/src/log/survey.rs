@@ -42,13 +42,15 @@ pub struct TopicSurvey {
     pub name: String,
     /// How many.
     pub messages: usize,
+    /// How many of them are read: those of the longest stretch where the clock begins anew.
+    pub messages_read: usize,
     /// First stamp, s, of the stretch that is read if the clock begins anew.
     pub from_s: Option<f64>,
     /// Last stamp of it, s.
     pub to_s: Option<f64>,
-    /// Usual rate, Hz.
+    /// Usual rate there, Hz.
     pub rate_hz: Option<f64>,
-    /// Stretches without a message.
+    /// Stretches without a message there.
     pub gaps: usize,
     /// The longest of them.
     pub longest_gap: Option<GapSurvey>,
@@ -160,12 +162,13 @@ fn of(name: &str, log: &Log) -> Survey {
 }
 
 fn topic_survey(topic: &Topic, stretch: usize, column: impl Fn(usize) -> Option<String>) -> TopicSurvey {
-    let (step_s, gaps) = steps(&topic.stamps_s);
     let read_s = &topic.stamps_s[topic.stretch(stretch)];
+    let (step_s, gaps) = steps(read_s);
     let longest = gaps.iter().max_by(|a, b| (a.1 - a.0).total_cmp(&(b.1 - b.0)));
     TopicSurvey {
         name: topic.name.clone(),
         messages: topic.stamps_s.len(),
+        messages_read: read_s.len(),
         from_s: read_s.first().copied(),
         to_s: read_s.last().copied(),
         rate_hz: (step_s > 0.0).then(|| 1.0 / step_s),

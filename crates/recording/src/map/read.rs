@@ -15,6 +15,7 @@ struct RawMap {
     #[serde(default)]
     description: String,
     delimiter: Option<String>,
+    decimal: Option<String>,
     #[serde(default)]
     ask: BTreeMap<String, Ask>,
     time: RawTime,
@@ -78,6 +79,7 @@ pub(super) fn map(name: &str, text: &str, asked: Option<&Asked>) -> Result<Colum
         name: name.into(),
         description: raw.description,
         delimiter: delimiter(name, raw.delimiter.as_deref())?,
+        decimal_comma: decimal_comma(name, raw.decimal.as_deref())?,
         time,
         given: given.into_pairs(),
         select: raw.select,
@@ -110,6 +112,18 @@ fn delimiter(map: &str, wanted: Option<&str>) -> Result<u8, MapError> {
             map,
             format!("delimiter = {other:?}; allowed: \",\", \";\", \"\\t\""),
             "what parts the cells of the CSV file",
+        )),
+    }
+}
+
+fn decimal_comma(map: &str, wanted: Option<&str>) -> Result<bool, MapError> {
+    match wanted {
+        None | Some(".") => Ok(false),
+        Some(",") => Ok(true),
+        Some(other) => Err(fail(
+            map,
+            format!("decimal = {other:?}; allowed: \".\", \",\""),
+            "the decimal mark of the numbers in the CSV file",
         )),
     }
 }

@@ -98,6 +98,9 @@ fn text(found: &Survey, all: bool) -> String {
 fn topic_text(topic: &TopicSurvey, all: bool) -> String {
     let name = if topic.name.is_empty() { "rows" } else { &topic.name };
     let mut out = format!("\n{name}: {}", topic.messages);
+    if topic.messages_read != topic.messages {
+        let _ = write!(out, ", of which {} are read,", topic.messages_read);
+    }
     if let Some(rate_hz) = topic.rate_hz {
         let _ = write!(out, " at {rate_hz:.1} Hz");
     }

@@ -1,8 +1,9 @@
 //! CSV as RFC 4180 has it, header row first.
 
 mod table;
+mod units;
 
-use std::io::{self, Read, Write};
+use std::io::{self, BufRead, Read, Write};
 
 use csv::{ByteRecord, ErrorKind, ReaderBuilder};
 
@@ -14,7 +15,12 @@ use crate::recording::Recording;
 pub(super) use table::log;
 
 /// Decodes row by row: memory holds the columns and one row.
-pub(super) fn decode(name: &str, input: impl Read, map: Option<&ColumnMap>) -> Result<Recording, Problem> {
+pub(super) fn decode(
+    name: &str,
+    mut input: impl BufRead,
+    map: Option<&ColumnMap>,
+) -> Result<Recording, Problem> {
+    let lines = Lines::of(input.fill_buf().map_err(|e| Problem::Unreadable { message: e.to_string() })?);
     let mut tail = Tail { input, last: b'\n' };
     let delimiter = map.map_or(b',', |map| map.delimiter);
     let mut reader =
@@ -34,10 +40,20 @@ pub(super) fn decode(name: &str, input: impl Read, map: Option<&ColumnMap>) -> R
         }
     }
     let width = header.len() as u64;
-    let mut rows = Assembler::new(name, header, map)?;
-    let mut losses = Vec::new();
+    let mut rows = Assembler::new(name, header.clone(), map)?;
+    let (mut losses, mut notes) = (Vec::new(), Vec::new());
+    let mut next = read(&mut reader, &mut record);
+    if matches!(next, Ok(true))
+        && let Some(below) = units::below(&header, &record)
+        // Names of our own say the unit themselves: another below them is a contradiction, not a second header.
+        && (map.is_some() || units::as_named(&header, &below))
+    {
+        notes.push("line 2 holds units, and is no row".to_owned());
+        notes.extend(map.iter().flat_map(|map| units::differ(&header, &below, map.units_as_they_stand())));
+        next = read(&mut reader, &mut record);
+    }
     loop {
-        match read(&mut reader, &mut record) {
+        match next {
             Ok(true) => {}
             Ok(false) => break,
             // A gzip stream cut off by a killed process: what came before it stands.
@@ -47,7 +63,7 @@ pub(super) fn decode(name: &str, input: impl Read, map: Option<&ColumnMap>) -> R
             }
             Err(other) => return Err(other),
         }
-        let line = record.position().map_or(0, csv::Position::line);
+        let line = lines.at(&record);
         let found = record.len() as u64;
         if found != width {
             let place = Place::Line(line);
@@ -69,8 +85,11 @@ pub(super) fn decode(name: &str, input: impl Read, map: Option<&ColumnMap>) -> R
             Ok("") | Err(_) => Cell::Empty,
             Ok(text) => Cell::Text(text),
         })?;
+        next = read(&mut reader, &mut record);
     }
-    rows.finish(losses)
+    let mut recording = rows.finish(losses)?;
+    recording.notes.extend(notes);
+    Ok(recording)
 }
 
 fn read(reader: &mut csv::Reader<impl Read>, record: &mut ByteRecord) -> Result<bool, Problem> {
@@ -78,6 +97,24 @@ fn read(reader: &mut csv::Reader<impl Read>, record: &mut ByteRecord) -> Result<
         ErrorKind::Io(e) => Problem::Unreadable { message: e.to_string() },
         other => Problem::Unreadable { message: format!("{other:?}") },
     })
+}
+
+/// How lines end, for a row's number: the reader has not taken the second sign of an end of two when it counts the next row.
+#[derive(Clone, Copy)]
+struct Lines {
+    of_two: bool,
+}
+
+impl Lines {
+    fn of(start: &[u8]) -> Self {
+        let end = start.iter().position(|b| *b == b'\n').unwrap_or(0);
+        Self { of_two: start.get(..end).is_some_and(|line| line.ends_with(b"\r")) }
+    }
+
+    /// Line of a row below the header.
+    fn at(self, row: &ByteRecord) -> u64 {
+        row.position().map_or(0, |position| position.line() + u64::from(self.of_two))
+    }
 }
 
 fn text(cell: &[u8], line: u64) -> Result<&str, Problem> {
@@ -151,3 +188,6 @@ impl<W: Write> Rows<W> {
         Ok(self.output)
     }
 }
+
+#[cfg(test)]
+mod tests;
