@@ -6,7 +6,7 @@ mod lab;
 use std::io::Write;
 use std::path::Path;
 
-use lab::{STAND, Table, clean, dry_rig, json, kort, path, random_levels, simulate, stderr, write};
+use lab::{STAND, Table, clean, dry_rig, json, kort, path, random_levels, simulate, stderr, swirl, write};
 use serde_json::Value;
 
 fn fit(recordings: &[&str], rig: &str, more: &[&str]) -> Value {
@@ -57,6 +57,27 @@ fn a_fitted_rig_is_a_rig_and_states_what_was_found() {
     let again = fit(&[clean()], &out, &[]);
     let lift = parameter(&again, "lift_max")["stated"].as_f64().unwrap();
     assert!((lift - 0.542).abs() < 0.01, "{lift}");
+}
+
+/// Effects that were fitted stand in the fitted rig; what is stated of one as exact was held, and stays with its own words.
+#[test]
+fn a_fitted_rig_has_the_effects_that_were_fitted() {
+    let (first, second) = (path("with-effect.toml"), path("with-effect-again.toml"));
+    let output = kort(&["fit", swirl(), "--rig", STAND, "--with", "rotational_flow", "-o", &first]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let text = std::fs::read_to_string(&first).unwrap();
+    assert!(text.contains("effect = \"rotational_flow\"\nswirl_yield = { value = 0."), "{text}");
+    let held = "swirl_lag_ratio = 0.08 # by hand";
+    let lines: Vec<&str> =
+        text.lines().map(|line| if line.starts_with("swirl_lag_ratio") { held } else { line }).collect();
+    std::fs::write(&first, lines.join("\n")).unwrap();
+    let output = kort(&["fit", swirl(), "--rig", &first, "-o", &second]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let text = std::fs::read_to_string(&second).unwrap();
+    assert!(text.contains(held) && text.contains("# 1, fitted by kort fit"), "{text}");
+    assert_eq!(text.matches("[[effects]]").count(), 1, "{text}");
+    let swirl = text.lines().find(|line| line.starts_with("swirl_yield")).unwrap();
+    assert!(swirl.contains("tol") && swirl.ends_with("fitted by kort fit"), "{swirl}");
 }
 
 #[test]

@@ -1,7 +1,9 @@
 //! What of a diagnosis belongs to the rig from now on.
 
-use kort_diagnose::report::{ParameterReport, Report};
-use kort_thruster::rig::{FoundEffect, Quantity};
+use kort_diagnose::report::Report;
+use kort_thruster::rig::FoundEffect;
+
+use crate::fitted_rig::quantity;
 
 /// Least probability with which a name belongs to the rig from now on.
 const BELIEVED: f64 = 0.7;
@@ -11,17 +13,13 @@ pub const DIAGNOSED: &str = "found by kort diagnose";
 
 /// Findings that a rig can take over, with twice the standard error as tolerance.
 pub fn believed(report: &Report) -> Vec<FoundEffect<'_>> {
-    let of = |p: &'_ ParameterReport| Quantity {
-        value: p.value,
-        tol: Some((2.0 * p.std_error / p.value).abs()).filter(|t| t.is_finite() && *t > 0.0),
-    };
     report
         .findings
         .iter()
         .filter(|f| f.probability >= BELIEVED && f.confounded_with.is_empty())
         .map(|f| FoundEffect {
             effect: &f.effect,
-            parameters: f.parameters.iter().map(|p| (p.name.as_str(), of(p))).collect(),
+            parameters: f.parameters.iter().map(|p| (p.name.as_str(), quantity(p))).collect(),
         })
         .collect()
 }

@@ -2,8 +2,9 @@
 //! they are. The comment behind a stated value told where that came from, and makes room for where the new one does.
 
 use kort_diagnose::report::ParameterReport;
-use kort_thruster::rig::Rig;
-use toml_edit::{Decor, DocumentMut, InlineTable, Item, Value};
+use kort_identify::identify::FittedEffect;
+use kort_thruster::rig::{FoundEffect, Quantity, Rig};
+use toml_edit::{Decor, DocumentMut, InlineTable, Item, TableLike, Value};
 
 /// What stands behind each value that `kort fit` writes.
 pub const FITTED: &str = "fitted by kort fit";
@@ -36,18 +37,9 @@ pub fn with_fitted(
         };
         let before = document.to_string();
         let in_one_line = document[table].is_inline_table();
-        let item = &mut document[table][p.name.as_str()];
-        let mut quantity = InlineTable::new();
-        quantity.insert("value", short(p.value).into());
-        let tol = (2.0 * p.std_error / p.value).abs();
-        if tol.is_finite() {
-            quantity.insert("tol", short(tol.clamp(TOL.0, TOL.1)).into());
-        }
-        let mut value = Value::InlineTable(quantity);
         // A comment amid a line would swallow the rest of it.
         let told = if in_one_line { String::new() } else { format!(" # {}, {by}", p.unit) };
-        *value.decor_mut() = Decor::new(" ", told);
-        *item = Item::Value(value);
+        document[table][p.name.as_str()] = item(p, &told);
         // A value that no rig may state (a symptom) keeps the stated one.
         if let Err(e) = Rig::from_toml(&document.to_string()) {
             left_out.push(format!("keeps the stated {}: {}", p.name, e.to_string().replace('\n', "; ")));
@@ -55,6 +47,74 @@ pub fn with_fitted(
         }
     }
     Ok((document.to_string(), left_out))
+}
+
+/// Puts fitted effects among a rig description's `[[effects]]`; what the fit held of one that stands there stays as it is.
+/// Also returned: which could not be written, and why.
+///
+/// # Errors
+/// The text is no rig description (it was one when the fit read it).
+pub fn with_fitted_effects(
+    text: &str,
+    effects: &[FittedEffect],
+    by: &str,
+) -> Result<(String, Vec<String>), String> {
+    let (mut text, mut left_out) = (text.to_owned(), Vec::new());
+    for fitted in effects {
+        let mut document: DocumentMut = text.parse().map_err(|e: toml_edit::TomlError| e.to_string())?;
+        let written = if let Some((table, in_one_line)) = standing(&mut document, &fitted.effect) {
+            for p in &fitted.parameters {
+                let told = if in_one_line { String::new() } else { format!(" # {}, {by}", p.unit) };
+                table.insert(&p.name, item(p, &told));
+            }
+            let written = document.to_string();
+            Rig::from_toml(&written).map(|_| written)
+        } else {
+            let parameters = fitted.parameters.iter().map(|p| (p.name.as_str(), quantity(p))).collect();
+            Rig::with_effects_toml(&text, &[FoundEffect { effect: &fitted.effect, parameters }], by)
+        };
+        match written {
+            Ok(written) => text = written,
+            Err(e) => left_out.push(format!("{}: {}", fitted.effect, e.to_string().replace('\n', "; "))),
+        }
+    }
+    Ok((text, left_out))
+}
+
+/// The table of an effect that stands in a rig description, and whether the whole of it stands in one line.
+fn standing<'a>(document: &'a mut DocumentMut, effect: &str) -> Option<(&'a mut dyn TableLike, bool)> {
+    let named = |table: &dyn TableLike| table.get("effect").and_then(Item::as_str) == Some(effect);
+    match document.get_mut("effects")? {
+        Item::ArrayOfTables(list) => {
+            let table = list.iter_mut().find(|table| named(*table))?;
+            Some((table, false))
+        }
+        Item::Value(Value::Array(list)) => {
+            let mut tables = list.iter_mut().filter_map(Value::as_inline_table_mut);
+            let table = tables.find(|table| named(*table))?;
+            Some((table, true))
+        }
+        _ => None,
+    }
+}
+
+/// A fitted value as it stands in a rig description, with what is told behind it.
+fn item(fitted: &ParameterReport, told: &str) -> Item {
+    let mut both = InlineTable::new();
+    both.insert("value", short(fitted.value).into());
+    let tol = (2.0 * fitted.std_error / fitted.value).abs();
+    if tol.is_finite() {
+        both.insert("tol", short(tol.clamp(TOL.0, TOL.1)).into());
+    }
+    let mut value = Value::InlineTable(both);
+    *value.decor_mut() = Decor::new(" ", told);
+    Item::Value(value)
+}
+
+/// A fitted value, with twice its standard error as tolerance.
+pub fn quantity(fitted: &ParameterReport) -> Quantity {
+    let tol = (2.0 * fitted.std_error / fitted.value).abs();
+    Quantity { value: fitted.value, tol: Some(tol).filter(|t| t.is_finite() && *t > 0.0) }
 }
 
 /// Six significant digits.
@@ -102,6 +162,27 @@ mod tests {
         let (text, left_out) = with_fitted(&rig, &[fitted("inertia_kg_m2", 0.02, 0.001)], FITTED).unwrap();
         let read = Rig::from_toml(&text).unwrap();
         assert!(left_out.is_empty() && read.motor.inertia_kg_m2.value == 0.02, "{text} {left_out:?}");
+    }
+
+    #[test]
+    fn an_effect_has_what_was_fitted_of_it_and_keeps_what_was_held() {
+        let known = "[[effects]]\neffect = \"coulomb_friction\"\ncoulomb_torque_n_m = { value = 0.3, tol = 0.5 } # by hand\nstribeck_rise = 0.2 # from the maker\n";
+        let effect = |name: &str, parameters: Vec<ParameterReport>| FittedEffect {
+            effect: name.into(),
+            path: "shaft".into(),
+            equation: String::new(),
+            parameters,
+        };
+        let friction = effect("coulomb_friction", vec![fitted("coulomb_torque_n_m", 0.25, 0.01)]);
+        let unknown = effect("gremlins", vec![fitted("number", 3.0, 1.0)]);
+        let (text, left_out) =
+            with_fitted_effects(&format!("{RIG}{known}"), &[friction, unknown], FITTED).unwrap();
+        assert!(
+            text.contains("coulomb_torque_n_m = { value = 0.25, tol = 0.08 } # 1, fitted by kort fit"),
+            "{text}"
+        );
+        assert!(text.contains("stribeck_rise = 0.2 # from the maker\n"), "{text}");
+        assert!(left_out.len() == 1 && left_out[0].contains("gremlins"), "{left_out:?}");
     }
 
     #[test]

@@ -85,6 +85,24 @@ pub fn spinner() -> Progress {
     Progress::new(spinner, |bar| format!("{}, {} so far", bar.message(), FormattedDuration(bar.elapsed())))
 }
 
+/// Steps of a command of unknown length: on a spinner, or, for the service that it is a job of, each on a line of its own.
+pub struct Steps(Option<Progress>);
+
+impl Steps {
+    /// Before the first one; `job` is the service's process id.
+    pub fn new(job: Option<u32>) -> Self {
+        Self(job.is_none().then(spinner))
+    }
+
+    /// It is at this now.
+    pub fn tell(&self, step: &str) {
+        match &self.0 {
+            Some(spinner) => spinner.set_message(step.to_string()),
+            None => eprintln!("step: {step}"),
+        }
+    }
+}
+
 fn style(template: &str) -> ProgressStyle {
     // The templates above are fixed; should one be wrong, the default bar still shows progress.
     ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())

@@ -7,10 +7,10 @@ use kort_diagnose::constants::Constants;
 use kort_diagnose::diagnose::{Diagnosis, Options, diagnose};
 use kort_recording::{Column, Recording};
 use kort_thruster::models::ModelName;
-use kort_thruster::rig::{FoundEffect, Quantity, Rig};
+use kort_thruster::rig::{FoundEffect, Rig};
 
 use crate::failure::Failure;
-use crate::fitted_rig::with_fitted;
+use crate::fitted_rig::{quantity, with_fitted};
 
 /// What stands behind each value in the rig description.
 const MEASURED: &str = "measured by kort calibrate";
@@ -46,17 +46,9 @@ pub fn rig_text(text: &str, estimate: &Estimate) -> Result<(String, Vec<String>)
             left_out.push(format!("{}: none seen within its uncertainty", effect.effect));
             continue;
         }
-        let quantity = |value: f64, std_error: f64| {
-            let tol = (2.0 * std_error / value).abs();
-            Quantity { value, tol: Some(tol).filter(|t| t.is_finite() && *t > 0.0) }
-        };
         found.push(FoundEffect {
             effect: &effect.effect,
-            parameters: effect
-                .parameters
-                .iter()
-                .map(|p| (p.name.as_str(), quantity(p.value, p.std_error)))
-                .collect(),
+            parameters: effect.parameters.iter().map(|p| (p.name.as_str(), quantity(p))).collect(),
         });
     }
     let text = Rig::with_effects_toml(&text, &found, MEASURED).map_err(Failure::failed)?;

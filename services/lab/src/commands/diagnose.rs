@@ -10,7 +10,8 @@ use kort_thruster::rig::Rig;
 use crate::believed::{DIAGNOSED, believed};
 use crate::failure::{Failure, Outcome, print, print_json, write_text};
 use crate::input::{Input, Loaded};
-use crate::{progress, render};
+use crate::progress::Steps;
+use crate::render;
 
 const EXAMPLE: &str = "\
 Example: kort diagnose tests/recordings/example-cases/rotational-flow.csv.gz \\
@@ -75,13 +76,9 @@ impl Diagnose {
     /// Unreadable input, or an output file that cannot be written.
     pub fn run(self) -> Result<Outcome, Failure> {
         let loaded = self.input.load()?;
-        let spinner = self.job.is_none().then(progress::spinner);
-        let told = |text: &str| match &spinner {
-            Some(spinner) => spinner.set_message(text.to_string()),
-            None => eprintln!("step: {text}"),
-        };
-        let diagnosis = diagnosis(&self.input, &loaded, &told)?;
-        drop(spinner);
+        let steps = Steps::new(self.job);
+        let diagnosis = diagnosis(&self.input, &loaded, &|step: &str| steps.tell(step))?;
+        drop(steps);
         if let Some(path) = &self.html {
             write_text(path, &render::diagnosis::page(&diagnosis, &loaded.rig))?;
             eprintln!("wrote {}", path.display());

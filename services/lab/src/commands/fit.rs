@@ -7,9 +7,10 @@ use kort_diagnose::constants::Constants;
 use kort_identify::identify::{FitReport, Options, identify};
 
 use crate::failure::{Failure, Outcome, print, print_json, write_text};
-use crate::fitted_rig::{FITTED, with_fitted};
+use crate::fitted_rig::{FITTED, with_fitted, with_fitted_effects};
 use crate::input::{Input, Loaded};
-use crate::{progress, render};
+use crate::progress::Steps;
+use crate::render;
 
 const EXAMPLE: &str = "\
 Example: kort fit tests/recordings/example-cases/clean.csv.gz \\
@@ -24,7 +25,8 @@ because a sensor misbehaves there; the notes say which.";
 pub struct Fit {
     #[command(flatten)]
     input: Input,
-    /// Write the rig description with the fitted values, tol = two standard errors
+    /// Write the rig description with the fitted values, those of effects among its [[effects]]; tol = two
+    /// standard errors
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Fits from this many starts within the stated tolerances
@@ -36,6 +38,9 @@ pub struct Fit {
     /// Print one JSON document (kort.fit/1)
     #[arg(long)]
     json: bool,
+    /// A job of the service, which has this process id: each step on a line of its own, nothing else disturbed
+    #[arg(long, value_name = "PID", hide = true)]
+    job: Option<u32>,
 }
 
 /// Fits what was read.
@@ -64,19 +69,27 @@ pub fn fit(
 }
 
 impl Fit {
+    /// The service's process that this is a job of.
+    pub fn job_of(&self) -> Option<u32> {
+        self.job
+    }
+
     /// Does it.
     ///
     /// # Errors
     /// Unreadable input, or an output file that cannot be written.
     pub fn run(self) -> Result<Outcome, Failure> {
         let loaded = self.input.load()?;
-        let spinner = progress::spinner();
-        let told = |text: &str| spinner.set_message(text.to_string());
+        let steps = Steps::new(self.job);
+        let told = |step: &str| steps.tell(step);
         let report = fit(&self.input, &loaded, usize::from(self.starts), self.free_friction, &told)?;
-        drop(spinner);
+        drop(steps);
         if let Some(path) = &self.output {
-            let (text, left_out) =
+            let (text, mut left_out) =
                 with_fitted(&loaded.rig_text, &report.parameters, FITTED).map_err(Failure::failed)?;
+            let (text, effects_left_out) =
+                with_fitted_effects(&text, &report.effects, FITTED).map_err(Failure::failed)?;
+            left_out.extend(effects_left_out);
             write_text(path, &text)?;
             for why in left_out {
                 eprintln!("note: {}: {why}", path.display());

@@ -48,6 +48,7 @@ impl Command {
     pub fn job_of(&self) -> Option<u32> {
         match self {
             Command::Diagnose(diagnose) => diagnose.job_of(),
+            Command::Fit(fit) => fit.job_of(),
             Command::Calibrate(calibrate) => calibrate.job_of(),
             _ => None,
         }
