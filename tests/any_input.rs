@@ -223,7 +223,7 @@ proptest! {
             (Body::Controller, r#"{"controller": "velocity_servo""#),
             (Body::Excitation, r#"{"limit": 60"#),
             (Body::Rig, r#"{"revision": 1"#),
-            (Body::Diagnosis, r#"{"last_s": 60"#),
+            (Body::Analysis, r#"{"last_s": 60"#),
             (Body::Recording, r#"{"name": "x""#),
             (Body::Message, r#"{"setpoint": {"thrust_n": 1}, "lease_id": "x""#),
         ] {

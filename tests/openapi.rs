@@ -21,6 +21,8 @@ const BY_MEANING: &str = "[checks.missing_required_header]\nexpected-statuses = 
     checks.positive_data_acceptance.enabled = false\n\
     [[operations]]\ninclude-path = \"/v1/thrusters/{id}/diagnoses\"\ninclude-method = \"POST\"\n\
     checks.positive_data_acceptance.enabled = false\n\
+    [[operations]]\ninclude-path = \"/v1/thrusters/{id}/fits\"\ninclude-method = \"POST\"\n\
+    checks.positive_data_acceptance.enabled = false\n\
     [[operations]]\ninclude-path = \"/v1/recordings/{name}\"\n\
     checks.use_after_free.enabled = false\n";
 

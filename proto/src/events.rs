@@ -74,6 +74,16 @@ pub enum EventKind {
     DiagnosisCancelled,
     /// A diagnosis was deleted.
     DiagnosisDeleted,
+    /// A fit was begun.
+    FitStarted,
+    /// A fit is done.
+    FitDone,
+    /// A fit came to nothing.
+    FitFailed,
+    /// A fit was ended on request.
+    FitCancelled,
+    /// A fit was deleted.
+    FitDeleted,
     /// A calibration was begun.
     CalibrationStarted,
     /// A calibration is over: done, stopped, aborted or failed.

@@ -12,6 +12,7 @@ use kort_proto::transport::Deployment;
 use serde_json::{Value, json};
 
 pub mod bench;
+pub mod jobs;
 pub mod pages;
 mod stalls;
 mod watch;

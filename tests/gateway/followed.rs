@@ -2,7 +2,7 @@
 
 use crate::common::{self, Stack, pages};
 
-/// Pages followed here, and in `tests/diagnoses.rs`.
+/// Pages followed here, and in `tests/diagnoses/main.rs`.
 const FOLLOWED: [&str; 7] = [
     "README.md",
     "docs/tutorial.md",

@@ -59,6 +59,9 @@ fn the_openapi_document_names_every_route_and_each_answers() {
             "/v1/thrusters/{id}/diagnoses",
             "/v1/thrusters/{id}/diagnoses/{diagnosis}",
             "/v1/thrusters/{id}/diagnoses/{diagnosis}/report",
+            "/v1/thrusters/{id}/fits",
+            "/v1/thrusters/{id}/fits/{fit}",
+            "/v1/thrusters/{id}/fits/{fit}/rig",
         ] {
             assert!(document["paths"][route].is_object(), "{route} is not documented");
         }
@@ -68,7 +71,7 @@ fn the_openapi_document_names_every_route_and_each_answers() {
                 .replace("{name}", "none")
                 .replace("{code}", "4")
                 .replace("{number}", "1");
-            let real = real.replace("{diagnosis}", "none");
+            let real = real.replace("{diagnosis}", "none").replace("{fit}", "none");
             for method in methods.as_object().unwrap().keys() {
                 let answer = send(port, &method.to_uppercase(), &real, &[], b"");
                 let documented = &document["paths"][path][method]["responses"][answer.status.to_string()];

@@ -3,7 +3,7 @@
 use crate::extract::{Json, OptionalJson};
 use crate::problem::Problem;
 use crate::routes::bodies::{
-    CalibrationRequest, ControllerFile, ControllerRequest, DiagnosisRequest, ExcitationRequest, GoOnRequest,
+    AnalysisRequest, CalibrationRequest, ControllerFile, ControllerRequest, ExcitationRequest, GoOnRequest,
     LeaseRequest, RecordingRequest, RecordingSetRequest, RigRequest, TagsRequest, incoming,
 };
 use crate::view::Setpoint;
@@ -23,8 +23,8 @@ pub enum Body {
     Excitation,
     /// `POST …/rig`
     Rig,
-    /// `POST …/diagnoses`
-    Diagnosis,
+    /// `POST …/diagnoses`, `POST …/fits`
+    Analysis,
     /// `POST …/calibrations`
     Calibration,
     /// `POST …/calibrations/{calibration}/go-on`
@@ -48,7 +48,7 @@ impl Body {
         Body::ControllerFile,
         Body::Excitation,
         Body::Rig,
-        Body::Diagnosis,
+        Body::Analysis,
         Body::Calibration,
         Body::GoOn,
         Body::Recording,
@@ -69,7 +69,7 @@ impl Body {
             Body::ControllerFile => Json::<ControllerFile>::from_bytes(bytes).map(drop),
             Body::Excitation => Json::<ExcitationRequest>::from_bytes(bytes).map(drop),
             Body::Rig => Json::<RigRequest>::from_bytes(bytes).map(drop),
-            Body::Diagnosis => OptionalJson::<DiagnosisRequest>::from_bytes(bytes).map(drop),
+            Body::Analysis => OptionalJson::<AnalysisRequest>::from_bytes(bytes).map(drop),
             Body::Calibration => OptionalJson::<CalibrationRequest>::from_bytes(bytes).map(drop),
             Body::GoOn => Json::<GoOnRequest>::from_bytes(bytes).map(drop),
             Body::Recording => OptionalJson::<RecordingRequest>::from_bytes(bytes).map(drop),

@@ -8,13 +8,13 @@
     reason = "a problem is made at most once a request; a box would only add a step"
 )]
 
+mod analysis;
 pub mod bodies;
 mod bus;
 mod calibration;
 mod check;
 mod connections;
 mod desk;
-mod diagnosis;
 mod durations;
 mod energy;
 mod error;
@@ -58,12 +58,12 @@ use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::watch;
 use utoipa::openapi::OpenApi;
 
+use analysis::Analyses;
 use bus::{Bell, Pulse};
 use calibration::Calibrations;
 use check::{certificate, tokens};
 pub use check::{check, check_config, doubtful, unused_effects};
 use connections::Connections;
-use diagnosis::Diagnoses;
 use durations::Durations;
 pub use error::GatewayError;
 use events::Events;
@@ -90,7 +90,7 @@ pub(crate) struct App {
     rigs: Vec<Arc<RigDesk>>,
     controllers: Vec<ControllerConfig>,
     rings: Vec<Ring>,
-    diagnoses: Arc<Diagnoses>,
+    analyses: Arc<Analyses>,
     calibrations: Arc<Calibrations>,
     tallies: Vec<Arc<Tally>>,
     recorder: Arc<Recorder>,
@@ -147,8 +147,8 @@ impl App {
         Ok(self.thrusters.iter().position(|other| Arc::ptr_eq(other, thruster)).unwrap_or_default())
     }
 
-    fn diagnoses(&self) -> &Arc<Diagnoses> {
-        &self.diagnoses
+    fn analyses(&self) -> &Arc<Analyses> {
+        &self.analyses
     }
 
     fn calibrations(&self) -> &Arc<Calibrations> {
@@ -333,10 +333,10 @@ async fn serve(
     let events = Events::start(&settings.events, Arc::clone(&recorder))
         .map_err(|error| GatewayError::Events { folder: settings.events.clone(), error })?;
     recorder.tell_to(&events);
-    let diagnoses =
-        Diagnoses::open(&settings.diagnoses, &settings.recordings, settings.diagnosis, Arc::clone(&events))
+    let analyses =
+        Analyses::open(&settings.diagnoses, &settings.recordings, settings.diagnosis, Arc::clone(&events))
             .map_err(|error| GatewayError::Diagnoses { folder: settings.diagnoses.clone(), error })?;
-    let diagnoses = Arc::new(diagnoses);
+    let analyses = Arc::new(analyses);
     let calibrations =
         Calibrations::open(&settings.calibrations, config, &deployment, Arc::clone(&events))
             .map_err(|error| GatewayError::Calibrations { folder: settings.calibrations.clone(), error })?;
@@ -348,7 +348,7 @@ async fn serve(
         rigs: Vec::new(),
         controllers: Vec::new(),
         rings: Vec::new(),
-        diagnoses: Arc::clone(&diagnoses),
+        analyses: Arc::clone(&analyses),
         calibrations: Arc::clone(&calibrations),
         tallies: Vec::new(),
         recorder: Arc::clone(&recorder),
@@ -461,7 +461,7 @@ async fn serve(
         }
         tokio::time::sleep(Duration::from_millis(10)).await;
     }
-    diagnoses.stop();
+    analyses.stop();
     calibrations.stop();
     recorder.stop_all();
     stop_bus.store(true, Ordering::Relaxed);

@@ -30,6 +30,7 @@ pub fn opening() -> OpenApi {
         ("command", "Lease, arming, setpoint, control law"),
         ("rig", "The rig description in force, its revisions, and the way back"),
         ("diagnoses", "What the model left out, found while the thruster runs"),
+        ("fits", "The model's parameters, fitted to a recording while the thruster runs"),
         ("calibrations", "Signs, zeros, friction, lags and thrust map of a thruster, stage by stage"),
         ("recordings", "Recordings of the live signals"),
         ("health", "Health and metrics"),

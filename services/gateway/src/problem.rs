@@ -25,6 +25,7 @@ pub enum Kind {
     UnknownRecording,
     UnknownRevision,
     UnknownDiagnosis,
+    UnknownFit,
     UnknownCalibration,
     UnknownFault,
     MethodNotAllowed,
@@ -37,6 +38,7 @@ pub enum Kind {
     NoRecording,
     RecordingActive,
     DiagnosisActive,
+    FitActive,
     CalibrationActive,
     ExcitationActive,
     NoExcitation,
@@ -56,7 +58,7 @@ pub enum Kind {
 
 impl Kind {
     /// All kinds, for the documentation and the tests.
-    pub const ALL: [Kind; 42] = [
+    pub const ALL: [Kind; 44] = [
         Kind::MalformedJson,
         Kind::MalformedPath,
         Kind::MalformedQuery,
@@ -72,6 +74,7 @@ impl Kind {
         Kind::UnknownRecording,
         Kind::UnknownRevision,
         Kind::UnknownDiagnosis,
+        Kind::UnknownFit,
         Kind::UnknownCalibration,
         Kind::UnknownFault,
         Kind::MethodNotAllowed,
@@ -84,6 +87,7 @@ impl Kind {
         Kind::NoRecording,
         Kind::RecordingActive,
         Kind::DiagnosisActive,
+        Kind::FitActive,
         Kind::CalibrationActive,
         Kind::ExcitationActive,
         Kind::NoExcitation,
@@ -123,6 +127,7 @@ impl Kind {
             Kind::UnknownRecording => (S::NOT_FOUND, "unknown-recording", "No such recording"),
             Kind::UnknownRevision => (S::NOT_FOUND, "unknown-revision", "No such revision of the rig"),
             Kind::UnknownDiagnosis => (S::NOT_FOUND, "unknown-diagnosis", "No such diagnosis"),
+            Kind::UnknownFit => (S::NOT_FOUND, "unknown-fit", "No such fit"),
             Kind::UnknownCalibration => (S::NOT_FOUND, "unknown-calibration", "No such calibration"),
             Kind::UnknownFault => (S::NOT_FOUND, "unknown-fault", "No such fault code"),
             Kind::MethodNotAllowed => {
@@ -141,6 +146,7 @@ impl Kind {
                 (S::CONFLICT, "recording-active", "A recording is running or has this name")
             }
             Kind::DiagnosisActive => (S::CONFLICT, "diagnosis-active", "A diagnosis is running"),
+            Kind::FitActive => (S::CONFLICT, "fit-active", "A fit is running"),
             Kind::CalibrationActive => (S::CONFLICT, "calibration-active", "A calibration is running"),
             Kind::ExcitationActive => (S::CONFLICT, "excitation-active", "A test signal is playing"),
             Kind::NoExcitation => (S::CONFLICT, "no-excitation", "No test signal is playing"),

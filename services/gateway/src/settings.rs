@@ -27,7 +27,7 @@ pub struct Settings {
     pub events: PathBuf,
     /// Folder of the rigs' revisions, likewise.
     pub rigs: PathBuf,
-    /// Folder of the diagnoses, likewise.
+    /// Folder of the diagnoses and fits, likewise.
     pub diagnoses: PathBuf,
     /// Folder of the calibrations, likewise.
     pub calibrations: PathBuf,
@@ -47,7 +47,7 @@ pub struct Settings {
     pub foxglove: Option<SocketAddr>,
     /// When a recording ends by itself.
     pub recording: RecordingLimits,
-    /// What is kept for diagnoses, and of them.
+    /// What is kept for diagnoses and fits, and of them.
     pub diagnosis: DiagnosisLimits,
 }
 
@@ -97,7 +97,7 @@ pub struct DiagnosisLimits {
     pub ring_time_s: f64,
     /// Rate at which it is kept, Hz.
     pub ring_rate_hz: f64,
-    /// Diagnoses that are kept; the oldest goes for the next.
+    /// Diagnoses that are kept, and fits likewise; the oldest goes for the next.
     pub kept_max: usize,
 }
 

@@ -1,5 +1,6 @@
 //! One thruster as the gateway sees it: what it asks (the desk) and what it last heard.
 
+mod analysis;
 mod calibration;
 mod command;
 mod faults;
@@ -16,6 +17,7 @@ use kort_proto::messages::{ControllerState, Outcome, Process, Reply, Request, Re
 use kort_proto::signals::Kind as SignalKind;
 use tokio::sync::oneshot;
 
+use crate::analysis::{AnalysisKind, Underway};
 use crate::bus::Bell;
 use crate::calibration::CalibrationInfo;
 use crate::desk::Desk;
@@ -26,8 +28,8 @@ use crate::lease::{By, Lease, Wanted};
 use crate::problem::{Kind, Problem};
 use crate::rig::Trial;
 use crate::view::{
-    DiagnosisStep, Estimated, LeaseView, LimitView, MismatchView, ParameterEstimate, Setpoint, SetpointRange,
-    ThrusterState, Values,
+    Estimated, LeaseView, LimitView, MismatchView, ParameterEstimate, Setpoint, SetpointRange, ThrusterState,
+    Values,
 };
 
 /// Servo and controller answer a request within this time, or are taken to be away.
@@ -59,8 +61,8 @@ pub struct Thruster {
     bell: Arc<Bell>,
     events: Arc<Events>,
     rendered: Mutex<(Rendered, Bytes)>,
-    /// Name and step of the diagnosis that runs, and when it began.
-    diagnosis: Mutex<Option<(String, String, Instant)>>,
+    /// The diagnosis or the fit that runs.
+    analysis: Mutex<Option<Underway>>,
     /// The calibration that runs, and when it began.
     calibration: Mutex<Option<(CalibrationInfo, Instant)>>,
     trial: Mutex<Trial>,
@@ -92,7 +94,7 @@ impl Thruster {
             asks,
             bell,
             events,
-            diagnosis: Mutex::default(),
+            analysis: Mutex::default(),
             calibration: Mutex::default(),
             trial: Mutex::new(Trial::new(range.thrust_n)),
             rendered: Mutex::new(((u64::MAX, u64::MAX, false), Bytes::new())),
@@ -108,11 +110,6 @@ impl Thruster {
     /// Another revision of the rig allows other setpoints.
     pub fn set_range(&self, range: SetpointRange) {
         *lock(&self.range) = range;
-    }
-
-    /// A diagnosis of it has come so far, or is over.
-    pub fn set_diagnosis(&self, at: Option<(String, String, Instant)>) {
-        *lock(&self.diagnosis) = at;
     }
 
     /// How the thrust fares under the revision of the rig in force.
@@ -278,11 +275,8 @@ impl Thruster {
                 parameters: controller.map(estimates).unwrap_or_default(),
             },
             mismatch: controller.map(MismatchView::of),
-            diagnosis: lock(&self.diagnosis).as_ref().map(|(id, step, began)| DiagnosisStep {
-                id: id.clone(),
-                step: step.clone(),
-                elapsed_s: now.saturating_duration_since(*began).as_secs_f64(),
-            }),
+            diagnosis: self.analysis(AnalysisKind::Diagnosis, now),
+            fit: self.analysis(AnalysisKind::Fit, now),
             calibration: self.calibration(now),
             revision_trial: self.trial().view(),
             excitation: desk.playing().map(|playing| ExcitationStep {

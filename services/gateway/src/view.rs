@@ -8,6 +8,7 @@ use utoipa::openapi::RefOr;
 use utoipa::openapi::schema::{ObjectBuilder, Schema, SchemaType, Type};
 use utoipa::{PartialSchema, ToSchema};
 
+use crate::analysis::JobStep;
 use crate::calibration::CalibrationStep;
 use crate::excitation::ExcitationStep;
 use crate::extract::Object;
@@ -49,7 +50,9 @@ pub struct ThrusterState {
     /// Which path has changed, and how far all is off the rig as stated; null while the controller is away.
     pub mismatch: Option<MismatchView>,
     /// The diagnosis of it that runs; null if none does.
-    pub diagnosis: Option<DiagnosisStep>,
+    pub diagnosis: Option<JobStep>,
+    /// The fit of it that runs; null if none does.
+    pub fit: Option<JobStep>,
     /// The calibration of it that runs; null if none does.
     pub calibration: Option<CalibrationStep>,
     /// How the thrust fares since another revision of the rig came into force; null if none did since the gateway started.
@@ -197,19 +200,6 @@ impl MismatchView {
             None => "every path is again as it was when it was learnt what is usual".into(),
         }
     }
-}
-
-/// How far a diagnosis is.
-#[derive(Clone, Debug, Serialize, ToSchema)]
-pub struct DiagnosisStep {
-    /// Its name.
-    #[schema(example = "t1-20260101T120000Z")]
-    pub id: String,
-    /// What it is at.
-    #[schema(example = "trying every effect")]
-    pub step: String,
-    /// Time it took so far, s.
-    pub elapsed_s: f64,
 }
 
 /// An estimated parameter.

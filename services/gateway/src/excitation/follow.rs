@@ -6,7 +6,7 @@ use std::time::Duration;
 use kort_proto::events::EventKind;
 
 use crate::App;
-use crate::diagnosis::{Options, Subject};
+use crate::analysis::{DiagnosisInfo, Options, Subject};
 use crate::problem::{Kind, Problem};
 use crate::token::Identity;
 
@@ -71,7 +71,7 @@ fn finish(app: &App, after: &After, complete: bool) -> Result<Option<String>, Pr
     })?;
     let subject = Subject::Recording(after.recording.clone(), file);
     let (thruster, rig) = (app.thruster(&after.thruster)?, app.rig(&after.thruster)?);
-    let info =
-        app.diagnoses().start(thruster, rig, &after.who, subject, first.as_deref(), options.clone())?;
-    Ok(Some(info.id))
+    let info: DiagnosisInfo =
+        app.analyses().start(thruster, rig, &after.who, subject, first.as_deref(), options.clone())?;
+    Ok(Some(info.job.id))
 }

@@ -27,7 +27,7 @@ pub struct Entry {
     pub revision: String,
     /// Name of the rig that it describes.
     pub name: String,
-    /// Where it comes from: `deployment`, `file`, `diagnosis ID`, or `revision N`.
+    /// Where it comes from: `deployment`, `file`, `diagnosis ID`, `fit ID`, or `revision N`.
     #[schema(example = "diagnosis t1-20260101T120000Z")]
     pub source: String,
     /// Who put it in force: name of the token, `local` where none is asked for.

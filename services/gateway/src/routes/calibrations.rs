@@ -10,7 +10,7 @@ use serde_json::Value;
 use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
-use super::diagnoses::blocking;
+use super::analyses::blocking;
 use crate::App;
 use crate::calibration::CalibrationInfo;
 use crate::extract::{Json, LeaseId, OptionalJson, Path};

@@ -12,7 +12,7 @@ use utoipa::{IntoParams, ToSchema};
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 use crate::App;
-use crate::diagnosis::Options;
+use crate::analysis::{DiagnosisInfo, Options};
 use crate::excitation::{After, Commanded, ExcitationView, Prepared, Wanted, follow, from_scenario};
 use crate::extract::{Json, LeaseId, Path, Query};
 use crate::problem::{Kind, Problem};
@@ -204,8 +204,9 @@ fn wanted(app: &App, id: &str, request: ExcitationRequest) -> Result<Wanted, Pro
             from_scenario(scenario, command, limit)
         }
         (None, None, Some(name)) => {
-            let diagnoses = app.diagnoses();
-            from_scenario(diagnoses.next_experiment(&diagnoses.find(id, &name)?)?, command, limit)
+            let analyses = app.analyses();
+            let first: DiagnosisInfo = analyses.find(id, &name)?;
+            from_scenario(analyses.next_experiment(&first)?, command, limit)
         }
         _ => {
             return Err(Problem::new(

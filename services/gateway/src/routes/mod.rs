@@ -1,5 +1,6 @@
 //! The routes, a file per resource. Adding one: write `routes/<name>.rs`, register it here.
 
+mod analyses;
 mod arming;
 mod calibrations;
 mod console;
@@ -10,6 +11,7 @@ mod docs;
 mod events;
 mod excitation;
 mod faults;
+mod fits;
 mod health;
 mod history;
 mod lease;
@@ -26,10 +28,10 @@ pub use controller::{ControllerRequest, ControllerView, LawParameter};
 
 /// What clients send, for [`crate::bodies`].
 pub mod bodies {
+    pub use super::analyses::AnalysisRequest;
     pub use super::calibrations::{CalibrationRequest, GoOnRequest};
     pub use super::controller::ControllerRequest;
     pub use super::controller_file::ControllerFile;
-    pub use super::diagnoses::DiagnosisRequest;
     pub use super::excitation::ExcitationRequest;
     pub use super::lease::LeaseRequest;
     pub use super::recording_sets::RecordingSetRequest;
@@ -66,6 +68,7 @@ pub fn router(app: Arc<App>) -> Router {
         .merge(controller_file::routes())
         .merge(rig::routes())
         .merge(diagnoses::routes())
+        .merge(fits::routes())
         .merge(calibrations::routes())
         .merge(stream::routes())
         .merge(history::routes())

@@ -11,6 +11,7 @@ use utoipa::{IntoParams, ToSchema};
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 use crate::App;
+use crate::analysis::{Analysis, DiagnosisInfo, FitInfo};
 use crate::extract::{Json, LeaseId, Path, Query};
 use crate::problem::{Kind, Problem};
 use crate::rig::{Asker, Entry, Making, Revised, Revision, RigDesk};
@@ -50,7 +51,7 @@ struct RevisionView {
     in_force: bool,
 }
 
-/// A revision to put in force: exactly one of `toml`, `diagnosis` and `revision`.
+/// A revision to put in force: exactly one of `toml`, `diagnosis`, `fit` and `revision`.
 #[derive(Default, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 #[schema(example = json!({"revision": 1, "note": "the friction was the cable's"}))]
@@ -61,6 +62,9 @@ pub struct RigRequest {
     /// Name of a diagnosis: the rig that it was compared with, and what it found.
     #[serde(default)]
     diagnosis: Option<String>,
+    /// Name of a fit: the rig that it was compared with, and the values that it found.
+    #[serde(default)]
+    fit: Option<String>,
     /// Number of a revision that is kept.
     #[serde(default)]
     #[schema(minimum = 1)]
@@ -192,8 +196,8 @@ async fn one(
     responses(
         (status = 200, description = "What is in force now, and what differs", body = Revised),
         (status = 400, description = "`malformed-json`, `malformed-body`, `malformed-header`, `malformed-query`", body = Problem, content_type = "application/problem+json"),
-        (status = 404, description = "`unknown-thruster`, `unknown-diagnosis`, `unknown-revision`", body = Problem, content_type = "application/problem+json"),
-        (status = 409, description = "`refused`: the drive is of another kind, or the diagnosis has nothing for the revision in force; `lease-held`, `lease-lost`", body = Problem, content_type = "application/problem+json"),
+        (status = 404, description = "`unknown-thruster`, `unknown-diagnosis`, `unknown-fit`, `unknown-revision`", body = Problem, content_type = "application/problem+json"),
+        (status = 409, description = "`refused`: the drive is of another kind, or the diagnosis or fit has nothing for the revision in force; `lease-held`, `lease-lost`", body = Problem, content_type = "application/problem+json"),
         (status = 413, description = "`body-too-large`", body = Problem, content_type = "application/problem+json"),
         (status = 415, description = "`unsupported-media-type`", body = Problem, content_type = "application/problem+json"),
         (status = 422, description = "`invalid-rig`, `invalid-field`, `out-of-range`", body = Problem, content_type = "application/problem+json"),
@@ -254,20 +258,24 @@ async fn whole(
 /// The text that a request names, and where it comes from.
 fn wanted(app: &App, id: &str, body: &RigRequest) -> Result<(String, String), Problem> {
     let desk = app.rig(id)?;
-    match (&body.toml, &body.diagnosis, body.revision) {
-        (Some(toml), None, None) => Ok((toml.clone(), "file".into())),
-        (None, Some(name), None) => {
-            let info = app.diagnoses().find(id, name)?;
-            let text = app.diagnoses().found(&info, &desk.book().current().0.revision)?;
-            Ok((text, format!("diagnosis {name}")))
-        }
-        (None, None, Some(number)) => {
+    match (&body.toml, &body.diagnosis, &body.fit, body.revision) {
+        (Some(toml), None, None, None) => Ok((toml.clone(), "file".into())),
+        (None, Some(name), None, None) => found::<DiagnosisInfo>(app, desk, id, name),
+        (None, None, Some(name), None) => found::<FitInfo>(app, desk, id, name),
+        (None, None, None, Some(number)) => {
             let (entry, text) = kept(desk, number)?;
             Ok((text.to_string(), format!("revision {}", entry.number)))
         }
-        _ => Err(Problem::new(Kind::InvalidField, "exactly one of toml, diagnosis and revision must be there")
-            .hint("send the file itself as text/plain, or {\"toml\": \"…\"}, {\"diagnosis\": \"…\"}, {\"revision\": 1}")),
+        _ => Err(Problem::new(Kind::InvalidField, "exactly one of toml, diagnosis, fit and revision must be there")
+            .hint("send the file itself as text/plain, or {\"toml\": \"…\"}, {\"diagnosis\": \"…\"}, {\"fit\": \"…\"}, {\"revision\": 1}")),
     }
+}
+
+/// What an analysis found, for the revision in force.
+fn found<A: Analysis>(app: &App, desk: &RigDesk, id: &str, name: &str) -> Result<(String, String), Problem> {
+    let info: A = app.analyses().find(id, name)?;
+    let text = app.analyses().found(&info, &desk.book().current().0.revision)?;
+    Ok((text, format!("{} {name}", A::KIND.entry().name)))
 }
 
 fn kept(desk: &RigDesk, number: u32) -> Result<Revision, Problem> {

@@ -1,13 +1,16 @@
-//! Diagnoses of a running thruster and the test signals for them, from outside: played, begun, followed, read, used, gone back from, cancelled.
+//! Diagnoses and fits of a running thruster and the test signals for them, from outside: played, begun, followed, read, used, gone back from, cancelled.
 
+#[path = "../common/mod.rs"]
 mod common;
+mod fits;
 
 use std::time::Duration;
 
-use common::{Site, Stack, children, kill, pages, wait};
+use common::jobs::job;
+use common::{Site, Stack, kill, pages, wait};
 use serde_json::{Value, json};
 
-/// How long a diagnosis may take that runs behind everything else on a machine full of tests.
+/// How long a diagnosis or a fit may take that runs behind everything else on a machine full of tests.
 const LONG: Duration = Duration::from_secs(300);
 
 /// A stand with dry friction that its rig description does not know of.
@@ -26,11 +29,11 @@ fn drive(stack: &mut Stack, levels: &[f64]) {
     }
 }
 
-/// Waits until a diagnosis is over; what became of it.
-fn over(stack: &Stack, id: &str) -> Value {
+/// Waits until a diagnosis or a fit is over; what became of it.
+fn over(stack: &Stack, path: &str) -> Value {
     let end = std::time::Instant::now() + LONG;
     loop {
-        let found = stack.expect("GET", &format!("/diagnoses/{id}"), None);
+        let found = stack.expect("GET", path, None);
         if found["state"] != "running" {
             return found;
         }
@@ -41,11 +44,6 @@ fn over(stack: &Stack, id: &str) -> Value {
 
 fn name_of(info: &Value) -> String {
     info["id"].as_str().unwrap_or_else(|| panic!("no name: {info}")).to_owned()
-}
-
-/// The process of the diagnosis that runs.
-fn job(stack: &Stack) -> Option<u32> {
-    children(stack.process("gateway")?).into_iter().find(|(_, role)| role == "diagnose").map(|(pid, _)| pid)
 }
 
 #[test]
@@ -65,7 +63,7 @@ fn what_the_rig_does_not_know_is_found_used_and_gone_back_from() {
             (diagnosis["id"] == id.as_str() && diagnosis["step"].as_str()?.len() > 3).then_some(())
         });
 
-        let done = over(&stack, &id);
+        let done = over(&stack, &format!("/diagnoses/{id}"));
         assert_eq!((&done["state"], &done["cause"]), (&json!("done"), &Value::Null), "{done}");
         assert_eq!(done["report"]["schema"], "kort.diagnosis/2");
         assert_eq!(done["report"]["verdict"], done["verdict"]);
@@ -128,7 +126,7 @@ fn a_diagnosis_gives_way_is_cancelled_and_ends_with_its_gateway() {
             })
         };
         let id = begin(&stack);
-        let pid = wait("its process", || job(&stack));
+        let pid = wait("its process", || job(&stack, "diagnose"));
         // proc(5): nice and policy are fields 19 and 41; SCHED_IDLE is 5.
         wait("it to give way", || {
             let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
@@ -137,7 +135,7 @@ fn a_diagnosis_gives_way_is_cancelled_and_ends_with_its_gateway() {
         });
         let cancelled = stack.expect("DELETE", &format!("/diagnoses/{id}"), None);
         assert_eq!(cancelled["state"], "cancelled");
-        assert_eq!(over(&stack, &id)["state"], "cancelled");
+        assert_eq!(over(&stack, &format!("/diagnoses/{id}"))["state"], "cancelled");
         assert!(!common::alive(pid));
         let (status, page) = stack.http("GET", &format!("/diagnoses/{id}/report"), None).unwrap();
         assert_eq!((status, &page["type"]), (409, &json!("urn:kort:problem:refused")), "{page}");
@@ -145,7 +143,7 @@ fn a_diagnosis_gives_way_is_cancelled_and_ends_with_its_gateway() {
 
         // Its gateway dies: so does it, and its successor says what became of it.
         let second = begin(&stack);
-        let pid = wait("its process", || job(&stack));
+        let pid = wait("its process", || job(&stack, "diagnose"));
         let old = stack.process_of("gateway");
         kill(old, "KILL");
         wait("its end", || (!common::alive(pid)).then_some(()));
@@ -206,7 +204,7 @@ fn a_test_signal_plays_under_the_lease_and_ends_at_zero() {
         });
 
         // A scenario file in shares, ended by hand, by a setpoint, and by a disarming.
-        let chirp = include_str!("../config/scenarios/chirp.toml");
+        let chirp = include_str!("../../config/scenarios/chirp.toml");
         let shares = json!({"toml": chirp, "limit": 40.0});
         for (method, path, body, left) in [
             ("DELETE", "/excitation", None, json!({"thrust_n": 0.0})),
@@ -272,7 +270,7 @@ fn a_proposed_experiment_is_played_and_diagnosed_with_the_first() {
         });
         let info = stack.expect("GET", &format!("/diagnoses/{id}"), None);
         assert_eq!((&info["recording"], &info["after"]), (&json!(recording), &json!("t1-first")));
-        let pid = wait("its process", || job(&stack));
+        let pid = wait("its process", || job(&stack, "diagnose"));
         let asked = std::fs::read_to_string(format!("/proc/{pid}/cmdline")).unwrap();
         let files: Vec<&str> = asked.split('\0').filter(|word| word.ends_with(".mcap")).collect();
         assert!(

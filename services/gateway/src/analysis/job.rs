@@ -1,4 +1,4 @@
-//! One diagnosis at work: the rows to a file, the process, its steps, and what its report says.
+//! One analysis at work: the rows to a file, the process, its steps, and what it made.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -11,18 +11,21 @@ use kort_proto::signals::SIGNALS;
 use kort_recording::LiveMcap;
 use serde_json::Value;
 
-use super::{Diagnoses, DiagnosisInfo, DiagnosisState, FindingView, LAST_MINUTES, Options, Subject};
+use super::kept::{FOUND, LAST_MINUTES, REPORT, RIG};
+use super::{Analyses, AnalysisKind, Options, Subject};
 use crate::rig::differ;
 use crate::ring::Row;
 use crate::thruster::lock;
 
-/// Before each step that `kort diagnose --job` tells.
+/// Before each step that a command with `--job` tells.
 const STEP: &str = "step: ";
 /// Exit code: done, but rows were lost or left out.
 const LOSSY: i32 = 3;
 
-/// A diagnosis about to be made.
+/// An analysis about to be made.
 pub struct Job {
+    /// Which kind.
+    pub kind: AnalysisKind,
     /// Its folder.
     pub folder: PathBuf,
     /// Recordings that come before it: all are fitted together.
@@ -35,68 +38,68 @@ pub struct Job {
     pub rig: Arc<str>,
 }
 
+/// What an analysis made.
+pub struct Made {
+    /// What it said.
+    pub report: Value,
+    /// The rig description that it was compared with.
+    pub rig: Arc<str>,
+    /// Rows were lost in reading, or left out.
+    pub lossy: bool,
+    /// Does the rig description with what was found differ?
+    pub usable: bool,
+}
+
 impl Job {
     /// Makes it, on a thread that lives as long as its process does: the process ends with it.
-    pub fn run(self, diagnoses: &Diagnoses) {
-        match self.make(diagnoses) {
-            Ok((status, _)) if matches!(status.code(), Some(0 | LOSSY)) => {
-                let lossy = status.code() == Some(LOSSY);
-                let report = fs::read(self.folder.join("report.json")).unwrap_or_default();
-                match serde_json::from_slice::<Value>(&report) {
-                    Ok(report) => {
-                        let found = fs::read_to_string(self.folder.join("found.toml")).unwrap_or_default();
-                        let usable = differ(&self.rig, &found);
-                        diagnoses.end(DiagnosisState::Done, None, |info| {
-                            told(info, &report);
-                            (info.lossy, info.usable) = (lossy, usable);
-                        });
-                    }
-                    Err(error) => {
-                        diagnoses.end(DiagnosisState::Failed, Some(format!("its report: {error}")), |_| ())
-                    }
-                }
-            }
-            Ok((status, words)) => {
-                let words = if words.is_empty() { format!("its process ended: {status}") } else { words };
-                diagnoses.end(DiagnosisState::Failed, Some(words), |_| ());
-            }
-            Err(error) => diagnoses.end(DiagnosisState::Failed, Some(error.to_string()), |_| ()),
+    ///
+    /// # Errors
+    /// Why there is nothing.
+    pub fn run(self, analyses: &Analyses) -> Result<Made, String> {
+        let (status, words) = self.make(analyses).map_err(|error| error.to_string())?;
+        if !matches!(status.code(), Some(0 | LOSSY)) {
+            return Err(if words.is_empty() { format!("its process ended: {status}") } else { words });
         }
+        let report = fs::read(self.folder.join(REPORT)).unwrap_or_default();
+        let report = serde_json::from_slice(&report).map_err(|error| format!("its report: {error}"))?;
+        let found = fs::read_to_string(self.folder.join(FOUND)).unwrap_or_default();
+        let (lossy, usable) = (status.code() == Some(LOSSY), differ(&self.rig, &found));
+        Ok(Made { report, rig: self.rig, lossy, usable })
     }
 
     /// Runs the process; how it ended, and its last words beside its steps.
-    fn make(&self, diagnoses: &Diagnoses) -> io::Result<(ExitStatus, String)> {
+    fn make(&self, analyses: &Analyses) -> io::Result<(ExitStatus, String)> {
         let in_folder = |name: &str| self.folder.join(name);
-        fs::write(in_folder("rig.toml"), &*self.rig)?;
+        fs::write(in_folder(RIG), &*self.rig)?;
         let recording = match &self.subject {
             Subject::Recording(_, file) => file.clone(),
             Subject::Last(_, rows) => {
-                diagnoses.step("writing the last minutes down");
+                analyses.step("writing the last minutes down");
                 let file = in_folder(LAST_MINUTES);
                 write_rows(&file, rows, &self.rig)?;
                 file
             }
         };
         let threads = std::thread::available_parallelism().map_or(1, |n| n.get().div_ceil(2));
-        let mut command = Command::new(&diagnoses.program);
-        command.arg("diagnose").args(&self.before).arg(recording).arg("--rig").arg(in_folder("rig.toml"));
+        let mut command = Command::new(&analyses.program);
+        command.arg(self.kind.entry().command).args(&self.before).arg(recording);
+        command.arg("--rig").arg(in_folder(RIG)).arg("-o").arg(in_folder(FOUND));
         command.args(["--json", "--jobs", &threads.to_string(), "--job", &std::process::id().to_string()]);
-        command.arg("--html").arg(in_folder("report.html")).arg("-o").arg(in_folder("found.toml"));
-        command.args(["--model", &self.options.model]);
+        command.args(self.kind.arguments(&self.folder)).args(["--model", &self.options.model]);
         if let Some(seed) = self.options.seed {
             command.args(["--seed", &seed.to_string()]);
         }
         if !self.options.with.is_empty() {
             command.args(["--with", &self.options.with.join(",")]);
         }
-        let report = File::create(in_folder("report.json"))?;
+        let report = File::create(in_folder(REPORT))?;
         let mut child = command.stdin(Stdio::null()).stdout(report).stderr(Stdio::piped()).spawn()?;
         let talk = child.stderr.take();
-        let child = diagnoses.hold(child);
+        let child = analyses.hold(child);
         let mut words = Vec::new();
         for line in talk.into_iter().flat_map(|talk| BufReader::new(talk).lines().map_while(Result::ok)) {
             match line.strip_prefix(STEP) {
-                Some(step) => diagnoses.step(step),
+                Some(step) => analyses.step(step),
                 None => words.push(line),
             }
             // Its last words are its error: what it said long before them is no use.
@@ -122,21 +125,4 @@ fn write_rows(file: &Path, rows: &[Row], rig: &str) -> io::Result<()> {
         output.row((at - first_ns) as f64 * 1e-9, &values)?;
     }
     output.finish()
-}
-
-/// What the list shows of a report.
-fn told(info: &mut DiagnosisInfo, report: &Value) {
-    let text = |value: &Value| value.as_str().map(str::to_owned);
-    info.verdict = text(&report["verdict"]);
-    info.summary = text(&report["summary"]);
-    let findings = report["findings"].as_array().into_iter().flatten();
-    info.findings = findings
-        .map(|finding| FindingView {
-            effect: text(&finding["effect"]).unwrap_or_default(),
-            path: text(&finding["path"]).unwrap_or_default(),
-            probability: finding["probability"].as_f64().unwrap_or(0.0),
-            statement: text(&finding["statement"]).unwrap_or_default(),
-            excess_error_removed: finding["heldout"]["excess_error_removed"].as_f64(),
-        })
-        .collect();
 }

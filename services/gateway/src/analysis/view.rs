@@ -1,11 +1,15 @@
-//! What the interface shows of a diagnosis.
+//! What the interface shows of every analysis, whatever its kind.
+
+use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// A diagnosis, running or past.
+use super::AnalysisKind;
+
+/// A diagnosis or a fit, running or past.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
-pub struct DiagnosisInfo {
+pub struct JobInfo {
     /// Its name.
     #[schema(example = "t1-20260101T120000Z")]
     pub id: String,
@@ -15,14 +19,14 @@ pub struct DiagnosisInfo {
     /// Who asked for it: name of the token, `local` where none is asked for.
     pub owner: String,
     /// How far it is.
-    pub state: DiagnosisState,
+    pub state: JobState,
     /// Of what: `recording NAME`, or `the last N s`.
     #[schema(example = "the last 300 s")]
     pub of: String,
     /// Name of the recording that it is of; null for the last minutes.
     #[serde(default)]
     pub recording: Option<String>,
-    /// Diagnosis whose recordings are fitted together with this one; null if it stands alone.
+    /// The one before it whose recordings are fitted together with this one; null if it stands alone.
     #[serde(default)]
     pub after: Option<String>,
     /// Number of the rig's revision that it is compared with.
@@ -42,42 +46,15 @@ pub struct DiagnosisInfo {
     /// Rows were lost in reading, or left out because a sensor misbehaves there: the report's notes say which.
     #[serde(default)]
     pub lossy: bool,
-    /// Its verdict; null until it is done.
-    #[serde(default)]
-    #[schema(example = "explained")]
-    pub verdict: Option<String>,
-    /// Its summary; null until it is done.
-    #[serde(default)]
-    pub summary: Option<String>,
-    /// Effects that it names, best first.
-    #[serde(default)]
-    pub findings: Vec<FindingView>,
     /// Is there something in it that the rig can take over (`POST …/rig` with its id)?
     #[serde(default)]
     pub usable: bool,
 }
 
-/// An effect that a diagnosis names.
-#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
-pub struct FindingView {
-    /// Its identifier in the catalogue.
-    #[schema(example = "coulomb_friction")]
-    pub effect: String,
-    /// drive, shaft, blade, flow or sensor.
-    pub path: String,
-    /// Probability that it is present.
-    #[schema(minimum = 0, maximum = 1)]
-    pub probability: f64,
-    /// In an engineer's words.
-    pub statement: String,
-    /// Share of the held-out squared error above the noise that it removes.
-    pub excess_error_removed: Option<f64>,
-}
-
-/// How far a diagnosis is.
+/// How far a diagnosis or a fit is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "lowercase")]
-pub enum DiagnosisState {
+pub enum JobState {
     /// Its process runs.
     Running,
     /// There is a report.
@@ -88,12 +65,28 @@ pub enum DiagnosisState {
     Cancelled,
 }
 
-impl DiagnosisInfo {
-    /// For the event log, once it is done.
-    pub fn done_words(&self) -> String {
-        let names: Vec<String> =
-            self.findings.iter().map(|f| format!("{} ({:.2})", f.effect, f.probability)).collect();
-        let names = if names.is_empty() { "no name".into() } else { names.join(", ") };
-        format!("diagnosis {}: {}, {names}", self.id, self.verdict.as_deref().unwrap_or("no verdict"))
-    }
+/// The one that runs, as its thruster's state knows it.
+#[derive(Clone, Debug)]
+pub struct Underway {
+    /// Which kind.
+    pub kind: AnalysisKind,
+    /// Its name.
+    pub id: String,
+    /// What it is at.
+    pub step: String,
+    /// When it began.
+    pub began: Instant,
+}
+
+/// How far the diagnosis or the fit of a thruster is.
+#[derive(Clone, Debug, Serialize, ToSchema)]
+pub struct JobStep {
+    /// Its name.
+    #[schema(example = "t1-20260101T120000Z")]
+    pub id: String,
+    /// What it is at.
+    #[schema(example = "trying every effect")]
+    pub step: String,
+    /// Time it took so far, s.
+    pub elapsed_s: f64,
 }
