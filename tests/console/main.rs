@@ -7,6 +7,7 @@ mod browser;
 #[path = "../common/mod.rs"]
 mod common;
 mod desk;
+mod fit;
 mod load;
 mod looks;
 mod plots;

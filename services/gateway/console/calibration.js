@@ -45,10 +45,7 @@ click("calibration-abort", async () => {
 click("calibration-use", async () => {
   const answer = await fetch(`${calibrationsOf()}/${calibrated.id}/rig`, { headers: token ? { Authorization: `Bearer ${token}` } : {} });
   if (!answer.ok) { log(`rig of ${calibrated.id}: ${answer.status}`, true); return; }
-  const wanted = { toml: await answer.text(), note: `calibration ${calibrated.id}` };
-  const would = await call("POST", `${base()}/rig?dry_run=true`, wanted);
-  if (!confirm(toAgree(would))) return;
-  came(await call("POST", `${base()}/rig`, wanted));
+  await adopt({ toml: await answer.text(), note: `calibration ${calibrated.id}` });
 });
 $("thruster").addEventListener("change", () => {
   calibrated = null; delete $("calibration").dataset.shown; $("calibration").replaceChildren(); says("calibration-text", "");

@@ -41,8 +41,8 @@ function showDiagnosis() {
   showPaths(state.mismatch);
   const running = state.diagnosis;
   if (running) says("diagnosis-text", `${running.step}, ${running.elapsed_s.toFixed(0)} s so far`);
-  $("diagnose").disabled = Boolean(running) || isStale();
-  $("diagnosis-cancel").disabled = !running;
+  $("diagnose").disabled = Boolean(running ?? state.fit) || isStale(); // there is one at a time of diagnoses and fits together
+  $("diagnosis-cancel").disabled = !(running ?? state.fit);
   $("use").disabled = !found || !found.usable || found.rig_revision !== state.rig_revision || isStale();
   showError();
 }
@@ -96,25 +96,26 @@ click("overlay", async () => {
 });
 setInterval(() => { if (!document.hidden) loadDiagnosis().catch(() => {}); }, LOOK_EVERY_MS);
 
+const chosenSubject = () => { const of = $("diagnosis-of").value; return of.startsWith("recording ") ? { recording: of.slice(10) } : { last_s: Number(of) }; };
 click("diagnose", async () => {
-  const recording = $("diagnosis-of").value.startsWith("recording ") ? $("diagnosis-of").value.slice(10) : null;
-  const begun = await call("POST", diagnosesOf(), recording ? { recording } : { last_s: Number($("diagnosis-of").value) });
+  const begun = await call("POST", diagnosesOf(), chosenSubject());
   log(`diagnosis ${begun.id} began, of ${begun.of}`);
 });
 click("diagnosis-cancel", async () => {
-  if (state.diagnosis) { await call("DELETE", `${diagnosesOf()}/${state.diagnosis.id}`); log("diagnosis cancelled"); }
+  const [what, running, kept] = state.diagnosis ? ["diagnosis", state.diagnosis, diagnosesOf()] : ["fit", state.fit, fitsOf()];
+  if (running) { await call("DELETE", `${kept}/${running.id}`); log(`${what} cancelled`); }
 });
 
 const value = (v) => (v === null ? "nothing" : typeof v === "object" && "value" in v ? `${v.value} (± ${percent(v.tol)})` : v === true ? "there" : String(v));
 const lines = (difference) => difference.map((change) => `${change.key}: ${value(change.before)} → ${value(change.after)}`);
 const unused = (answer) => answer.unused_effects.map(({ effect, why }) => `${effect} is used by no law and no observer: ${why}`);
 const toAgree = (would) => `Put this in force on ${thruster}, also while it drives?\n\n${[...lines(would.difference), ...unused(would)].join("\n")}`;
-click("use", async () => {
-  const wanted = { diagnosis: found.id };
+async function adopt(wanted) {
   const would = await call("POST", `${base()}/rig?dry_run=true`, wanted);
   if (!confirm(toAgree(would))) return;
   came(await call("POST", `${base()}/rig`, wanted));
-});
+}
+click("use", () => adopt({ diagnosis: found.id }));
 const goBack = async () => came(await call("POST", `${base()}/rig/rollback`));
 click("back", goBack);
 click("worse-back", goBack);
@@ -139,7 +140,7 @@ function showError() {
   $("error-text").className = trial.larger ? "warn-text" : "quiet";
 }
 
-// What can be diagnosed: the last minutes, or a recording that is done.
+// What can be diagnosed or fitted: the last minutes, or a recording that is done.
 async function offer() {
   const of = thruster, list = (await call("GET", "/v1/recordings")).filter((item) => item.thruster === of && item.state !== "recording");
   if (thruster !== of) return;

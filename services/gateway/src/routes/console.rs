@@ -14,7 +14,7 @@ use crate::App;
 struct Parts;
 
 /// What the page is put together from, each in its place. uPlot is other people's: MIT, its licence goes along.
-const PARTS: [&str; 12] = [
+const PARTS: [&str; 13] = [
     "vendor/uplot/LICENSE",
     "vendor/uplot/uPlot.min.css",
     "vendor/uplot/uPlot.iife.min.js",
@@ -26,6 +26,7 @@ const PARTS: [&str; 12] = [
     "signal.js",
     "recordings.js",
     "diagnosis.js",
+    "fit.js",
     "calibration.js",
 ];
 

@@ -1,0 +1,61 @@
+"use strict";
+// Fit: the model's parameters from the last minutes or a recording, beside what the rig description states; use them.
+let fitted = null; // the newest fit of this thruster that is done, else the newest
+const fitsOf = () => `${base()}/fits`;
+
+function showFit() {
+  if (!state) return;
+  const running = state.fit;
+  if (running) says("fit-text", `Fit: ${running.step}`); // its seconds stand beside it: read aloud each would drown the rest
+  says("fit-time", running ? `${running.elapsed_s.toFixed(0)} s so far` : "");
+  $("fit").disabled = Boolean(state.diagnosis ?? state.fit) || isStale();
+  $("use-fit").disabled = !fitted?.usable || fitted.rig_revision !== state.rig_revision || isStale();
+}
+setInterval(showFit, 200);
+
+// A value with as many decimals as its doubt has two digits of.
+function withDoubt(value, doubt) {
+  if (value === null) return "–";
+  if (!doubt) return String(Number(value.toPrecision(4)));
+  const decimals = Math.max(0, 1 - Math.floor(Math.log10(doubt)));
+  return decimals > 7 ? `${value.toExponential(3)} ± ${doubt.toExponential(1)}` : `${value.toFixed(decimals)} ± ${doubt.toFixed(decimals)}`;
+}
+const digits2 = (share) => (share === null ? "–" : `${Number((100 * share).toPrecision(2))} %`);
+const statedOf = ({ stated, stated_tol }) => (stated === null ? "–" : `${Number(stated.toPrecision(4))}${stated_tol === null ? "" : ` ± ${digits2(stated_tol)}`}`);
+const breakable = (words) => words.split(/(?<=_)/).flatMap((part, i) => (i ? [document.createElement("wbr"), part] : [part])); // a long one begins a line anew behind an underscore
+const rowsOf = (id, rows) => $(id).replaceChildren(...rows.map(cells));
+
+async function loadFit() {
+  if (!thruster || !state) return;
+  const of = thruster, list = await call("GET", fitsOf());
+  if (thruster !== of) return; // another was chosen meanwhile: these are not its
+  const newest = list.at(-1) ?? null;
+  fitted = list.findLast((item) => item.state === "done") ?? newest; // what ended otherwise takes nothing away
+  if (!fitted || fitted.state === "running") return;
+  const ended = newest.state === "done" || newest.state === "running" ? "" : `${newest.id}: ${newest.state}${newest.cause ? `, ${newest.cause}` : ""}`;
+  const shown = `${fitted.id} ${fitted.state} ${ended}`;
+  if ($("fitted").dataset.shown === shown) return;
+  $("fitted").dataset.shown = shown;
+  const open = fitted.not_identifiable.flatMap((group) => group.parameters);
+  const done = `${fitted.id}: ${fitted.parameters.length} values of ${fitted.model} fitted to ${fitted.of}.${open.length ? ` It cannot fix ${open.join(", ")}.` : ""}${fitted.lossy ? " Some of its rows were left out." : ""}`;
+  says("fit-text", fitted.state !== "done" ? ended : ended ? `${ended}. ${done}` : done);
+  $("fitted-of").textContent = `values of ${fitted.model}: what revision ${fitted.rig_number} of the rig states with its tolerance (two sigma), and what was fitted with its standard error`;
+  rowsOf("fitted", fitted.parameters.map((p) => [breakable(p.effect ? `${p.name} of ${p.effect}` : p.name), statedOf(p), `${withDoubt(p.value, p.std_error)}${p.at_bound ? ", at the edge of what is allowed" : ""}`, p.unit]));
+  rowsOf("heldout", fitted.heldout.map((left) => [breakable(left.channel), digits2(left.nrmse), digits2(left.noise_floor), left.white ? "noise" : "structure"]));
+  rowsOf("fit-open", fitted.not_identifiable.map((group) => [breakable(group.parameters.join(", ")), group.why, group.excitation]));
+  const item = (words, className) => Object.assign(document.createElement("li"), { textContent: words.replaceAll(/\S*\/(?=[^/\s]+\.mcap)/g, ""), className }); // where a file lies here is the gateway's matter
+  $("fit-notes").replaceChildren(...fitted.symptoms.map((words) => item(words, "warn-text")), ...fitted.notes.map((words) => item(words, "quiet")));
+}
+setInterval(() => { if (!document.hidden) loadFit().catch(() => {}); }, LOOK_EVERY_MS);
+setTimeout(() => loadFit().catch(() => {}), 500);
+
+click("fit", async () => {
+  const begun = await call("POST", fitsOf(), chosenSubject());
+  log(`fit ${begun.id} began, of ${begun.of}`);
+});
+click("use-fit", () => adopt({ fit: fitted.id }));
+$("thruster").addEventListener("change", () => {
+  fitted = null; delete $("fitted").dataset.shown;
+  for (const id of ["fitted", "heldout", "fit-open", "fit-notes"]) $(id).replaceChildren();
+  says("fit-text", "");
+});
