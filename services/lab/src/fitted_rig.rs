@@ -166,7 +166,7 @@ mod tests {
 
     #[test]
     fn an_effect_has_what_was_fitted_of_it_and_keeps_what_was_held() {
-        let known = "[[effects]]\neffect = \"coulomb_friction\"\ncoulomb_torque_n_m = { value = 0.3, tol = 0.5 } # by hand\nstribeck_rise = 0.2 # from the maker\n";
+        let known = "[[effects]]\neffect = \"coulomb_friction\"\ncoulomb_torque_n_m = { value = 0.3, tol = 0.5 } # by hand\nstribeck_rise = 0.2 # from the maker\nstribeck_speed_rad_s = 2.0\n";
         let effect = |name: &str, parameters: Vec<ParameterReport>| FittedEffect {
             effect: name.into(),
             path: "shaft".into(),
