@@ -18,6 +18,7 @@ from urllib.parse import quote, urlsplit, urlunsplit
 
 from . import _kort
 from .diagnosis import Diagnosis
+from .fitting import Fit
 from .recording import Recording, _taken
 from .reports import build
 
@@ -202,17 +203,38 @@ class Client:
     ) -> tuple[str, Diagnosis]:
         """Lets the service diagnose a recording, or the last ``last_s`` seconds, and waits ``timeout_s`` (s) for it; its
         id and the report. Raises ``RuntimeError`` if it fails and ``TimeoutError`` if it takes longer."""
+        started, report = self._analysed(thruster, "diagnoses", recording, last_s, timeout_s)
+        _, page = self.request("GET", _of(thruster, f"diagnoses/{quote(started)}/report"))
+        extra = {"document": report, "rig_toml": "", "html": page.decode()}
+        diagnosis: Diagnosis = build(Diagnosis, {**report, **extra})
+        return started, diagnosis
+
+    def fit(
+        self,
+        thruster: str,
+        *,
+        recording: str | None = None,
+        last_s: float | None = None,
+        timeout_s: float = 600.0,
+    ) -> tuple[str, Fit]:
+        """Lets the service fit its model to a recording, or to the last ``last_s`` seconds, and waits ``timeout_s`` (s) for
+        it; its id and the report. Raises ``RuntimeError`` if it fails and ``TimeoutError`` if it takes longer."""
+        started, report = self._analysed(thruster, "fits", recording, last_s, timeout_s)
+        _, rig = self.request("GET", _of(thruster, f"fits/{quote(started)}/rig"))
+        fitted: Fit = build(Fit, {**report, "document": report, "rig_toml": rig.decode()})
+        return started, fitted
+
+    def _analysed(
+        self, thruster: str, what: str, recording: str | None, last_s: float | None, timeout_s: float
+    ) -> tuple[str, dict[str, Any]]:
+        """Id and report of a diagnosis or a fit, once it is done."""
         body = {k: v for k, v in {"recording": recording, "last_s": last_s}.items() if v is not None}
-        started = str(self.call("POST", _of(thruster, "diagnoses"), body)["id"])
+        started = str(self.call("POST", _of(thruster, what), body)["id"])
         end = time.monotonic() + timeout_s
         while True:
-            found = self.call("GET", _of(thruster, f"diagnoses/{quote(started)}"))
+            found = self.call("GET", _of(thruster, f"{what}/{quote(started)}"))
             if found["report"] is not None:
-                _, page = self.request("GET", _of(thruster, f"diagnoses/{quote(started)}/report"))
-                report = found["report"]
-                extra = {"document": report, "rig_toml": "", "html": page.decode()}
-                diagnosis: Diagnosis = build(Diagnosis, {**report, **extra})
-                return started, diagnosis
+                return started, found["report"]
             if found["state"] != "running":
                 raise RuntimeError(f"{started}: {found['state']}: {found.get('cause')}")
             if time.monotonic() > end:
@@ -287,6 +309,10 @@ class Command:
     def adopt(self, diagnosis: str) -> Any:
         """Puts the rig with what a diagnosis found in force: no stop, no step."""
         return self._call("POST", "rig", {"diagnosis": diagnosis})
+
+    def adopt_fit(self, fit: str) -> Any:
+        """Puts the rig with the values of a fit in force: no stop, no step."""
+        return self._call("POST", "rig", {"fit": fit})
 
     def roll_back(self) -> Any:
         """Puts the rig of before in force again."""

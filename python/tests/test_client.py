@@ -109,6 +109,19 @@ def test_command_record_and_read_back(client: kort.Client) -> None:
     assert client.state("t1").lease is None
 
 
+def test_the_service_fits_what_it_drove(client: kort.Client) -> None:
+    with client.command("t1", "test", ttl_ms=60_000) as command:
+        command.arm()
+        wait(lambda: client.state("t1").armed)
+        for thrust_n in (60.0, -60.0, 100.0, 20.0, -80.0, 40.0):
+            command.thrust(thrust_n)
+            time.sleep(1.2)
+        command.disarm()
+    started, fit = client.fit("t1", last_s=60.0, timeout_s=300.0)
+    assert started.startswith("t1-") and fit.schema == "kort.fit/1" and fit.channels["shaft_speed_rad_s"]
+    assert "[propeller]" in fit.rig_toml and fit.document["model"] == fit.model
+
+
 def test_the_stream_gives_states(client: kort.Client) -> None:
     with client.stream("t1", hz=20) as stream:
         states = [state for state, _ in zip(stream, range(3))]
