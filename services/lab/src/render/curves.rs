@@ -28,7 +28,7 @@ pub fn all(diagnosis: &Diagnosis) -> Markup {
     let drawn = &report.recordings[..report.recordings.len().min(MOST_RECORDINGS)];
     html! {
         p class="soft" {
-            "Measured is dark, the baseline orange"
+            "Measured has the colour of the text, the baseline is orange"
             @if found { ", the model with everything found blue" }
             "."
             @if !spans.is_empty() && !several { " Shaded: where most of the mismatch lies." }

@@ -4,11 +4,12 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::number;
 
-/// The whole look. Dark text on white; tables scroll inside their own box on a phone.
+/// The whole look. Dark text on white, or light on dark for who asks for it, as the console shows it; tables scroll inside
+/// their own box on a phone.
 const STYLE: &str = "
-:root { --ink: #1b2733; --soft: #5b6b7a; --line: #d8e0e7; --band: #f4f7fa; --accent: #0b6fb8; }
+:root { --ink: #1b2733; --soft: #5b6b7a; --line: #d8e0e7; --band: #f4f7fa; --accent: #0b6fb8; --paper: #fff; color-scheme: light dark; }
 * { box-sizing: border-box; }
-body { margin: 0 auto; padding: 1.5rem 1.25rem 4rem; max-width: 62rem; color: var(--ink); background: #fff;
+body { margin: 0 auto; padding: 1.5rem 1.25rem 4rem; max-width: 62rem; color: var(--ink); background: var(--paper);
   font: 16px/1.55 system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', sans-serif; }
 header { border-bottom: 2px solid var(--ink); margin-bottom: 1.5rem; padding-bottom: .5rem; }
 h1 { font-size: 1.6rem; line-height: 1.2; margin: 0 0 .25rem; }
@@ -38,6 +39,11 @@ dt { color: var(--soft); } dd { margin: 0; }
 footer { margin-top: 3rem; border-top: 1px solid var(--line); padding-top: .6rem; }
 @media (max-width: 40rem) { body { padding: 1rem .8rem 3rem; font-size: 15px; } h1 { font-size: 1.3rem; }
   dl { grid-template-columns: 1fr; gap: 0; } dd { margin-bottom: .4rem; } }
+@media screen and (prefers-color-scheme: dark) {
+  :root { --ink: #e4eaf0; --soft: #9fb0bf; --line: #33414e; --band: #1b252f; --accent: #3f9ae0; --paper: #12181f; }
+  a { color: #7cb8ff; }
+  /* Drawn dark on light: turned over, with the hues kept. */
+  figure svg, figcaption [style] { filter: invert(1) hue-rotate(180deg); } }
 @media print { body { max-width: none; } figure, table { break-inside: avoid; } }
 ";
 
