@@ -1,6 +1,8 @@
 //! A closed loop of controller and plant for the suites.
 #![allow(dead_code)]
 
+pub mod watched;
+
 use kort_control::{Controller, ControllerConfig, Measurement, Output, Reference};
 use kort_thruster::models::ModelName;
 use kort_thruster::parameters::{Parameter, Parameters};
