@@ -21,7 +21,7 @@ pub(super) struct Constants<T> {
     density_kg_m3: T,
     added_mass_kg: T,
     flux_kg_m: T,
-    inertia_kg_m2: T,
+    pub(super) inertia_kg_m2: T,
     pub(super) torque_constant_nm_a: T,
     pub(super) resistance_ohm: T,
     viscous_nm_s: T,

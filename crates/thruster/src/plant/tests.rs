@@ -150,6 +150,33 @@ fn a_disturbance_dies_at_the_rate_that_is_told() {
     assert!(told > 0.9 * dies && told < 2.0 * dies, "{told} {dies}");
 }
 
+/// A light rotor that its supply holds back: strides chosen without that limit would run away at it.
+#[test]
+fn a_supply_that_brakes_within_a_stride_is_not_passed_over() {
+    let rig = "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = 8e-5\ntorque_constant_nm_a = 0.11\n\
+               viscous_friction_nm_s = 3e-4\nwinding_resistance_ohm = 0.9\n[amplifier]\nkind = \"current\"\n\
+               current_limit_a = 20\nsupply_v = 10\n[sensors]\n";
+    let rig = Rig::from_toml(rig).expect("a rig");
+    let limit = (&crate::effects::voltage_limit_backemf::DESCRIPTOR, &[0.0, 1.0][..]);
+    let ends_at = |of: usize| {
+        let mut plant: Plant = Plant::new(ModelName::Model2, &rig, &Parameters::stated(&rig), &[limit], 1e-3);
+        let ticks: Vec<Tick> = (0..3000)
+            .map(|i| Tick {
+                time_s: f64::from(i) * 1e-3,
+                course: if i > 500 { Course::Smooth } else { Course::Any },
+                ..Tick::default()
+            })
+            .collect();
+        // Up to the limit, and slowly on.
+        let commands: Vec<f64> = (0..3000).map(|i| 0.2 + 1e-3 * f64::from(i)).collect();
+        ticks.chunks(of).zip(commands.chunks(of)).for_each(|(t, c)| plant.stride(t, Some(c)));
+        plant.truth().shaft_speed_rad_s
+    };
+    let (one, ten) = (ends_at(1), ends_at(10));
+    assert!((80.0..95.0).contains(&one), "at its limit: {one}");
+    assert!((ten - one).abs() < 1e-3 * one, "{ten} {one}");
+}
+
 /// A ball screw's motor on a voltage drive, with hardly any friction: the winding brakes it.
 #[test]
 fn a_voltage_that_stands_brakes() {
