@@ -350,6 +350,8 @@ impl<'a, 'p> Writer<'a, 'p> {
                 break;
             }
         }
+        // What was not fitted may stand in the places of many effects rather than of few.
+        out.sort_by(|a, b| b.probability.total_cmp(&a.probability));
         out
     }
 

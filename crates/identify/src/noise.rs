@@ -168,8 +168,9 @@ impl Floor {
                 let facts = criterion.facts(&bands[b]);
                 (sum + facts * (left[b] / self.doubt[b]).min(1.0), n + facts)
             });
-            // By a standard deviation more: the least of several is rather too small.
-            if facts > 0.0 { sum / facts * (1.0 + (2.0 / facts).sqrt()) } else { 1.0 }
+            // By two standard deviations more: residual and doubt are one draw each, and the least of several is rather
+            // too small.
+            if facts > 0.0 { sum / facts * (1.0 + 2.0 * (4.0 / facts).sqrt()) } else { 1.0 }
         };
         channels(bands).map(of_channel).fold(1.0, f64::min)
     }

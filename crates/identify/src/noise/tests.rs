@@ -215,7 +215,7 @@ fn what_drives_is_in_doubt_no_further_than_the_mismatch_of_any_channel_shows() {
     assert_eq!(kept(1.0, 1.0), 1.0, "all of it may be real");
     assert_eq!(kept(1e-2, 1e-2), 1.0);
     let facts: f64 = bands().iter().map(|band| CRITERION.facts(band)).sum();
-    assert!((kept(1e-4, 1.0) / (1e-2 * (1.0 + (2.0 / facts).sqrt())) - 1.0).abs() < 1e-9);
+    assert!((kept(1e-4, 1.0) / (1e-2 * (1.0 + 2.0 * (4.0 / facts).sqrt())) - 1.0).abs() < 1e-9);
     assert_eq!(kept(1e-4, 1.0), kept(1.0, 1e-4));
     let plain = Floor::of_signal(&two, &CRITERION);
     assert_eq!(

@@ -7,6 +7,10 @@ use crate::parameters::Parameter as P;
 use crate::real::Real;
 use crate::rig::AmplifierKind;
 
+/// Share of a disturbance that the winding may brake away in several ticks passed at once. Whoever chose them does not know
+/// that an effect holds the drive to its supply, nor how a fit moves the winding.
+const BRAKES: f64 = 0.8;
+
 /// What the drive does over one tick.
 #[derive(Clone, Copy)]
 pub(super) struct Course<T> {
@@ -125,6 +129,14 @@ impl<T: Real> Plant<T> {
             (short - rub / self.tick_s) * balance.inertia_kg_m2 / self.constants.torque_constant_nm_a;
         let current_a = short_a.clamp(-limit_a, limit_a);
         (current_a != short_a).then_some(AtLimit { current_a, wanted_rad_s })
+    }
+
+    /// Whether the winding, under a voltage that stands, brakes the shaft within this time.
+    #[inline(always)]
+    pub(super) fn brakes_within(&self, tick: &Tick, course: &Course<T>, span_s: f64) -> bool {
+        let kt = self.constants.torque_constant_nm_a.re();
+        let resists = course.drive.resistance_ohm.re() * self.constants.inertia_kg_m2.re();
+        course.by_speed && tick.driven == Driven::Command && kt * kt * span_s > BRAKES * resists
     }
 
     /// The currents of a tick, where no speed is needed for them.

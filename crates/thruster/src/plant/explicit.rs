@@ -2,16 +2,12 @@
 //! once where they stay so.
 
 use super::drive::Course as DriveCourse;
-use super::{Balance, Course, Driven, Plant, Rub, SPEED, Tick, each};
+use super::{Balance, Course, Plant, Rub, SPEED, Tick, each};
 use crate::real::Real;
 
 /// Share of the shaft's speed that may go in several ticks passed at once: dry friction turns round with the speed,
 /// which a long step would pass over.
 const TURNS: f64 = 0.5;
-
-/// Share of a disturbance that the winding may brake away in several ticks passed at once. Whoever chose them does not know
-/// that an effect holds the drive to its supply, nor how a fit moves the winding.
-const BRAKES: f64 = 0.8;
 
 impl<T: Real> Plant<T> {
     /// Steps through ticks under commands in place of their own, at once where that is allowed and else one by one.
@@ -51,14 +47,6 @@ impl<T: Real> Plant<T> {
             && (!HOOKED
                 || self.last_rub.is_none()
                 || goes * self.tick_s * (ticks.len() as f64) < TURNS * x[SPEED].re().abs())
-    }
-
-    /// Whether the winding, under a voltage that stands, brakes the shaft within this time.
-    #[inline(always)]
-    fn brakes_within(&self, tick: &Tick, drive: &DriveCourse<T>, span_s: f64) -> bool {
-        let kt = self.constants.torque_constant_nm_a.re();
-        let resists = drive.drive.resistance_ohm.re() * self.constants.inertia_kg_m2.re();
-        drive.by_speed && tick.driven == Driven::Command && kt * kt * span_s > BRAKES * resists
     }
 
     /// Whether rates of the last step and a look ahead tell this one.
