@@ -102,7 +102,7 @@ fn standing<'a>(document: &'a mut DocumentMut, effect: &str) -> Option<(&'a mut 
 fn item(fitted: &ParameterReport, told: &str) -> Item {
     let mut both = InlineTable::new();
     both.insert("value", short(fitted.value).into());
-    let tol = (2.0 * fitted.std_error / fitted.value).abs();
+    let tol = tolerance(fitted);
     if tol.is_finite() {
         both.insert("tol", short(tol.clamp(TOL.0, TOL.1)).into());
     }
@@ -113,8 +113,12 @@ fn item(fitted: &ParameterReport, told: &str) -> Item {
 
 /// A fitted value, with twice its standard error as tolerance.
 pub fn quantity(fitted: &ParameterReport) -> Quantity {
-    let tol = (2.0 * fitted.std_error / fitted.value).abs();
-    Quantity { value: fitted.value, tol: Some(tol).filter(|t| t.is_finite() && *t > 0.0) }
+    Quantity { value: fitted.value, tol: Some(tolerance(fitted)).filter(|t| t.is_finite() && *t > 0.0) }
+}
+
+/// Twice its standard error, over its value.
+fn tolerance(fitted: &ParameterReport) -> f64 {
+    (2.0 * fitted.std_error / fitted.value).abs()
 }
 
 /// Six significant digits.
