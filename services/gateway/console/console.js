@@ -267,9 +267,11 @@ function showBounds() {
   $("slider").value = $("entry").value;
 }
 
+let lawChanges = 0; // an answer asked for before a change was made shows what was before
 async function loadController() {
-  const of = thruster, answer = await call("GET", `${base()}/controller`);
+  const of = thruster, asked = lawChanges, answer = await call("GET", `${base()}/controller`);
   if (thruster !== of) return;
+  if (lawChanges !== asked) return loadController();
   $("controller").dataset.running = answer.controller;
   for (const [id, names, chosen] of [["controller", answer.available, answer.controller], ["observer", answer.observers, answer.observer], ["estimator", answer.estimators, answer.estimator]]) {
     $(id).replaceChildren(...names.map((name) => new Option(name, name, false, name === chosen)));
@@ -280,8 +282,9 @@ async function loadController() {
     entry.addEventListener("change", () => { // an emptied field is no zero
       if (entry.value === "") { entry.value = p.value; return; }
       const value = Number(entry.value);
+      lawChanges += 1;
       call("PUT", `${base()}/controller`, { parameters: { [p.name]: value } })
-        .then(() => { p.value = value; log(`${p.name} = ${value}${p.unit === "1" ? "" : ` ${p.unit}`}`); }).catch(() => { entry.value = p.value; });
+        .then(() => { lawChanges += 1; p.value = value; log(`${p.name} = ${value}${p.unit === "1" ? "" : ` ${p.unit}`}`); }).catch(() => { entry.value = p.value; });
     });
     const small = Object.assign(document.createElement("small"), { textContent: range });
     return cells([[p.name, document.createElement("br"), small], entry, p.unit]);
