@@ -47,6 +47,7 @@ impl Search<'_, '_> {
         }
         let mut effects = Vec::new();
         let mut untried = self.screens[set].clone();
+        untried.retain(|s| !self.barred.contains(&s.effect.id));
         untried.retain(|s| {
             if !effects.contains(&s.effect.id) {
                 effects.push(s.effect.id);

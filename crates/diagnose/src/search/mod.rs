@@ -2,6 +2,7 @@
 //! effects, to convergence. Every set that was fitted is kept, with its cost: the posterior is over them.
 
 mod afar;
+mod elsewhere;
 mod every_start;
 mod expand;
 mod forms;
@@ -51,6 +52,8 @@ pub struct Search<'a, 'p> {
     /// What a larger set cost when a smaller one was last fitted from where it ended.
     dropped: BTreeMap<(Set, Set), f64>,
     reshaped: BTreeSet<(Set, u64)>,
+    /// Effects that are not to be added for now.
+    barred: Set,
     /// Sets from whose fit another was begun, with what the fit cost then.
     exchanged: BTreeSet<(Set, Set, u64)>,
     /// What each effect does to the model, and to other equations in its place: by members without a size.
@@ -74,6 +77,7 @@ impl<'a, 'p> Search<'a, 'p> {
             begun_from: BTreeSet::new(),
             dropped: BTreeMap::new(),
             reshaped: BTreeSet::new(),
+            barred: Set::new(),
             exchanged: BTreeSet::new(),
             probes: BTreeMap::new(),
             ways: Vec::new(),
@@ -161,7 +165,8 @@ impl<'a, 'p> Search<'a, 'p> {
         self.fit_what_has_no_size();
         self.expand(&best, self.cost(&best));
         self.look_from_afar();
-        self.climb(best, progress)
+        let best = self.climb(best, progress);
+        self.elsewhere(best, progress)
     }
 
     /// Members of a set that are other equations in the place of the model's.

@@ -179,3 +179,31 @@ fn the_plainer_of_two_takes_the_place_that_the_other_found() {
         assert_eq!(search.relatives(&vec![bent.id]), [plain.id]);
     });
 }
+
+#[test]
+fn another_way_begins_with_what_explains_something_else() {
+    let [friction, bent, lag] = [
+        &coulomb_friction::DESCRIPTOR,
+        &position_dependent_friction::DESCRIPTOR,
+        &encoder_filter_lag::DESCRIPTOR,
+    ];
+    with_search(vec![friction, bent, lag], |search| {
+        let none = Set::new();
+        let baseline = search.fits[&none].clone();
+        search.probes.insert(none.clone(), search.probe_all(&none));
+        for effect in [friction, bent, lag] {
+            let member = Member::new(effect, &search.problem.scale);
+            let hypothesis = baseline.hypothesis.with(&baseline.values, member, &search.problem.scale);
+            search.fit_set(vec![effect.id], &hypothesis, &baseline.columns);
+        }
+        let (rubs, late) = (vec![friction.id], vec![lag.id]);
+        assert_eq!(search.ways_beside(&rubs, &none).0, [friction.id, bent.id], "they explain the same");
+        assert_eq!(search.ways_beside(&late, &none), (late.clone(), Some(rubs.clone())));
+        assert_ne!(search.ways_beside(&late, &rubs).1, Some(rubs.clone()), "known to lead elsewhere");
+        search.barred = late.clone();
+        search.expand(&none, f64::INFINITY);
+        assert!(!search.forward(&rubs).contains(&lag.id), "not to be added");
+        search.barred = none;
+        assert_eq!(search.elsewhere(late, &|_| ()), [friction.id, lag.id]);
+    });
+}
