@@ -55,7 +55,9 @@ fn every_kind_of_bad_recording_is_named() {
         (b"time_s,current_a\n0,1\n1,NaN\n", &["line 3", "current_a", "\"NaN\"", "not finite"]),
         (b"time_s,current_a\n0,1\ninf,1\n", &["line 3", "time_s", "\"inf\""]),
         (b"time_s,current_a\n0,1\n1\n2,1\n", &["line 3", "1 cells", "2"]),
-        (b"time_s,current_a\n0,\xff\xfe\n1,1\n", &["line 2", "UTF-8"]),
+        (b"time_s,current_a\n0,\x81\x8d\n1,1\n", &["line 2", "UTF-8", "Windows-1252"]),
+        (b"time_s,current_a\n0,\xff\xfe\n1,1\n", &["line 2", "current_a", "\"\u{ff}\u{fe}\""]),
+        (b"Bench 3\nWater 18 C\n\ntime_s,current_a\n0,1\n1,one\n", &["line 6", "current_a", "\"one\""]),
         (b"\x89MCAP0\r\n\x00\x01\x02", &["MCAP"]),
         (b"\x1f\x8b\x08\x00garbage", &["bad.csv"]),
     ];

@@ -7,6 +7,8 @@ mod bags;
 mod clocks;
 #[path = "common/lab.rs"]
 mod lab;
+#[path = "logs/preambles.rs"]
+mod preambles;
 #[path = "logs/refused.rs"]
 mod refused;
 #[path = "logs/tables.rs"]

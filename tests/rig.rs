@@ -209,6 +209,27 @@ fn what_cannot_be_used_is_refused_with_the_reason() {
         }
         assert_eq!(ask(&stack, "GET", "/rig/revisions/7", &[], "").0, 404);
 
+        // All that is wrong is told at once, as `kort check` tells it.
+        let many = wrong.replacen("radius_m = ", "radius_m = 130 # ", 1).replace("[run]", "[rnu]");
+        let (status, problem) = ask(&stack, "POST", "/rig?dry_run=true", &[TEXT], &many);
+        let problem = parsed(&problem);
+        let site = tempfile::tempdir().unwrap();
+        let file = site.path().join("many.toml");
+        std::fs::write(&file, &many).unwrap();
+        let checked = run(std::process::Command::new(KORT).args(["check", "--json"]).arg(&file));
+        let mut checked = parsed(&String::from_utf8_lossy(&checked.stdout))["problems"].clone();
+        for told in checked.as_array_mut().unwrap() {
+            told.as_object_mut().unwrap().remove("file");
+        }
+        assert_eq!((status, &problem["problems"]), (422, &checked), "{problem}");
+        assert_eq!(checked.as_array().map(Vec::len), Some(3), "{checked}");
+        for told in checked.as_array().unwrap() {
+            assert!(
+                problem["detail"].as_str().unwrap().contains(told["message"].as_str().unwrap()),
+                "{problem}"
+            );
+        }
+
         // Under another's lease nothing changes.
         let lease = json!({"holder": "bench", "ttl_ms": 60000}).to_string();
         let (_, granted) = ask(&stack, "POST", "/lease", &[JSON], &lease);

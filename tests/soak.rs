@@ -316,6 +316,41 @@ fn a_rig_s_default_is_explained() {
     assert!(text(&dry.stderr).contains("needs a propeller"), "{}", text(&dry.stderr));
 }
 
+/// What a rig's page says of an effect that it states, the effect's own page says too, on every kind of drive.
+#[test]
+fn an_effect_is_explained_as_the_rigs_that_state_it_are() {
+    let folder = tempfile::tempdir().expect("folder");
+    let ventilation = "[[effects]]\neffect = \"ventilation\"\nthrust_loss = 0.3\nonset_speed_rad_s = 40\nlag_s = 0.3\n\
+                       recovery_lag_s = 0.3\nhysteresis = 0.1\ndrag_loss_over_lift_loss = 1\n";
+    let mut ripple = String::from("[[effects]]\neffect = \"torque_ripple_cogging\"\n");
+    for k in 1..=4 {
+        ripple += &format!(
+            "order_{k} = {k}\ncogging_sin_{k}_n_m = 0.01\ncogging_cos_{k}_n_m = 0\nripple_sin_{k}_nm_a = 0\nripple_cos_{k}_nm_a = 0\n"
+        );
+    }
+    let document = |run: &Output| serde_json::from_slice::<Value>(&run.stdout).expect("JSON");
+    let mut said = 0;
+    for rig in ["whitcomb-yoerger-1999", "t200", "speed-drive"] {
+        let stated = std::fs::read_to_string(format!("config/thrusters/{rig}.toml")).expect("a rig");
+        let file = folder.path().join("rig.toml");
+        std::fs::write(&file, format!("{stated}\n{ventilation}{ripple}")).expect("a file");
+        let of_rig = document(&kort(&["explain", "--json", "--for", file.to_str().expect("utf-8")]));
+        for known in of_rig["known_effects"].as_array().expect("effects") {
+            let effect = known["effect"].as_str().expect("an id");
+            let page =
+                text(&kort(&["explain", effect]).stdout).split_whitespace().collect::<Vec<_>>().join(" ");
+            for words in known["how"].as_str().expect("words").split("; ") {
+                assert!(page.contains(words), "{rig}, {effect}: {words} not in {page}");
+                said += 1;
+            }
+        }
+    }
+    assert!(said >= 6);
+    let told = document(&kort(&["explain", "ventilation", "--json"]))["effects"][0].clone();
+    assert!(told["used_for"].as_array().is_some_and(|uses| !uses.is_empty()), "{told}");
+    assert!(told["not_used"].is_null() && told["not_used_elsewhere"].is_string(), "{told}");
+}
+
 #[test]
 fn what_cannot_be_a_share_is_named() {
     let folder = tempfile::tempdir().expect("folder");

@@ -7,6 +7,7 @@
 //! gateway --Request--> controller, servo --Reply--> gateway
 //! ```
 
+pub mod complaint;
 #[cfg(feature = "config")]
 pub mod config;
 #[cfg(feature = "config")]

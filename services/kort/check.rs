@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
+use kort_proto::complaint::Complaint;
 use kort_proto::config::{Config, DEFAULT_PATH, is_there};
 use serde::Serialize;
 
@@ -24,13 +25,8 @@ pub struct Check {
 #[derive(Debug, PartialEq, Serialize)]
 struct Problem {
     file: String,
-    key: Option<String>,
-    found: Option<String>,
-    /// Values that are allowed, where that is what is wrong and the words set them apart.
-    allowed: Option<String>,
-    hint: Option<String>,
-    /// All that is said but the hint.
-    message: String,
+    #[serde(flatten)]
+    said: Complaint,
 }
 
 /// An effect that a rig states and no control law or observer uses: no mistake, and never passed over in silence.
@@ -184,65 +180,19 @@ fn services(config: &Config) -> Vec<String> {
     said
 }
 
-/// Takes a message apart: `file: `key` = value is …\nhint: …`.
+/// What is said of a file, or of another that the words name: `file: …`.
 fn problem(file: &str, message: &str) -> Problem {
-    let (what, hint) = match message.split_once("hint:") {
-        Some((what, hint)) => (what.trim(), Some(hint.trim().to_owned())),
-        None => (message.trim(), None),
-    };
-    let (file, what) = match what.split_once(": ") {
+    let (file, words) = match message.split_once(": ") {
         Some((named, rest)) if named.ends_with(".toml") => (named, rest),
-        _ => (file, what),
+        _ => (file, message),
     };
-    // The TOML reader shows the line, and says behind the hint in which key it lies.
-    let (hint, within) = match hint.as_deref().and_then(|hint| hint.rsplit_once("\nin `")) {
-        Some((hint, key)) => (Some(hint.trim().to_owned()), key.strip_suffix('`')),
-        None => (hint, None),
-    };
-    let parsing = what.contains("TOML parse error");
-    let pointed = if parsing { pointed_at(what) } else { None };
-    let named = || what.split('`').nth(1).filter(|_| !parsing || what.contains(" field `"));
-    let key = pointed.map(|(key, _)| key).or_else(named).or(within).map(str::to_owned);
-    let after = |words: &[&str]| words.iter().find_map(|words| Some(what.split_once(words)?.1));
-    // A colon within a value (an address) is followed by no space, a comma within a list by one.
-    let ends = [" is ", " does ", " asks ", ": ", ";", ", and ", ", but ", ", which ", "\n"];
-    let found = after(&["` = ", "` holds ", "` has "])
-        .and_then(|rest| ends.iter().try_fold(rest, |found, end| found.split(end).next()))
-        .or(pointed.map(|(_, value)| value))
-        .map(|found| found.trim().to_owned());
-    let allowed = after(&[
-        "is allowed: ",
-        " is outside ",
-        "allowed is ",
-        "allowed are ",
-        "known are ",
-        "expected one of ",
-        "here are ",
-    ]);
-    // A type; names of ours mean nothing to others.
-    let of_type = || after(&[", expected "]).filter(|kind| pointed.is_some() && !kind.starts_with("struct "));
-    let allowed = allowed.or_else(of_type);
-    // Where the words only say that it is none of them, the hint counts them up.
-    let allowed = allowed.or_else(|| hint.as_deref()?.strip_prefix("known are "));
-    let allowed = allowed.map(|allowed| allowed.trim().replace('`', ""));
-    Problem { file: file.to_owned(), key, found, allowed, hint, message: what.to_owned() }
-}
-
-/// Key and value at which a reader of TOML points, with carets below the line that it shows.
-fn pointed_at(what: &str) -> Option<(&str, &str)> {
-    let mut lines = what.lines();
-    let line = lines.by_ref().find_map(|line| line.trim_start().split_once(" | "))?.1;
-    let below = lines.next()?.split_once("| ")?.1;
-    let from = below.find('^')?;
-    let key = line.get(..from)?.trim_end().strip_suffix('=')?.trim_end();
-    let key = key.rsplit([' ', '{', ',']).next()?;
-    Some((key, line.get(from..from + below.trim().len())?))
+    Problem { file: file.to_owned(), said: Complaint::of(words) }
 }
 
 impl std::fmt::Display for Problem {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}: {}", self.file, self.message)?;
-        match &self.hint {
+        write!(f, "{}: {}", self.file, self.said.message)?;
+        match &self.said.hint {
             Some(hint) => write!(f, "\nhint: {hint}"),
             None => Ok(()),
         }
@@ -260,89 +210,19 @@ mod tests {
             one(Path::new("kort.toml"), text, &mut found);
             let problems = found.problems;
             assert_eq!(problems.len(), 1, "{problems:?}");
-            assert!(problems[0].message.contains("no key at all"), "{problems:?}");
-            assert_eq!(problems[0].allowed, None, "{problems:?}");
+            assert!(problems[0].said.message.contains("no key at all"), "{problems:?}");
+            assert_eq!(problems[0].said.allowed, None, "{problems:?}");
             assert!(
-                problems[0].hint.as_ref().is_some_and(|hint| hint.contains("[thrusters.ID]")),
+                problems[0].said.hint.as_ref().is_some_and(|hint| hint.contains("[thrusters.ID]")),
                 "{problems:?}"
             );
         }
     }
 
-    /// Key, value found and values allowed of a message.
-    fn apart(message: &str) -> [Option<String>; 3] {
-        let Problem { key, found, allowed, .. } = problem("kort.toml", message);
-        [key, found, allowed]
-    }
-
     #[test]
-    fn a_message_is_taken_apart() {
-        let found = problem(
-            "kort.toml",
-            "my.toml: `thrusters.t1.limits.current_a` = 1000000 is outside 0.001 to 9\nhint: at most 9",
-        );
-        assert_eq!(found.file, "my.toml");
-        assert_eq!(found.hint.as_deref(), Some("at most 9"));
-        for (message, key, value, allowed) in [
-            (&*found.message, "thrusters.t1.limits.current_a", "1000000", "0.001 to 9"),
-            (
-                "`gateway.hosts` holds \"a:1\"; allowed are names and addresses\nhint: \"a\"",
-                "gateway.hosts",
-                "\"a:1\"",
-                "names and addresses",
-            ),
-            (
-                "`thrusters.t1.servo.cores` holds 9, which this machine does not have; here are 0-3",
-                "thrusters.t1.servo.cores",
-                "9",
-                "0-3",
-            ),
-            (
-                "`amplifier.kind` = curent is outside what is allowed: \"current\" or \"speed\"\nhint: say it",
-                "amplifier.kind",
-                "curent",
-                "\"current\" or \"speed\"",
-            ),
-            (
-                "`thrusters.t1.amplifier` = \"x\" is no drive\nhint: known are \"simulated\", \"vesc\"",
-                "thrusters.t1.amplifier",
-                "\"x\"",
-                "\"simulated\", \"vesc\"",
-            ),
-            (
-                "TOML parse error at line 2, column 12\n  |\n2 | observer = \"x\"\n  |            ^^^\nunknown variant `x`, expected one of `ekf`, `ukf`",
-                "observer",
-                "\"x\"",
-                "ekf, ukf",
-            ),
-            (
-                "TOML parse error at line 9, column 21\n  |\n9 | servo = { rate_hz = \"x\" }\n  |                     ^^^\ninvalid type: string \"x\", expected f64\nhint: a number",
-                "rate_hz",
-                "\"x\"",
-                "f64",
-            ),
-        ] {
-            let [key, value, allowed] = [key, value, allowed].map(|part| Some(part.to_owned()));
-            assert_eq!(apart(message), [key, value, allowed], "{message}");
-        }
-        let [key, found, allowed] =
-            apart("section [a]: unknown field `frozn_s`, expected one of `frozen_s`, `spike_rad_s`");
-        assert_eq!((key.as_deref(), found), (Some("frozn_s"), None));
-        assert_eq!(allowed.as_deref(), Some("frozen_s, spike_rad_s"));
-    }
-
-    /// A sentence is no value: where the words say something else than what is allowed, nothing stands there.
-    #[test]
-    fn what_is_not_set_apart_is_not_called_allowed() {
-        for (message, value) in [
-            ("`gateway.bind` = [::]:8080 is reached from other machines: no tls", "[::]:8080"),
-            ("`thrusters.t1.controller.rate_hz` = 300 does not divide servo.rate_hz = 500", "300"),
-        ] {
-            let found = problem("kort.toml", message);
-            assert_eq!(
-                (found.found.as_deref(), found.allowed, &*found.message),
-                (Some(value), None, message)
-            );
-        }
+    fn words_that_name_another_file_are_of_that_file() {
+        let found = problem("kort.toml", "my.toml: `a` = 1 is outside 2 to 9\nhint: at most 9");
+        assert_eq!((&*found.file, found.said.hint.as_deref()), ("my.toml", Some("at most 9")));
+        assert_eq!(problem("kort.toml", "`a` = 1: no").file, "kort.toml");
     }
 }

@@ -14,6 +14,60 @@ fn rows(page: &mut Browser, id: &str) -> Vec<Vec<String>> {
     serde_json::from_value(rows).unwrap()
 }
 
+fn text_of(page: &mut Browser, id: &str) -> String {
+    page.eval(&format!("$('{id}').textContent")).as_str().unwrap_or_default().to_owned()
+}
+
+/// A key that goes down and up again.
+fn press(page: &mut Browser, key: &str) {
+    let (code, number, text) = match key {
+        " " => ("Space", 32, " "),
+        "Enter" => ("Enter", 13, "\r"),
+        "Tab" => ("Tab", 9, ""),
+        "ArrowUp" => ("ArrowUp", 38, ""),
+        other => panic!("{other}"),
+    };
+    let event = |kind: &str, text: &str| json!({"type": kind, "key": key, "code": code, "windowsVirtualKeyCode": number, "text": text});
+    page.call("Input.dispatchKeyEvent", event(if text.is_empty() { "rawKeyDown" } else { "keyDown" }, text));
+    page.call("Input.dispatchKeyEvent", event("keyUp", ""));
+}
+
+/// From the button before them on: the model's list, the summary, the first boxes behind it.
+fn chosen_by_keys(page: &mut Browser) {
+    page.eval("$('diagnosis-of').value = '60'; $('fit').focus()");
+    let reach = |page: &mut Browser, what: &str| {
+        for _ in 0..70 {
+            if page.eval(&format!("document.activeElement === {what}")) == json!(true) {
+                return;
+            }
+            press(page, "Tab");
+        }
+        panic!("Tab does not reach {what}");
+    };
+    reach(page, "$('analysis-model')");
+    press(page, "ArrowUp");
+    page.until("$('analysis-model').value === 'model1'");
+    reach(page, "$('known').querySelector('summary')");
+    press(page, "Enter");
+    page.until("$('known').open");
+    reach(page, "document.querySelector('#known-effects input[value=coulomb_friction]')");
+    press(page, " ");
+    page.until(&text_is("known-text", "coulomb friction"));
+    let named = page.eval("[...document.querySelectorAll('#known-effects input, #analysis-model')].every((field) => field.labels.length && field.labels[0].textContent.trim())");
+    assert_eq!(named, json!(true), "every field has a label");
+    // No more than the service takes; what is chosen can be taken back.
+    page.eval("[...document.querySelectorAll('#known-effects input:not(:checked)')].slice(0, 7).forEach((box) => box.click())");
+    assert_eq!(page.eval("document.querySelectorAll('#known-effects input:enabled').length"), json!(8));
+    for (theme, width) in [("light", 1280), ("dark", 390)] {
+        page.show_as(theme, width);
+        page.eval("$('known').scrollIntoView()");
+        let wide = page.eval("document.documentElement.scrollWidth").as_u64().unwrap();
+        assert!(wide <= width, "{theme} at {width} px: the page is {wide} px wide");
+        page.picture(&format!("{}/target/console-known-{theme}-{width}.png", env!("CARGO_MANIFEST_DIR")));
+    }
+    page.eval("document.querySelectorAll('#known-effects input:checked:not([value=coulomb_friction])').forEach((box) => box.click())");
+}
+
 #[test]
 fn an_operator_fits_reads_and_uses_what_was_fitted() {
     common::in_real_time(|| {
@@ -71,6 +125,22 @@ fn an_operator_fits_reads_and_uses_what_was_fitted() {
             page.show_as(theme, 1280);
             assert_eq!(page.eval(FAINT)["faint"], json!([]), "{theme}: text below 4.5:1");
         }
+
+        // Another model, and an effect taken as known: reached and chosen by the keyboard alone.
+        chosen_by_keys(&mut page);
+        page.eval("$('fit').focus()");
+        press(&mut page, "Enter");
+        page.until("fitted?.model === 'model1' && state.fit === null");
+        page.until(
+            "[...$('fitted').rows].some((row) => row.cells[0].textContent.endsWith('of coulomb_friction'))",
+        );
+        assert!(text_of(&mut page, "fitted-of").starts_with("values of model1"));
+        page.eval("$('analysis-model').value = 'model2'; for (const box of document.querySelectorAll('#known-effects input:checked')) box.click()");
+        assert_eq!(text_of(&mut page, "known-text"), "nothing beyond the rig description");
+        page.click("fit");
+        page.until("fitted?.model === 'model2' && state.fit === null");
+        page.until(&text_is("fit-text", ": 5 values of model2 fitted to the last"));
+        let found = rows(&mut page, "fitted");
 
         // What differs is shown before it is agreed to, as for a diagnosis.
         page.eval("window.confirm = (words) => { window.agreed = words; return true; }");

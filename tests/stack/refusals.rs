@@ -344,3 +344,42 @@ fn cores_that_this_machine_has_not_are_a_warning() {
     assert_eq!((&warning["key"], &warning["found"]), (&"thrusters.t1.servo.cores".into(), &"1023".into()));
     assert!(warning["allowed"].as_str().is_some_and(|here| here.starts_with('0')), "{warning}");
 }
+
+/// Scenarios and controllers are told in full too, by what checks them and by what runs them.
+#[test]
+fn all_that_is_wrong_with_a_scenario_or_a_controller_is_said_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        path.to_str().unwrap().to_owned()
+    };
+    let said = |arguments: &[&str]| {
+        let out = run(std::process::Command::new(common::KORT).args(arguments));
+        assert_eq!(out.status.code(), Some(2), "{arguments:?}: {}", String::from_utf8_lossy(&out.stdout));
+        String::from_utf8_lossy(&[out.stdout, out.stderr].concat()).into_owned()
+    };
+    let hold = "[[segments]]\nkind = \"hold\"\nvalue = 0.5\n";
+    let steps = "name = \"x\"\nwhat = \"x\"\nrig = \"t200\"\ncontrollers = [\"velocity_servo\"]\n[[reference]]\nkind = \"steps\"\nlevels = [0.5]\n";
+    for (name, text, keys, and_run) in [
+        ("a.toml", format!("noise = \"no\"\nsede = 1\n{hold}duration = 1\n"), ["`noise`", "`sede`", "`segments[0].duration`"], "simulate"),
+        ("b.toml", format!("noise = -1\nduration_s = -5\n{hold}duration_s = 0\n"), ["`noise`", "`duration_s`", "`segments[0].duration_s`"], "simulate"),
+        ("c.toml", format!("duration_s = 60\nseed_s = 1\naim_of_plain = true\n{steps}hold = 1\n"), ["`seed_s`", "`aim_of_plain`", "`reference[0].hold`"], "soak"),
+        ("d.toml", format!("duration_s = 0\nseeds = 0\n{steps}hold_s = 0\n"), ["`duration_s`", "`seeds`", "`hold_s`"], "soak"),
+        ("e.toml", "law = \"best\"\nobservr = \"ekf\"\n[laws.servo]\nphase_margin_deg = \"x\"\n".into(), ["`law`", "`observr`", "`laws.servo.phase_margin_deg`"], ""),
+        ("f.toml", "law = \"look_ahead\"\n[laws.servo]\nphase_margin_deg = 5\n[limits]\noverspeed = 9\nfade_s = -1\n".into(), ["`phase_margin_deg`", "`overspeed`", "`fade_s`"], ""),
+    ] {
+        let path = file(name, &text);
+        let mut told = vec![said(&["check", &path])];
+        match and_run {
+            "simulate" => told.push(said(&["simulate", "--rig", "t200", "--scenario", &path, "-o", &file("out.csv", "")])),
+            "soak" => told.push(said(&["soak", &path, "--rig", "t200"])),
+            _ => told.push(said(&["soak", "soak-towed", "--rig", "t200", "--controllers", &path])),
+        }
+        for words in told {
+            for key in keys {
+                assert_eq!(words.matches(&format!("{path}: {key}")).count(), 1, "{name}, {key}: {words}");
+            }
+        }
+    }
+}

@@ -10,6 +10,7 @@
 //! Every key has a default; an unknown one is an error. [`TUNABLES`] is the table of what may be
 //! changed while running: the service's `PUT …/controller` and the suites read it.
 
+use kort_thruster::place;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -20,7 +21,7 @@ use crate::observers::{ObserverKind, ObserverOptions};
 /// Why a configuration cannot be used.
 #[derive(Debug, Error, Clone, PartialEq)]
 pub enum ConfigError {
-    /// Not TOML, an unknown key or a value of the wrong kind; the parser's words name line and key.
+    /// Not TOML, an unknown key or a value of the wrong kind; the words name line or key.
     #[error("{message}\nhint: kinds of law: {laws}")]
     Syntax {
         /// The parser's words.
@@ -52,6 +53,10 @@ pub enum ConfigError {
         /// What it means.
         what: &'static str,
     },
+}
+
+fn syntax(message: String) -> ConfigError {
+    ConfigError::Syntax { message, laws: LawKind::ALL.map(LawKind::name).join(", ") }
 }
 
 /// Limits a controller keeps besides the rig's own.
@@ -105,16 +110,23 @@ impl ControllerConfig {
     /// Reads a configuration; ranges are checked.
     ///
     /// # Errors
-    /// [`ConfigError`] names line, key, value and what is allowed.
+    /// [`ConfigError`] names line or key, value and what is allowed; of several the first.
     pub fn from_toml(text: &str) -> Result<Self, ConfigError> {
-        let config: Self = toml::from_str(text).map_err(|e| ConfigError::Syntax {
-            message: e.to_string().trim_end().to_owned(),
-            laws: LawKind::ALL.map(LawKind::name).join(", "),
-        })?;
-        for tunable in TUNABLES {
-            tunable.check((tunable.get)(&config))?;
-        }
-        Ok(config)
+        // There is at least one where there is no configuration.
+        let nothing = || syntax(String::new());
+        Self::from_toml_with_all(text).map_err(|wrong| wrong.into_iter().next().unwrap_or_else(nothing))
+    }
+
+    /// As [`Self::from_toml`], with everything that is wrong: what cannot be read, else all that is out of range.
+    ///
+    /// # Errors
+    /// What is wrong; at least one.
+    pub fn from_toml_with_all(text: &str) -> Result<Self, Vec<ConfigError>> {
+        let config: Self = place::from_toml_with_all(text)
+            .map_err(|said| said.into_iter().map(syntax).collect::<Vec<_>>())?;
+        let wrong: Vec<_> =
+            TUNABLES.iter().filter_map(|tunable| tunable.check((tunable.get)(&config)).err()).collect();
+        if wrong.is_empty() { Ok(config) } else { Err(wrong) }
     }
 
     /// The configuration as a file of `config/controllers/` that [`ControllerConfig::from_toml`] reads back, every key

@@ -80,11 +80,24 @@ pub enum Problem {
     Empty,
     /// Bytes that are no text.
     #[error(
-        "{place} is not UTF-8 text, and the file begins like no log that kort reads; allowed: CSV in UTF-8, MCAP, PX4 ULog, ArduPilot DataFlash, ROS 2 bag, Betaflight or INAV blackbox, candump; plain or gzip"
+        "{place} is no text, and the file begins like no log that kort reads; allowed: CSV in UTF-8, UTF-16 with its mark or Windows-1252 (Latin-1), MCAP, PX4 ULog, ArduPilot DataFlash, ROS 2 bag, Betaflight or INAV blackbox, candump; plain or gzip"
     )]
-    NotUtf8 {
+    NotText {
         /// Where.
         place: Place,
+    },
+    /// UTF-16 that does not say so.
+    #[error(
+        "line 1 has a zero beside each sign, as UTF-16 has, without the mark that UTF-16 begins with; allowed: CSV in UTF-8, UTF-16 with its mark or Windows-1252 (Latin-1)"
+    )]
+    Utf16Unmarked,
+    /// What a file's first line says of its delimiter is none, or not what the map says.
+    #[error("line 1 says that the cells are parted by {found:?}; allowed: {allowed}")]
+    Delimiter {
+        /// What it says.
+        found: char,
+        /// What may stand there.
+        allowed: String,
     },
     /// A header name twice.
     #[error("column `{column}` stands twice in the header, at positions {first} and {second}")]
@@ -270,8 +283,14 @@ impl Problem {
             Problem::Packed { hint, .. } => (*hint).into(),
             Problem::UnknownFormat { .. } => "name the file REC.csv, REC.csv.gz or REC.mcap".into(),
             Problem::Empty => "was the logger stopped before its first row?".into(),
-            Problem::NotUtf8 { .. } => {
+            Problem::NotText { .. } => {
                 "a table, or a spreadsheet, must be saved as CSV in UTF-8; a log of another format must be converted to one of these".into()
+            }
+            Problem::Utf16Unmarked => {
+                "save it as CSV in UTF-8; or `iconv -f UTF-16LE -t UTF-8 FILE` (UTF-16BE where the zero comes first)".into()
+            }
+            Problem::Delimiter { .. } => {
+                "save the file with a delimiter that is allowed, or correct `delimiter` in the column map".into()
             }
             Problem::DuplicateColumn { .. } => "rename or remove one of the two".into(),
             Problem::UnnamedColumn { .. } => {

@@ -23,8 +23,8 @@ pub struct ColumnMap {
     pub name: String,
     /// Where the log comes from and what its columns mean.
     pub description: String,
-    /// What parts the cells of a CSV file.
-    pub delimiter: u8,
+    /// What parts the cells of a CSV file, where the map says it: else a comma, or what the file says itself.
+    pub delimiter: Option<u8>,
     /// Its numbers have a decimal comma.
     pub decimal_comma: bool,
     /// Where the instants come from.
@@ -250,6 +250,16 @@ impl ColumnMap {
             let sign = column.sign_of.as_ref().map(|(sign, _)| sign.as_str());
             std::iter::once(column.source.as_str()).chain(sign).map(|source| (source, column.optional))
         })
+    }
+
+    /// Source columns that a table must have.
+    pub(crate) fn wanted(&self) -> Vec<&str> {
+        let time = match &self.time {
+            Time::Column { source, .. } => Some(source.as_str()),
+            Time::Clock { .. } | Time::Settled { .. } => None,
+        };
+        let columns = self.sources().filter(|(_, optional)| !optional).map(|(source, _)| source);
+        time.into_iter().chain(columns).collect()
     }
 
     /// Source columns that are taken as they stand, stamps too, with the unit that they are read in.

@@ -56,23 +56,27 @@ impl Excitation {
     /// Prepares the segments, one after the other. Random ones follow from `seed`.
     ///
     /// # Errors
-    /// A value out of range, or a replay that cannot be had; named as `field[index].key`.
+    /// Of each segment a value out of range, or a replay that cannot be had; named as `field[index].key`.
     pub fn new(
         field: &str,
         segments: &[Segment],
         seed: u64,
         replays: &mut dyn Replays,
-    ) -> Result<Self, ScenarioError> {
-        let mut parts = Vec::with_capacity(segments.len());
+    ) -> Result<Self, Vec<ScenarioError>> {
+        let (mut parts, mut wrong) = (Vec::with_capacity(segments.len()), Vec::new());
         let mut start = 0.0;
         for (i, segment) in segments.iter().enumerate() {
             let at = format!("{field}[{i}]");
             let random = ChaCha8Rng::seed_from_u64(seed.wrapping_add(i as u64 * 0x9e37_79b9));
-            let (duration_s, part) = segment.prepare(&at, random, replays)?;
-            parts.push((start, part));
-            start += duration_s;
+            match segment.prepare(&at, random, replays) {
+                Ok((duration_s, part)) => {
+                    parts.push((start, part));
+                    start += duration_s;
+                }
+                Err(error) => wrong.push(error),
+            }
         }
-        Ok(Self { parts, duration_s: start })
+        if wrong.is_empty() { Ok(Self { parts, duration_s: start }) } else { Err(wrong) }
     }
 
     /// Sum of the segments, s.
@@ -198,7 +202,7 @@ mod tests {
     #[test]
     fn wrong_values_are_named() {
         let error =
-            |s: Segment| Excitation::new("segments", &[s], 1, &mut NoReplays).unwrap_err().to_string();
+            |s: Segment| Excitation::new("segments", &[s], 1, &mut NoReplays).unwrap_err()[0].to_string();
         assert!(error(Segment::Hold { value: f64::NAN, duration_s: 1.0 }).contains("segments[0].value"));
         assert!(error(Segment::Hold { value: 1.0, duration_s: -1.0 }).contains("-1"));
         let prbs = Segment::Prbs { amplitude: 1.0, mean: 0.0, each_s: 0.1, order: 40, duration_s: 1.0 };

@@ -3,15 +3,14 @@
 //! Pure: the same scenario, rig and seed give the same rows. Written as TOML or JSON;
 //! `kort simulate` runs it, a diagnosis report carries one as its next experiment.
 
+mod check;
 mod excitation;
 mod measuring;
-mod place;
 mod run;
 mod segment;
 
 pub use excitation::{Excitation, NoReplays, Replayed, Replays};
 pub use measuring::Measuring;
-pub use place::{complaint, from_toml};
 pub use run::{Run, Used, scale, used_effect};
 pub use segment::Segment;
 
@@ -22,6 +21,7 @@ use thiserror::Error;
 
 use kort_thruster::models::ModelName;
 use kort_thruster::parameters::Parameter;
+use kort_thruster::place;
 
 /// What the segments of a scenario's command mean.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -225,21 +225,37 @@ impl Scenario {
     /// Reads a scenario from TOML.
     ///
     /// # Errors
-    /// [`ScenarioError::Syntax`] with line or key.
+    /// [`ScenarioError::Syntax`] with line or key; of several the first.
     pub fn from_toml(text: &str) -> Result<Self, ScenarioError> {
-        from_toml(text).map_err(|message| ScenarioError::Syntax { message })
+        Self::from_toml_with_all(text).map_err(first)
+    }
+
+    /// As [`Self::from_toml`], with everything that cannot be read.
+    ///
+    /// # Errors
+    /// What is wrong; at least one.
+    pub fn from_toml_with_all(text: &str) -> Result<Self, Vec<ScenarioError>> {
+        place::from_toml_with_all(text).map_err(syntax)
     }
 
     /// Reads a scenario file as people have it: TOML, JSON, or the JSON report of a diagnosis, whose next experiment it
     /// is then.
     ///
     /// # Errors
-    /// [`ScenarioError::Syntax`] with line or key, or that the report asks for no further run.
+    /// [`ScenarioError::Syntax`] with line or key, or that the report asks for no further run; of several the first.
     pub fn from_text(text: &str) -> Result<Self, ScenarioError> {
+        Self::from_text_with_all(text).map_err(first)
+    }
+
+    /// As [`Self::from_text`], with everything that cannot be read.
+    ///
+    /// # Errors
+    /// What is wrong; at least one.
+    pub fn from_text_with_all(text: &str) -> Result<Self, Vec<ScenarioError>> {
         if !text.trim_start().starts_with('{') {
-            return Self::from_toml(text);
+            return Self::from_toml_with_all(text);
         }
-        let fail = |message: String| ScenarioError::Syntax { message };
+        let fail = |message: String| syntax(vec![message]);
         let mut json: serde_json::Value = serde_json::from_str(text).map_err(|e| fail(e.to_string()))?;
         if let Some(next) = json.get_mut("next_experiment") {
             json = next.get_mut("scenario").map(serde_json::Value::take).ok_or_else(|| {
@@ -247,8 +263,17 @@ impl Scenario {
             })?;
         }
         serde_json::from_value(json.clone()).map_err(|e| {
-            let tree = toml::Value::try_from(json).ok();
-            fail(tree.as_ref().and_then(complaint::<Self>).unwrap_or_else(|| e.to_string()))
+            let said = toml::Value::try_from(json).map(place::complaints::<Self>).unwrap_or_default();
+            if said.is_empty() { fail(e.to_string()) } else { syntax(said) }
         })
     }
+}
+
+fn syntax(said: Vec<String>) -> Vec<ScenarioError> {
+    said.into_iter().map(|message| ScenarioError::Syntax { message }).collect()
+}
+
+/// There is at least one where there is no scenario.
+fn first(wrong: Vec<ScenarioError>) -> ScenarioError {
+    wrong.into_iter().next().unwrap_or_else(|| ScenarioError::Syntax { message: String::new() })
 }

@@ -10,9 +10,9 @@ use kort_thruster::parameters::{Parameter, Parameters};
 use kort_thruster::plant::{Plant, Sensed, Tick};
 use kort_thruster::rig::{AmplifierKind, Rig};
 
-use crate::{Command, Excitation, Measuring, Replays, Scenario, ScenarioError};
+use crate::{Command, Excitation, Measuring, Replays, Scenario, ScenarioError, Segment};
 use drive_map::DriveMap;
-use effects::used;
+pub(crate) use effects::used;
 pub use effects::{Used, used_effect};
 use turbulent::Turbulent;
 
@@ -20,7 +20,7 @@ use turbulent::Turbulent;
 const CONTROL_RATE_HZ: f64 = 500.0;
 const LOG_RATE_HZ: f64 = 100.0;
 /// Longest run: a day.
-const LONGEST_S: f64 = 86_400.0;
+pub(crate) const LONGEST_S: f64 = 86_400.0;
 
 /// A prepared scenario.
 pub struct Run {
@@ -53,49 +53,38 @@ impl Run {
     /// Prepares a scenario on a rig.
     ///
     /// # Errors
-    /// [`ScenarioError`] names the key, the value found and what is allowed.
-    pub fn new(scenario: &Scenario, rig: &Rig, replays: &mut dyn Replays) -> Result<Self, ScenarioError> {
-        let value = |key: &str, found: f64, allowed: &str| ScenarioError::Value {
-            key: key.into(),
-            found: found.to_string(),
-            allowed: allowed.into(),
-        };
+    /// All that is wrong; each [`ScenarioError`] names the key, the value found and what is allowed. What an effect may be is
+    /// told once the signals can be played: it goes by their size.
+    pub fn new(
+        scenario: &Scenario,
+        rig: &Rig,
+        replays: &mut dyn Replays,
+    ) -> Result<Self, Vec<ScenarioError>> {
+        let mut wrong = scenario.values();
         let mut parameters = Parameters::stated(rig);
         for (parameter, number) in &scenario.parameters {
-            if !number.is_finite() || (parameter.positive() && *number < 0.0) {
-                return Err(value(
-                    &format!("parameters.{}", parameter.name()),
-                    *number,
-                    "a finite number, 0 or above",
-                ));
-            }
             parameters.set(*parameter, *number);
         }
-        if !scenario.noise.is_finite() || scenario.noise < 0.0 {
-            return Err(value("noise", scenario.noise, "0 (off) or a factor above 0"));
-        }
-        if scenario.segments.is_empty() {
-            return Err(ScenarioError::Missing {
-                key: "segments".into(),
-                hint: "at least one, for example { kind = \"hold\", value = 0.5, duration_s = 5.0 }".into(),
-            });
-        }
         let seed = scenario.seed;
-        let command = Excitation::new("segments", &scenario.segments, seed, replays)?;
+        let mut signal = |name: &str, segments: &[Segment], salt: u64| {
+            let signal = Excitation::new(name, segments, seed.wrapping_add(salt), replays);
+            signal.map_err(|errors| wrong.extend(errors)).ok().filter(|_| !segments.is_empty())
+        };
+        let command = signal("segments", &scenario.segments, 0);
+        let ambient = signal("ambient", &scenario.ambient, 11);
+        let supply = signal("supply", &scenario.supply, 13);
+        let depth = signal("depth", &scenario.depth, 17);
+        let temperature = signal("temperature", &scenario.temperature, 19);
+        let drive = DriveMap::new(scenario.command, rig, &parameters).map_err(|error| wrong.push(error)).ok();
+        let (Some(command), Some(drive), true) = (command, drive, wrong.is_empty()) else {
+            return Err(wrong);
+        };
+        let turbulence = scenario.turbulence.map(|t| Turbulent::new(t, seed));
         let duration_s = scenario.duration_s.unwrap_or(command.duration_s());
         if !(duration_s > 0.0 && duration_s <= LONGEST_S) {
-            return Err(value("duration_s", duration_s, "above 0, at most 86400"));
+            let (key, found) = ("duration_s".into(), duration_s.to_string());
+            return Err(vec![ScenarioError::Value { key, found, allowed: "above 0, at most 86400".into() }]);
         }
-        let mut signal = |name: &str, segments: &[_], salt: u64| match segments {
-            [] => Ok(None),
-            some => Excitation::new(name, some, seed.wrapping_add(salt), replays).map(Some),
-        };
-        let ambient = signal("ambient", &scenario.ambient, 11)?;
-        let supply = signal("supply", &scenario.supply, 13)?;
-        let depth = signal("depth", &scenario.depth, 17)?;
-        let temperature = signal("temperature", &scenario.temperature, 19)?;
-        let turbulence = scenario.turbulence.map(|t| Turbulent::new(t, seed)).transpose()?;
-        let drive = DriveMap::new(scenario.command, rig, &parameters)?;
         let tick_s = 1.0 / rig.sensors.control_rate_hz.unwrap_or(CONTROL_RATE_HZ);
         let log_rate_hz = rig.sensors.log_rate_hz.unwrap_or(LOG_RATE_HZ);
         let peak = drive.to_drive(command.peak(1.0 / log_rate_hz)).abs();

@@ -46,36 +46,35 @@ pub struct Drawn {
 }
 
 impl Hidden {
-    /// Whether every value is one that can be meant.
-    ///
-    /// # Errors
-    /// Words that name the key, the value and what is allowed.
-    pub fn check(&self) -> Result<(), String> {
+    /// All values that cannot be meant, in words that name the key, the value and what is allowed.
+    pub fn check(&self) -> Vec<String> {
+        let mut wrong = Vec::new();
         let [fewest, most] = self.count;
         if fewest < 1 || most < fewest || most > 8 || most as usize > self.effects.len() {
-            return Err(format!(
+            wrong.push(format!(
                 "`hidden.count` = [{fewest}, {most}] is outside what is allowed: 1 to the {} effects listed, at most 8\nhint: count = [1, 4]",
                 self.effects.len()
             ));
         }
         let [least, largest] = self.size;
         if !(least > 0.0 && largest >= least && largest <= 0.5) {
-            return Err(format!(
+            wrong.push(format!(
                 "`hidden.size` = [{least}, {largest}] is outside what is allowed: above 0 to 0.5, in order\nhint: size = [0.03, 0.15]"
             ));
         }
         if !(self.log_rate_hz >= 5.0 && self.log_rate_hz <= 10_000.0) {
-            return Err(format!(
+            wrong.push(format!(
                 "`hidden.log_rate_hz` = {} is outside what is allowed: 5 to 10000\nhint: 100",
                 self.log_rate_hz
             ));
         }
-        match self.effects.iter().find(|id| effects::find(id).is_none_or(|d| d.nonparametric)) {
-            Some(id) => Err(format!(
+        let none = self.effects.iter().filter(|id| effects::find(id).is_none_or(|d| d.nonparametric));
+        wrong.extend(none.map(|id| {
+            format!(
                 "`hidden.effects`: `{id}` is no effect of the catalogue with lasting sizes\nhint: `kort explain` lists it"
-            )),
-            None => Ok(()),
-        }
+            )
+        }));
+        wrong
     }
 
     /// The effects of a seed on a rig, with their sizes.

@@ -9,6 +9,7 @@ use std::path::PathBuf;
 
 use kort_thruster::models::ModelName;
 use kort_thruster::parameters::Parameter;
+use kort_thruster::place;
 use serde::Deserialize;
 
 use crate::hidden::Hidden;
@@ -368,12 +369,14 @@ impl Scenario {
     /// A scenario from its text, checked.
     ///
     /// # Errors
-    /// Words that name the key, the value and what is allowed, with a hint.
-    pub fn from_toml(text: &str) -> Result<Self, String> {
-        let scenario: Self = kort_scenario::from_toml(text)
-            .map_err(|said| format!("{said}\nhint: docs/control.md lists every key"))?;
-        scenario.check()?;
-        Ok(scenario)
+    /// All that is wrong: what cannot be read, else the values that cannot be meant. Each names the key, the value and what
+    /// is allowed, with a hint.
+    pub fn from_toml(text: &str) -> Result<Self, Vec<String>> {
+        let hinted = |said: String| format!("{said}\nhint: docs/control.md lists every key");
+        let scenario: Self = place::from_toml_with_all(text)
+            .map_err(|said| said.into_iter().map(hinted).collect::<Vec<_>>())?;
+        let wrong = scenario.check();
+        if wrong.is_empty() { Ok(scenario) } else { Err(wrong) }
     }
 
     /// Virtual time that one law takes with one seed, s.

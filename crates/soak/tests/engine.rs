@@ -125,6 +125,7 @@ fn a_sensor_that_lies_makes_thrust_worse_for_the_law_that_believes_it() {
 
 #[test]
 fn a_scenario_with_an_impossible_value_says_what_is_allowed() {
-    let said = Scenario::from_toml(&STEPS.replace("duration_s = 12", "duration_s = -1")).unwrap_err();
+    let said =
+        Scenario::from_toml(&STEPS.replace("duration_s = 12", "duration_s = -1")).unwrap_err().join("\n");
     assert!(said.contains("duration_s") && said.contains("1 to") && said.contains("hint:"), "{said}");
 }

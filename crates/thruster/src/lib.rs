@@ -14,6 +14,7 @@ pub mod models;
 pub mod momentum;
 pub mod motor;
 pub mod parameters;
+pub mod place;
 pub mod plant;
 pub mod real;
 pub mod rig;

@@ -95,7 +95,7 @@ pub fn problems(config: &Config, id: &str) -> Vec<ControllerError> {
             None
         }
     };
-    let law = law(config, id, thruster).map_err(|error| wrong.push(error)).ok();
+    let law = law(config, id, thruster).map_err(|errors| wrong.extend(errors)).ok();
     if let (Some((file, rig)), Some(law)) = (rig, law) {
         let tick = Tick::new(&rig, &law, thruster.controller_period_ns(), 0);
         wrong.extend(tick.err().map(|error| ControllerError::Model { file, error }));
@@ -111,7 +111,11 @@ pub fn run(config: &Config, deployment: &Deployment, id: &str, latched: u64) -> 
     let thruster = config.thruster(id)?;
     let (file, text) = config.rig_text(id, thruster)?;
     let rig = Rig::from_toml(&text).map_err(|error| ControllerError::Rig { file: file.clone(), error })?;
-    let law = law(config, id, thruster)?;
+    let law = match law(config, id, thruster) {
+        Ok(law) => law,
+        // There is at least one.
+        Err(wrong) => return wrong.into_iter().next().map_or(Ok(()), Err),
+    };
     let period_ns = thruster.controller_period_ns();
     let stop = Arc::new(AtomicBool::new(false));
     for signal in END_SIGNALS {
@@ -162,22 +166,25 @@ pub fn run(config: &Config, deployment: &Deployment, id: &str, latched: u64) -> 
     Ok(())
 }
 
-/// Law, observer, estimator and options as the deployment says.
-fn law(config: &Config, id: &str, thruster: &Thruster) -> Result<ControllerConfig, ControllerError> {
+/// Law, observer, estimator and options as the deployment says, or everything that is wrong with them.
+fn law(config: &Config, id: &str, thruster: &Thruster) -> Result<ControllerConfig, Vec<ControllerError>> {
     let keys = &thruster.controller;
-    let mut law = if keys.file == Path::new("") {
-        ControllerConfig::default()
-    } else {
-        let (file, text) = config.text_of(&format!("thrusters.{id}.controller.file"), &keys.file, &[])?;
-        ControllerConfig::from_toml(&text).map_err(|error| ControllerError::Law { file, error })?
-    };
+    let mut law = ControllerConfig::default();
+    if keys.file != Path::new("") {
+        let key = format!("thrusters.{id}.controller.file");
+        let (file, text) = config.text_of(&key, &keys.file, &[]).map_err(|error| vec![error.into()])?;
+        let of_file = |error| ControllerError::Law { file: file.clone(), error };
+        law = ControllerConfig::from_toml_with_all(&text)
+            .map_err(|wrong| wrong.into_iter().map(of_file).collect::<Vec<_>>())?;
+    }
     if !keys.law.is_empty() {
         law.law = LawKind::from_name(&keys.law).ok_or_else(|| {
-            config.error(format!(
+            let error = config.error(format!(
                 "`thrusters.{id}.controller.law` = \"{}\" is no control law\nhint: known are {}",
                 keys.law,
                 LawKind::ALL.map(LawKind::name).join(", ")
-            ))
+            ));
+            vec![error.into()]
         })?;
     }
     Ok(law)

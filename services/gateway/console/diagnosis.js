@@ -96,9 +96,21 @@ click("overlay", async () => {
 });
 setInterval(() => { if (!document.hidden) loadDiagnosis().catch(() => {}); }, LOOK_EVERY_MS);
 
-const chosenSubject = () => { const of = $("diagnosis-of").value; return of.startsWith("recording ") ? { recording: of.slice(10) } : { last_s: Number(of) }; };
+// What is asked for: of which rows, by which model, with which effects taken as known. Diagnose and Fit take the same.
+const WITH_MAX = 8;
+const knownEffects = () => [...document.querySelectorAll("#known-effects input:checked")].map((box) => box.value);
+function analysisOf() {
+  const of = $("diagnosis-of").value, subject = of.startsWith("recording ") ? { recording: of.slice(10) } : { last_s: Number(of) };
+  return { ...subject, model: $("analysis-model").value, with: knownEffects() };
+}
+function showKnown() {
+  const known = knownEffects();
+  $("known-text").textContent = known.length ? known.join(", ").replaceAll("_", " ") : "nothing beyond the rig description";
+  for (const box of document.querySelectorAll("#known-effects input")) box.disabled = !box.checked && known.length >= WITH_MAX;
+}
+$("known-effects").addEventListener("change", showKnown);
 click("diagnose", async () => {
-  const begun = await call("POST", diagnosesOf(), chosenSubject());
+  const begun = await call("POST", diagnosesOf(), analysisOf());
   log(`diagnosis ${begun.id} began, of ${begun.of}`);
 });
 click("diagnosis-cancel", async () => {
@@ -157,5 +169,7 @@ $("thruster").addEventListener("change", () => {
   found = null; revised = null; proposed = null; $("page").hidden = true;
   for (const id of ["findings", "diagnosis-of"]) delete $(id).dataset.shown;
   $("findings").replaceChildren(); $("report").replaceChildren(); says("diagnosis-text", ""); says("next-text", ""); says("rig-text", "");
+  for (const box of document.querySelectorAll("#known-effects input")) box.checked = false; // what is known of one is not of another
+  showKnown();
   offer().catch(() => {});
 });

@@ -50,7 +50,7 @@ setInterval(() => { if (!document.hidden) loadFit().catch(() => {}); }, LOOK_EVE
 setTimeout(() => loadFit().catch(() => {}), 500);
 
 click("fit", async () => {
-  const begun = await call("POST", fitsOf(), chosenSubject());
+  const begun = await call("POST", fitsOf(), analysisOf());
   log(`fit ${begun.id} began, of ${begun.of}`);
 });
 click("use-fit", () => adopt({ fit: fitted.id }));

@@ -4,6 +4,7 @@ use axum::Json;
 use axum::extract::rejection::{BytesRejection, JsonRejection, PathRejection, QueryRejection};
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
+use kort_proto::complaint::Complaint;
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -205,6 +206,30 @@ pub struct Problem {
     /// The values that would be accepted, where they can be listed.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     allowed: Vec<String>,
+    /// All that is wrong with a file that was handed in, as `kort check` tells it.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    problems: Vec<FileProblem>,
+}
+
+/// Something that is wrong with a file.
+#[derive(Clone, Debug, Serialize, ToSchema)]
+pub struct FileProblem {
+    /// The key meant, with its table.
+    key: Option<String>,
+    /// What stands there.
+    found: Option<String>,
+    /// What may stand there, where the words set it apart.
+    allowed: Option<String>,
+    /// What to do.
+    hint: Option<String>,
+    /// All that is said but the hint.
+    message: String,
+}
+
+impl From<Complaint> for FileProblem {
+    fn from(Complaint { key, found, allowed, hint, message }: Complaint) -> FileProblem {
+        FileProblem { key, found, allowed, hint, message }
+    }
 }
 
 impl Problem {
@@ -219,7 +244,25 @@ impl Problem {
             hint: None,
             holder: None,
             allowed: Vec::new(),
+            problems: Vec::new(),
         }
+    }
+
+    /// A problem with a file that was handed in: all that is said of it, one after the other in `detail` too. The way out is
+    /// that of the first; `usual` where it has none.
+    pub fn of_many(kind: Kind, wrong: &[impl ToString], usual: &str) -> Problem {
+        let said: Vec<Complaint> = wrong.iter().map(|words| Complaint::of(&words.to_string())).collect();
+        let detail: Vec<&str> = said.iter().map(|complaint| complaint.message.as_str()).collect();
+        let hint = said.first().and_then(|first| first.hint.clone()).unwrap_or_else(|| usual.to_owned());
+        let problem = Problem::new(kind, detail.join("; "));
+        let problem = if hint.is_empty() { problem } else { problem.hint(hint) };
+        Problem { problems: said.into_iter().map(FileProblem::from).collect(), ..problem }
+    }
+
+    /// Names the field of the request that holds the file.
+    pub fn within(mut self, field: &str) -> Problem {
+        self.detail = format!("{field}: {}", self.detail);
+        self
     }
 
     /// Adds the way out.

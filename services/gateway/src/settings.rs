@@ -337,7 +337,7 @@ pub fn thrusters_with_all(config: &Config) -> (Vec<Deployed>, Vec<ConfigError>) 
                 None
             }
         };
-        let controller = controller(config, id, thruster).map_err(|error| wrong.push(error)).ok();
+        let controller = controller(config, id, thruster).map_err(|errors| wrong.extend(errors)).ok();
         let ((file, text, rig), controller) = (rig?, controller?);
         let heartbeat = Duration::from_nanos(thruster.controller_period_ns());
         let speed_limit_rad_s = thruster
@@ -364,13 +364,15 @@ pub fn thrusters_with_all(config: &Config) -> (Vec<Deployed>, Vec<ConfigError>) 
 }
 
 /// The file of law, observer and estimator; the deployment's law goes before its own.
-fn controller(config: &Config, id: &str, thruster: &Thruster) -> Result<ControllerConfig, ConfigError> {
+fn controller(config: &Config, id: &str, thruster: &Thruster) -> Result<ControllerConfig, Vec<ConfigError>> {
     let keys = &thruster.controller;
     let mut stated = ControllerConfig::default();
     if keys.file != Path::new("") {
-        let (file, text) = config.text_of(&format!("thrusters.{id}.controller.file"), &keys.file, &[])?;
-        stated = ControllerConfig::from_toml(&text)
-            .map_err(|error| ConfigError { file, message: error.to_string() })?;
+        let key = format!("thrusters.{id}.controller.file");
+        let (file, text) = config.text_of(&key, &keys.file, &[]).map_err(|error| vec![error])?;
+        let words = |message: String| ConfigError { file: file.clone(), message };
+        stated = ControllerConfig::from_toml_with_all(&text)
+            .map_err(|wrong| wrong.iter().map(|error| words(error.to_string())).collect::<Vec<_>>())?;
     }
     // The controller's process refuses another law in its own words.
     stated.law = LawKind::from_name(&keys.law).unwrap_or(stated.law);

@@ -35,26 +35,30 @@ impl Kind {
         }
     }
 
-    /// Reads the text as this kind is read; words that name key, value and what is allowed. Of a rig everything that is wrong,
-    /// of the other kinds the first that their readers find.
+    /// Reads the text as this kind is read; words that name key, value and what is allowed: everything that is wrong, of a column
+    /// map the first that its reader finds.
     ///
     /// # Errors
     /// What is wrong with it, at least one.
     pub fn check(self, text: &str, path: &Path) -> Result<(), Vec<String>> {
-        let first = |words: String| vec![words];
+        fn all<E: ToString>(wrong: Vec<E>) -> Vec<String> {
+            wrong.iter().map(ToString::to_string).collect()
+        }
         match self {
-            Kind::Rig => Rig::from_toml_with_all(text)
-                .map(drop)
-                .map_err(|wrong| wrong.iter().map(ToString::to_string).collect()),
-            Kind::Soak => kort_soak::Scenario::from_toml(text).map(drop).map_err(first),
+            Kind::Rig => Rig::from_toml_with_all(text).map(drop).map_err(all),
+            Kind::Soak => kort_soak::Scenario::from_toml(text).map(drop),
             Kind::Scenario => {
-                kort_scenario::Scenario::from_toml(text).map(drop).map_err(|e| first(e.to_string()))
+                let wrong = match kort_scenario::Scenario::from_toml_with_all(text) {
+                    Ok(scenario) => scenario.check(),
+                    Err(wrong) => wrong,
+                };
+                if wrong.is_empty() { Ok(()) } else { Err(all(wrong)) }
             }
             Kind::Columns => {
                 let name = path.file_stem().unwrap_or_default().to_string_lossy();
-                ColumnMap::from_toml(&name, text).map(drop).map_err(|e| first(e.to_string()))
+                ColumnMap::from_toml(&name, text).map(drop).map_err(|error| vec![error.to_string()])
             }
-            Kind::Controller => ControllerConfig::from_toml(text).map(drop).map_err(|e| first(e.to_string())),
+            Kind::Controller => ControllerConfig::from_toml_with_all(text).map(drop).map_err(all),
         }
     }
 

@@ -42,6 +42,11 @@ impl Failure {
         Failure::Input(format!("{}: {message}", path.display()))
     }
 
+    /// Input of a named file with all that is wrong with it.
+    pub fn in_file_all(path: &Path, wrong: impl IntoIterator<Item: fmt::Display>) -> Self {
+        Self::in_file(path, all_of(&path.display().to_string(), wrong))
+    }
+
     /// The work itself failed.
     pub fn failed(message: impl fmt::Display) -> Self {
         Failure::Failed(message.to_string())
@@ -62,6 +67,12 @@ impl Failure {
             Failure::Failed(_) => 1,
         }
     }
+}
+
+/// All that is wrong with a file, each but the first behind its name: that stands before the whole.
+pub fn all_of(file: &str, wrong: impl IntoIterator<Item: fmt::Display>) -> String {
+    let said: Vec<String> = wrong.into_iter().map(|words| words.to_string()).collect();
+    said.join(&format!("\n{file}: "))
 }
 
 impl fmt::Display for Failure {

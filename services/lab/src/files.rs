@@ -72,7 +72,7 @@ fn text_of<E: Embed>(wanted: &Path, folder: &str, what: &str, offered: &[String]
 /// # Errors
 /// Names the file, the key, the value found and what is allowed.
 pub fn read_rig(wanted: &Path) -> Result<Rig, Failure> {
-    Rig::from_toml(&rig_text(wanted)?).map_err(|e| Failure::in_file(wanted, e))
+    Rig::from_toml_with_all(&rig_text(wanted)?).map_err(|wrong| Failure::in_file_all(wanted, wrong))
 }
 
 /// A rig description's text by path or name.

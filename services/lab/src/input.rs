@@ -189,7 +189,7 @@ impl Input {
     fn rig(&self, recordings: &[Recording]) -> Result<(String, Rig), Failure> {
         if let Some(path) = &self.rig {
             let text = rig_text(path)?;
-            let rig = Rig::from_toml(&text).map_err(|e| Failure::in_file(path, e))?;
+            let rig = Rig::from_toml_with_all(&text).map_err(|wrong| Failure::in_file_all(path, wrong))?;
             return Ok((text, rig));
         }
         let mut held: Option<(&String, &Path)> = None;

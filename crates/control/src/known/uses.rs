@@ -1,6 +1,6 @@
 //! What each known effect is used for, found by the same probing that uses it: `kort explain EFFECT`.
 
-use kort_thruster::effects::{Descriptor, Effect, Path};
+use kort_thruster::effects::{Descriptor, Effect, Path, Spec};
 use kort_thruster::plant::{Sensed, Tick};
 use kort_thruster::rig::{AmplifierKind, KnownEffect, Quantity, Rig};
 
@@ -102,16 +102,18 @@ pub struct Usage {
     pub effect: &'static str,
     /// Where it is used.
     pub uses: Vec<Use>,
-    /// Why it is not.
+    /// Why it is not; beside `uses` where drive or values decide, as over the catalogue.
     pub left: Option<&'static str>,
 }
 
 impl Usage {
-    /// What it is used for, or why not, in words.
+    /// What it is used for, or why not, in words: the same of a rig and of the catalogue.
     pub fn words(&self) -> String {
+        let uses = self.uses.iter().map(|u| u.words()).collect::<Vec<_>>().join("; ");
         match self.left {
-            Some(why) => format!("NOT USED: {why}"),
-            None => self.uses.iter().map(|u| u.words()).collect::<Vec<_>>().join("; "),
+            Some(why) if self.uses.is_empty() => format!("NOT USED: {why}"),
+            Some(why) => format!("{uses}; with another drive or at other values NOT USED: {why}"),
+            None => uses,
         }
     }
 }
@@ -136,8 +138,9 @@ pub fn of_rig(rig: &Rig, period_s: f64) -> Result<Vec<Usage>, ModelError> {
     rig.effects.iter().map(|known| of_one(rig, known, period_s)).collect()
 }
 
-/// What an effect of the catalogue would be used for on a current, a voltage and a speed drive, at the sizes where a
-/// fit starts.
+/// What an effect of the catalogue would be used for on a current, a voltage and a speed drive: at the sizes where a fit starts
+/// where they are used also with each strength alone, and where nothing reaches those with each shape at the ends of its range.
+/// All that is ever used, and why nothing is where nothing is.
 pub fn of_effect(effect: &'static Descriptor) -> Usage {
     let mut usage = Usage { effect: effect.id, uses: Vec::new(), left: None };
     for text in [
@@ -149,22 +152,52 @@ pub fn of_effect(effect: &'static Descriptor) -> Usage {
         let Ok(model) = ControlModel::from_rig(&rig, 1e-3) else { continue };
         let scale = model.scale(&rig, 600.0);
         let specs = (effect.parameters)(&scale);
-        // Where every value leaves things as they are (factors of one), another start moves them.
-        let starts = std::iter::once(specs.iter().map(|s| s.start).collect()).chain((effect.starts)(&scale));
-        for values in starts {
-            let known = KnownEffect {
-                effect: effect.id,
-                parameters: specs.iter().zip(values).map(|(s, v)| (s.name, Quantity::exact(v))).collect(),
-            };
-            if let Ok(found) = of_one(&rig, &known, 1e-3) {
-                usage.uses.extend(found.uses);
-                usage.left = found.left.or(usage.left);
-            }
+        // Where every value leaves things as they are (factors of one), another start moves them: it tells nothing of why.
+        let start: Vec<f64> = specs.iter().map(|s| s.start).collect();
+        let starts: Vec<_> = std::iter::once(start.clone()).chain((effect.starts)(&scale)).collect();
+        let mut found = at(effect, &rig, &specs, &starts);
+        if found.uses.is_empty() {
+            let shapes = specs.iter().enumerate().filter(|(_, spec)| spec.shape);
+            let ends = shapes.flat_map(|(place, spec)| [(place, spec.low), (place, spec.high)]);
+            let moved = ends.map(|(place, value)| {
+                let mut values = start.clone();
+                values[place] = value;
+                values
+            });
+            let ends = at(effect, &rig, &specs, &moved.collect::<Vec<_>>());
+            // Not at the sizes where a fit starts, and yet at others.
+            found.uses = ends.uses;
+        } else {
+            // Each strength by itself: a rig may state one of them only.
+            let last = starts.last().unwrap_or(&start);
+            let alone = specs.iter().enumerate().filter(|(place, spec)| !spec.shape && last[*place] != 0.0);
+            let alone = alone.map(|(alone, _)| {
+                let kept = |place: usize| specs[place].shape || place == alone;
+                last.iter().enumerate().map(|(place, v)| if kept(place) { *v } else { 0.0 }).collect()
+            });
+            found.left = at(effect, &rig, &specs, &alone.collect::<Vec<_>>()).left;
         }
+        usage.uses.extend(found.uses);
+        usage.left = usage.left.or(found.left);
     }
     usage.uses.sort_unstable();
     usage.uses.dedup();
-    usage.left = usage.left.filter(|_| usage.uses.is_empty());
+    usage
+}
+
+/// What an effect is used for on a rig at any of these values, and why it is not at the last that nothing reaches.
+fn at(effect: &'static Descriptor, rig: &Rig, specs: &[Spec], values: &[Vec<f64>]) -> Usage {
+    let mut usage = Usage { effect: effect.id, uses: Vec::new(), left: None };
+    for values in values {
+        let known = KnownEffect {
+            effect: effect.id,
+            parameters: specs.iter().zip(values).map(|(s, v)| (s.name, Quantity::exact(*v))).collect(),
+        };
+        if let Ok(found) = of_one(rig, &known, 1e-3) {
+            usage.uses.extend(found.uses);
+            usage.left = found.left.or(usage.left);
+        }
+    }
     usage
 }
 
@@ -306,7 +339,7 @@ mod tests {
     fn no_effect_is_passed_over_in_silence() {
         for effect in ALL {
             let usage = of_effect(effect);
-            assert!(usage.uses.is_empty() == usage.left.is_some(), "{usage:?}");
+            assert!(!usage.uses.is_empty() || usage.left.is_some(), "{usage:?}");
         }
     }
 

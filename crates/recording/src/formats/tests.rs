@@ -105,8 +105,11 @@ fn bad_input_is_named() {
         matches!(csv("time_s;thrust_n\n0;1\n").unwrap_err(), Problem::MissingTime { hint, .. } if hint.contains("semicolons"))
     );
     assert!(matches!(csv("time_s,shaft_speed\n0,1\n").unwrap_err(), Problem::UnitMissing { .. }));
-    for bytes in [&b"time_s,\xff\n0,1\n"[..], b"time_s,thrust_n\n0,\xff\n", b"t\0i\0m\0e\0_\0s\0\n\0"] {
-        assert!(matches!(decode("rec", bytes, None).unwrap_err(), Problem::NotUtf8 { .. }));
+    for bytes in [&b"time_s,\x81\n0,1\n"[..], b"time_s,thrust_n\n0,\x81\n", b"time_s,thrust_n\n0,\0\n"] {
+        assert!(matches!(decode("rec", bytes, None).unwrap_err(), Problem::NotText { .. }));
+    }
+    for bytes in [&b"t\0i\0m\0e\0_\0s\0\n\0"[..], b"\0t\0i\0m\0e\0_\0s\0\n"] {
+        assert_eq!(decode("rec", bytes, None).unwrap_err(), Problem::Utf16Unmarked);
     }
 }
 

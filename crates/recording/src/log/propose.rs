@@ -13,27 +13,43 @@ use crate::units::{self, Unit};
 /// Fields chosen for a proposed map: (topic, field) and our column.
 pub(super) type Chosen = BTreeMap<(usize, usize), &'static str>;
 
-/// One of our columns, and words in a field's name that speak for it, most telling first, and against it.
+/// One of our columns, and words in a field's name that speak for it, most telling first, and against it: English, and German
+/// as the instruments of many test stands write.
 struct Rule {
     column: &'static str,
     words: &'static [&'static str],
     without: &'static [&'static str],
 }
 
-pub(super) const ASKED: &[&str] =
-    &["cmd", "command", "ref", "reference", "set", "setpoint", "target", "desired", "goal"];
+pub(super) const ASKED: &[&str] = &[
+    "cmd",
+    "command",
+    "ref",
+    "reference",
+    "set",
+    "setpoint",
+    "target",
+    "desired",
+    "goal",
+    "soll",
+    "sollwert",
+];
 const SUPPLY: &[&str] = &["supply", "bat", "battery", "in", "input", "bus", "dc"];
 
 const RULES: &[Rule] = &[
     Rule {
         column: "shaft_speed_rad_s",
-        words: &["erpm", "rpm", "omega", "rotorspeed", "velocity", "speed"],
+        words: &["erpm", "rpm", "omega", "rotorspeed", "velocity", "speed", "drehzahl"],
         without: &["air", "ground", "wind", "wheel", "fan", "gps", "gnss"],
     },
-    Rule { column: "current_a", words: &["current", "curr", "iq", "amps"], without: SUPPLY },
+    Rule {
+        column: "current_a",
+        words: &["current", "curr", "iq", "amps", "motorstrom", "strom"],
+        without: SUPPLY,
+    },
     Rule {
         column: "supply_v",
-        words: &["voltage", "volt", "vbus", "vbat", "vcc"],
+        words: &["voltage", "volt", "vbus", "vbat", "vcc", "spannung"],
         without: &["axis", "cell"],
     },
     Rule {
@@ -46,12 +62,24 @@ const RULES: &[Rule] = &[
         words: &["duty", "throttle", "pwm", "control", "output", "out"],
         without: &[],
     },
-    Rule { column: "thrust_n", words: &["thrust", "force", "loadcell"], without: &[] },
-    Rule { column: "torque_n_m", words: &["torque"], without: &[] },
-    Rule { column: "shaft_angle_rad", words: &["angle", "position", "encoder"], without: &["gps", "gnss"] },
-    Rule { column: "temperature_c", words: &["temperature", "temp"], without: &["air", "baro"] },
-    Rule { column: "power_w", words: &["power"], without: &[] },
-    Rule { column: "depth_m", words: &["depth"], without: &[] },
+    Rule {
+        column: "thrust_n",
+        words: &["thrust", "force", "loadcell", "schub", "schubkraft", "kraft"],
+        without: &[],
+    },
+    Rule { column: "torque_n_m", words: &["torque", "drehmoment"], without: &[] },
+    Rule {
+        column: "shaft_angle_rad",
+        words: &["angle", "position", "encoder", "winkel", "drehwinkel"],
+        without: &["gps", "gnss"],
+    },
+    Rule {
+        column: "temperature_c",
+        words: &["temperature", "temp", "temperatur"],
+        without: &["air", "baro"],
+    },
+    Rule { column: "power_w", words: &["power", "leistung"], without: &[] },
+    Rule { column: "depth_m", words: &["depth", "tiefe"], without: &[] },
     Rule { column: "flow_m_s", words: &["flow"], without: &["optical"] },
 ];
 
@@ -300,7 +328,19 @@ fn toml(log: &Log, chosen: &Chosen, table: bool) -> String {
 /// Whether a table's column looks like its stamps.
 pub(crate) fn is_time(name: &str) -> bool {
     let names = words(name);
-    const TIME: &[&str] = &["time", "timestamp", "stamp", "t", "ms", "us", "millis", "micros"];
+    const TIME: &[&str] = &[
+        "time",
+        "timestamp",
+        "stamp",
+        "t",
+        "ms",
+        "us",
+        "millis",
+        "micros",
+        "zeit",
+        "zeitstempel",
+        "messzeit",
+    ];
     names.first().is_some_and(|first| TIME.contains(&first.as_str()))
         || unit_in(name).is_some_and(|u| u.si == "s") && names.iter().any(|n| TIME.contains(&n.as_str()))
 }
@@ -335,6 +375,9 @@ mod tests {
         assert_eq!(unit_in("output[1]").map(|u| u.symbol), None);
         assert_eq!(unit_in("erpm").map(|u| u.symbol), None, "electrical turns are no turns of the shaft");
         assert!(is_time("ms_today") && is_time("t_s") && is_time("Time") && !is_time("temp"));
+        assert!(
+            is_time("Zeit") && is_time("Zeit [s]") && is_time("Time (ms)") && is_time("Elapsed Time (s)")
+        );
         assert_eq!(time_factor("ms_today"), Some(1e-3));
         assert_eq!(time_factor("Time"), None);
     }

@@ -103,11 +103,12 @@ pub(super) fn asks(name: &str, text: &str) -> Option<Asks> {
     Some(Asks { given, sources: raw.columns.into_values().map(|column| column.source).collect() })
 }
 
-fn delimiter(map: &str, wanted: Option<&str>) -> Result<u8, MapError> {
+fn delimiter(map: &str, wanted: Option<&str>) -> Result<Option<u8>, MapError> {
     match wanted {
-        None | Some(",") => Ok(b','),
-        Some(";") => Ok(b';'),
-        Some("\t") => Ok(b'\t'),
+        None => Ok(None),
+        Some(",") => Ok(Some(b',')),
+        Some(";") => Ok(Some(b';')),
+        Some("\t") => Ok(Some(b'\t')),
         Some(other) => Err(fail(
             map,
             format!("delimiter = {other:?}; allowed: \",\", \";\", \"\\t\""),

@@ -2,55 +2,67 @@
 
 use std::collections::BTreeMap;
 
-use kort_thruster::effects::{self, Descriptor, Scale, Spec};
+use kort_thruster::effects::{self, Descriptor, Scale};
 
 use crate::{Scenario, ScenarioError};
 
 /// An effect of the catalogue and its parameters' values in order.
 pub type Used = (&'static Descriptor, Vec<f64>);
 
-/// All effects of a scenario.
-pub(super) fn used(scenario: &Scenario, scale: &Scale) -> Result<Vec<Used>, ScenarioError> {
-    let effects = scenario.effects.iter().enumerate();
-    effects
-        .map(|(i, wanted)| {
-            let (named, given) = (format!("effects[{i}].effect"), format!("effects[{i}].parameters"));
-            used_effect((&named, &wanted.effect), (&given, &wanted.parameters), scale)
-        })
-        .collect()
+/// All effects of a scenario, or all that is wrong with them.
+pub(crate) fn used(scenario: &Scenario, scale: &Scale) -> Result<Vec<Used>, Vec<ScenarioError>> {
+    let (mut all, mut wrong) = (Vec::new(), Vec::new());
+    for (i, wanted) in scenario.effects.iter().enumerate() {
+        let (named, given) = (format!("effects[{i}].effect"), format!("effects[{i}].parameters"));
+        match used_effect((&named, &wanted.effect), (&given, &wanted.parameters), scale) {
+            Ok(used) => all.push(used),
+            Err(errors) => wrong.extend(errors),
+        }
+    }
+    if wrong.is_empty() { Ok(all) } else { Err(wrong) }
 }
 
 /// One effect: its identifier, and its values by parameter, each behind the key at which they stand.
 ///
 /// # Errors
-/// [`ScenarioError`] names the key of an effect or a parameter that there is not, of a value out of range, and of one
-/// that is missing.
+/// Each [`ScenarioError`] names the key of an effect or a parameter that there is not, of a value out of range, or of one
+/// that is missing; one that is told as misspelt is not missing too.
 pub fn used_effect(
     (named, id): (&str, &str),
     (given, values): (&str, &BTreeMap<String, f64>),
     scale: &Scale,
-) -> Result<Used, ScenarioError> {
+) -> Result<Used, Vec<ScenarioError>> {
     let Some(descriptor) = effects::find(id) else {
         let ids: Vec<&str> = effects::ALL.iter().map(|d| d.id).collect();
         let (key, found) = (named.into(), format!("\"{id}\""));
-        return Err(ScenarioError::Unknown { key, found, hint: nearest(id, &ids) });
+        return Err(vec![ScenarioError::Unknown { key, found, hint: nearest(id, &ids) }]);
     };
     let specs = (descriptor.parameters)(scale);
-    if let Some(name) = values.keys().find(|name| !specs.iter().any(|s| s.name == *name)) {
-        let names: Vec<&str> = specs.iter().map(|s| s.name).collect();
-        let (key, found) = (given.into(), format!("\"{name}\""));
-        return Err(ScenarioError::Unknown { key, found, hint: nearest(name, &names) });
-    }
-    let value = |spec: &Spec| {
+    let names: Vec<&str> = specs.iter().map(|s| s.name).collect();
+    let unknown: Vec<&String> = values.keys().filter(|name| !names.contains(&name.as_str())).collect();
+    let mut wrong: Vec<ScenarioError> = unknown
+        .iter()
+        .map(|name| {
+            let (key, found) = (given.into(), format!("\"{name}\""));
+            ScenarioError::Unknown { key, found, hint: nearest(name, &names) }
+        })
+        .collect();
+    let mut used = Vec::with_capacity(specs.len());
+    for spec in &specs {
         let key = format!("{given}.{}", spec.name);
         let range = format!("{} to {} {}", spec.low, spec.high, spec.unit);
+        let meant = |name: &&String| strsim::jaro_winkler(name, spec.name) > 0.75;
         match values.get(spec.name) {
-            None => Err(ScenarioError::Missing { key, hint: format!("{range}, for example {}", spec.start) }),
-            Some(v) if *v >= spec.low && *v <= spec.high => Ok(*v),
-            Some(v) => Err(ScenarioError::Value { key, found: v.to_string(), allowed: range }),
+            None if unknown.iter().any(meant) => {}
+            None => {
+                let hint = format!("{range}, for example {}", spec.start);
+                wrong.push(ScenarioError::Missing { key, hint });
+            }
+            Some(v) if *v >= spec.low && *v <= spec.high => used.push(*v),
+            Some(v) => wrong.push(ScenarioError::Value { key, found: v.to_string(), allowed: range }),
         }
-    };
-    Ok((descriptor, specs.iter().map(value).collect::<Result<_, _>>()?))
+    }
+    if wrong.is_empty() { Ok((descriptor, used)) } else { Err(wrong) }
 }
 
 /// The name that was meant, perhaps, and all there are.

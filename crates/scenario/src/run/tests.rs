@@ -97,7 +97,7 @@ fn every_effect_runs_at_its_usual_size() {
 #[test]
 fn errors_name_the_key() {
     let rig = rig();
-    let error = |s: &Scenario| Run::new(s, &rig, &mut NoReplays).err().unwrap().to_string();
+    let error = |s: &Scenario| Run::new(s, &rig, &mut NoReplays).err().unwrap()[0].to_string();
     let hold = vec![Segment::Hold { value: 0.5, duration_s: 1.0 }];
     let one = |effect: &str, pairs: &[(&str, f64)]| Scenario {
         effects: vec![EffectUse {

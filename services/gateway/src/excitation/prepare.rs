@@ -228,11 +228,8 @@ fn modest(at: usize, segment: &Segment) -> Result<(), Problem> {
     }
 }
 
-fn told(error: ScenarioError) -> Problem {
-    let words = error.to_string();
-    let (detail, hint) =
-        words.split_once("\nhint: ").unwrap_or((&words, "see the keys of a scenario in docs/recordings.md"));
-    Problem::new(Kind::OutOfRange, detail).hint(hint)
+fn told(wrong: Vec<ScenarioError>) -> Problem {
+    Problem::of_many(Kind::OutOfRange, &wrong, "see the keys of a scenario in docs/recordings.md")
 }
 
 #[cfg(test)]

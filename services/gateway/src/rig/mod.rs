@@ -259,9 +259,9 @@ impl RigDesk {
 
     /// Checks a text as `kort check` and the controller do.
     fn check(&self, text: &str) -> Result<Checked, Problem> {
-        let rig = Rig::from_toml(text).map_err(|error| invalid(&error.to_string()))?;
+        let rig = Rig::from_toml_with_all(text).map_err(|wrong| invalid(&wrong))?;
         let period_s = self.deployed.heartbeat.as_secs_f64();
-        let model = ControlModel::from_rig(&rig, period_s).map_err(|error| invalid(&error.to_string()))?;
+        let model = ControlModel::from_rig(&rig, period_s).map_err(|error| invalid(&[error]))?;
         let drive = self.deployed.drive;
         if rig.amplifier.kind != drive {
             return Err(Problem::new(
@@ -314,10 +314,7 @@ fn kind(kind: AmplifierKind) -> &'static str {
     }
 }
 
-/// The words of a check: what is wrong, and the way out.
-fn invalid(words: &str) -> Problem {
-    match words.split_once("hint:") {
-        Some((what, hint)) => Problem::new(Kind::InvalidRig, what.trim()).hint(hint.trim()),
-        None => Problem::new(Kind::InvalidRig, words.trim()),
-    }
+/// All that a check says.
+fn invalid(wrong: &[impl ToString]) -> Problem {
+    Problem::of_many(Kind::InvalidRig, wrong, "")
 }

@@ -79,11 +79,8 @@ async fn load(
 ) -> Result<axum::Json<ControllerView>, Problem> {
     let thruster = app.thruster(&id)?;
     let invalid = |words: String| Problem::new(Kind::InvalidField, words);
-    let wanted = ControllerConfig::from_toml(&toml).map_err(|error| {
-        let words = error.to_string();
-        let (what, hint) =
-            words.split_once("\nhint: ").unwrap_or((&words, "config/controllers has examples"));
-        invalid(format!("toml: {what}")).hint(hint)
+    let wanted = ControllerConfig::from_toml_with_all(&toml).map_err(|wrong| {
+        Problem::of_many(Kind::InvalidField, &wrong, "config/controllers has examples").within("toml")
     })?;
     let runs = in_force(&app, &id, &thruster.controller()?)?;
     if runs.tuned_as(&wanted) != wanted {

@@ -195,10 +195,9 @@ fn wanted(app: &App, id: &str, request: ExcitationRequest) -> Result<Wanted, Pro
             from_scenario(scenario, Some(commanded), limit)
         }
         (None, Some(text), None) => {
-            let scenario = Scenario::from_text(&text).map_err(|error| {
-                let words = error.to_string();
-                let detail = words.split("\nhint: ").next().unwrap_or(&words);
-                Problem::new(Kind::InvalidField, format!("toml: {detail}"))
+            let scenario = Scenario::from_text_with_all(&text).map_err(|wrong| {
+                Problem::of_many(Kind::InvalidField, &wrong, "")
+                    .within("toml")
                     .hint("`kort simulate` runs the same files; docs/recordings.md lists their keys")
             })?;
             from_scenario(scenario, command, limit)

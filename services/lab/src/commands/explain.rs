@@ -135,6 +135,11 @@ struct Entry {
     used_for: Vec<&'static str>,
     /// Why none of them can use it, if so.
     not_used: Option<&'static str>,
+    /// Why none of them can with another drive or at other values, where some can.
+    not_used_elsewhere: Option<&'static str>,
+    /// The same in the words of `--for`.
+    #[serde(skip)]
+    usage: String,
 }
 
 #[derive(Serialize)]
@@ -149,9 +154,12 @@ impl Entry {
     fn of(effect: &'static Descriptor) -> Self {
         let role = |shape| if shape { "shape" } else { "strength" };
         let usage = uses::of_effect(effect);
+        let never = usage.uses.is_empty();
         Self {
+            usage: usage.words(),
+            not_used: usage.left.filter(|_| never),
+            not_used_elsewhere: usage.left.filter(|_| !never),
             used_for: usage.uses.into_iter().map(Use::words).collect(),
-            not_used: usage.left,
             effect: effect.id,
             path: effect.path.name(),
             what: effect.what,
@@ -185,29 +193,14 @@ impl Entry {
             ("Confused with", self.confused_with.join(", ")),
             ("Separated by", self.separated_by.into()),
             ("Parameters", self.parameter_list()),
-            (USED_FOR, self.usage()),
+            (USED_FOR, format!("{}.", self.usage)),
             ("Reference", self.reference.into()),
         ]
-    }
-
-    /// What laws and observers do with it.
-    fn usage(&self) -> String {
-        match self.not_used {
-            Some(why) => format!("Nothing: {why}."),
-            None => self.used_for.iter().map(|words| sentence(words)).collect::<Vec<_>>().join(" "),
-        }
     }
 }
 
 /// Heading of what laws and observers do with an effect.
 const USED_FOR: &str = "Known in a rig, used for";
-
-/// Words with a capital and a full stop.
-fn sentence(words: &str) -> String {
-    let mut letters = words.chars();
-    let first = letters.next().map(|c| c.to_uppercase().collect::<String>()).unwrap_or_default();
-    format!("{first}{}.", letters.as_str())
-}
 
 fn table(effects: &[&Descriptor]) -> String {
     let mut text = format!("{} effects that a thruster model may leave out\n", effects.len());

@@ -64,7 +64,8 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     scenario.seed = args.seed.unwrap_or(scenario.seed);
     scenario.noise = args.noise.unwrap_or(scenario.noise);
     let mut files = Files { beside: args.scenario.parent().map(Path::to_path_buf), lost: false };
-    let mut run = Run::new(&scenario, &rig, &mut files).map_err(|e| Failure::in_file(&args.scenario, e))?;
+    let mut run =
+        Run::new(&scenario, &rig, &mut files).map_err(|wrong| Failure::in_file_all(&args.scenario, wrong))?;
     let columns = run.columns().to_vec();
     let duration_s = write(&mut run, format, &args.output)?;
     let report = Report {
@@ -103,11 +104,13 @@ pub fn recording(
     noise: Option<f64>,
 ) -> Result<Recording, Failure> {
     let rig = files::read_rig(rig)?;
-    let mut wanted = Scenario::from_text(text).map_err(|e| Failure::in_file(scenario, e))?;
+    let mut wanted =
+        Scenario::from_text_with_all(text).map_err(|wrong| Failure::in_file_all(scenario, wrong))?;
     wanted.seed = seed.unwrap_or(wanted.seed);
     wanted.noise = noise.unwrap_or(wanted.noise);
     let mut files = Files { beside: scenario.parent().map(Path::to_path_buf), lost: false };
-    let mut run = Run::new(&wanted, &rig, &mut files).map_err(|e| Failure::in_file(scenario, e))?;
+    let mut run =
+        Run::new(&wanted, &rig, &mut files).map_err(|wrong| Failure::in_file_all(scenario, wrong))?;
     let names = run.columns().to_vec();
     let mut columns: Vec<Vec<f64>> = vec![Vec::new(); names.len()];
     let (mut time_s, mut values) = (Vec::new(), Vec::new());
@@ -148,7 +151,8 @@ fn write(run: &mut Run, format: Format, path: &Path) -> Result<f64, Failure> {
 
 /// A scenario in TOML or JSON, or the next experiment of a diagnosis report.
 fn read_scenario(wanted: &Path) -> Result<Scenario, Failure> {
-    Scenario::from_text(&files::scenario_text(wanted)?).map_err(|e| Failure::in_file(wanted, e))
+    Scenario::from_text_with_all(&files::scenario_text(wanted)?)
+        .map_err(|wrong| Failure::in_file_all(wanted, wrong))
 }
 
 /// Replays from files and built-in recordings.

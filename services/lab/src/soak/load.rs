@@ -2,12 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use kort_control::{ConfigError, ControlModel, ControllerConfig, LawKind, ModelError, advise};
+use kort_control::{ControlModel, ControllerConfig, LawKind, ModelError, advise};
 use kort_soak::{Hooked, Prepared, Replayed, Scenario, Segment};
-use kort_thruster::rig::Rig;
+use kort_thruster::rig::{Rig, RigError};
 use thiserror::Error;
 
-use crate::failure::Failure;
+use crate::failure::{Failure, all_of};
 use crate::files;
 
 /// Why a scenario cannot be run: the file and what is wrong in it.
@@ -16,7 +16,7 @@ use crate::files;
 pub struct ScenarioError {
     /// The scenario's file.
     pub file: String,
-    /// What is wrong, with a hint.
+    /// All that is wrong, with hints.
     pub message: String,
 }
 
@@ -39,12 +39,12 @@ pub enum SoakError {
         laws: String,
     },
     /// A controller's file.
-    #[error("{file}: {source}")]
+    #[error("{file}: {message}")]
     Controller {
         /// The file.
         file: String,
-        /// What is wrong.
-        source: ConfigError,
+        /// All that is wrong.
+        message: String,
     },
     /// A recording to replay.
     #[error("replay of {file}: {message}")]
@@ -192,10 +192,15 @@ pub fn load(path: &Path, instead: &Instead) -> Result<Loaded, SoakError> {
 fn read(path: &Path, rig: Option<&Path>) -> Result<(Scenario, Rig, String), SoakError> {
     let text = files::soak_scenario_text(path)?;
     let error = |path: &Path, message: String| ScenarioError { file: path.display().to_string(), message };
-    let scenario = Scenario::from_toml(&text).map_err(|message| error(path, message))?;
+    let all = |path: &Path, wrong: Vec<String>| error(path, all_of(&path.display().to_string(), wrong));
+    let parsed = |path: &Path, text: &str| {
+        let words = |wrong: Vec<RigError>| wrong.iter().map(ToString::to_string).collect();
+        Rig::from_toml_with_all(text).map_err(|wrong| all(path, words(wrong)))
+    };
+    let scenario = Scenario::from_toml(&text).map_err(|wrong| all(path, wrong))?;
     let by_name = |name: &Path| -> Result<(Rig, String), SoakError> {
         let text = files::rig_text(name)?;
-        Ok((Rig::from_toml(&text).map_err(|e| error(name, e.to_string()))?, text))
+        Ok((parsed(name, &text)?, text))
     };
     if let Some(rig) = rig {
         let (rig, text) = by_name(rig)?;
@@ -210,8 +215,7 @@ fn read(path: &Path, rig: Option<&Path>) -> Result<(Scenario, Rig, String), Soak
     let text = std::fs::read_to_string(&rig).map_err(|e| {
         error(&rig, format!("{e}\nhint: `rig` in {} is taken relative to that file", path.display()))
     })?;
-    let parsed = Rig::from_toml(&text).map_err(|e| error(&rig, e.to_string()))?;
-    Ok((scenario, parsed, text))
+    Ok((scenario, parsed(&rig, &text)?, text))
 }
 
 /// A controller by name: a path, a file beside the scenario or under `config/`, or a bare law.
@@ -223,8 +227,9 @@ fn controller(name: &str, folder: &Path) -> Result<ControllerConfig, SoakError> 
         vec![folder.join("../controllers").join(&file), Path::new("config/controllers").join(&file)]
     };
     if let Some((place, text)) = places.iter().find_map(|p| std::fs::read_to_string(p).ok().map(|t| (p, t))) {
-        return ControllerConfig::from_toml(&text)
-            .map_err(|source| SoakError::Controller { file: place.display().to_string(), source });
+        let file = place.display().to_string();
+        return ControllerConfig::from_toml_with_all(&text)
+            .map_err(|wrong| SoakError::Controller { message: all_of(&file, wrong), file });
     }
     LawKind::from_name(name).map(ControllerConfig::with_law).ok_or_else(|| {
         let laws = LawKind::ALL.map(LawKind::name);

@@ -6,7 +6,7 @@ use kort_proto::config::{Config, ConfigError, Thruster};
 use kort_proto::faults::Fault;
 use kort_proto::messages::DriveKind;
 use kort_proto::signals::Signals;
-use kort_scenario::Measuring;
+use kort_scenario::{Measuring, ScenarioError};
 use kort_thruster::effects::Descriptor;
 use kort_thruster::models::ModelName;
 use kort_thruster::parameters::{Parameter, Parameters};
@@ -117,7 +117,10 @@ impl Simulated {
         for (i, effect) in keys.effects.iter().enumerate() {
             let (named, given) = (format!("{section}.effects[{i}].id"), format!("{section}.effects[{i}]"));
             let used = kort_scenario::used_effect((&named, &effect.id), (&given, &effect.values), &scale);
-            chosen.push(used.map_err(|e| config.error(e.to_string()))?);
+            let first = |wrong: Vec<ScenarioError>| {
+                config.error(wrong.first().map(ToString::to_string).unwrap_or_default())
+            };
+            chosen.push(used.map_err(first)?);
         }
         let chosen: Vec<(&Descriptor, &[f64])> = chosen.iter().map(|(d, v)| (*d, v.as_slice())).collect();
         Ok(Self {

@@ -1,9 +1,11 @@
 //! CSV as RFC 4180 has it, header row first.
 
+mod encoding;
+mod opening;
 mod table;
 mod units;
 
-use std::io::{self, BufRead, Read, Write};
+use std::io::{self, Read, Write};
 
 use csv::{ByteRecord, ErrorKind, ReaderBuilder};
 
@@ -11,28 +13,27 @@ use crate::assemble::{Assembler, Cell};
 use crate::error::{Place, Problem};
 use crate::map::ColumnMap;
 use crate::recording::Recording;
+use encoding::Texts;
+use opening::Opening;
 
 pub(super) use table::log;
 
 /// Decodes row by row: memory holds the columns and one row.
-pub(super) fn decode(
-    name: &str,
-    mut input: impl BufRead,
-    map: Option<&ColumnMap>,
-) -> Result<Recording, Problem> {
-    let lines = Lines::of(input.fill_buf().map_err(|e| Problem::Unreadable { message: e.to_string() })?);
+pub(super) fn decode(name: &str, input: impl Read, map: Option<&ColumnMap>) -> Result<Recording, Problem> {
+    let stated = map.and_then(|map| map.delimiter);
+    let wanted = map.map_or(vec!["time_s"], ColumnMap::wanted);
+    let Opening { rows: input, delimiter, lines, mut notes } =
+        opening::open(input, stated, &[stated.unwrap_or(b',')], &wanted)?;
     let mut tail = Tail { input, last: b'\n' };
-    let delimiter = map.map_or(b',', |map| map.delimiter);
     let mut reader =
         ReaderBuilder::new().has_headers(false).flexible(true).delimiter(delimiter).from_reader(&mut tail);
     let mut record = ByteRecord::new();
     if !read(&mut reader, &mut record)? {
         return Err(Problem::Empty);
     }
-    let mut header = Vec::with_capacity(record.len());
-    for cell in &record {
-        header.push(text(cell, 1)?.trim().to_string());
-    }
+    let mut texts = Texts::default();
+    texts.take(&mut record, lines.header())?;
+    let mut header: Vec<String> = record.iter().map(|cell| text(cell).trim().to_owned()).collect();
     if map.is_some() {
         // Others end a row with the sign between cells: a column that a map cannot mean.
         for (place, name) in header.iter_mut().enumerate().filter(|(_, name)| name.is_empty()) {
@@ -41,15 +42,19 @@ pub(super) fn decode(
     }
     let width = header.len() as u64;
     let mut rows = Assembler::new(name, header.clone(), map)?;
-    let (mut losses, mut notes) = (Vec::new(), Vec::new());
+    let (mut losses, mut empty) = (Vec::new(), 0_u64);
     let mut next = read(&mut reader, &mut record);
+    let line = lines.at(&record);
     if matches!(next, Ok(true))
+        && texts.take(&mut record, line).is_ok()
         && let Some(below) = units::below(&header, &record)
         // Names of our own say the unit themselves: another below them is a contradiction, not a second header.
         && (map.is_some() || units::as_named(&header, &below))
     {
-        notes.push("line 2 holds units, and is no row".to_owned());
-        notes.extend(map.iter().flat_map(|map| units::differ(&header, &below, map.units_as_they_stand())));
+        notes.push(units::said(line));
+        notes.extend(
+            map.iter().flat_map(|map| units::differ(line, &header, &below, map.units_as_they_stand())),
+        );
         next = read(&mut reader, &mut record);
     }
     loop {
@@ -62,6 +67,11 @@ pub(super) fn decode(
                 break;
             }
             Err(other) => return Err(other),
+        }
+        if is_empty(&record) {
+            empty += 1;
+            next = read(&mut reader, &mut record);
+            continue;
         }
         let line = lines.at(&record);
         let found = record.len() as u64;
@@ -77,17 +87,16 @@ pub(super) fn decode(
             }
             return Err(Problem::RowLength { place, found, expected: width });
         }
-        for cell in &record {
-            text(cell, line)?;
-        }
-        // Checked above: every cell is UTF-8.
-        rows.push(Place::Line(line), |i| match std::str::from_utf8(&record[i]) {
-            Ok("") | Err(_) => Cell::Empty,
-            Ok(text) => Cell::Text(text),
+        texts.take(&mut record, line)?;
+        rows.push(Place::Line(line), |i| match text(&record[i]) {
+            "" => Cell::Empty,
+            text => Cell::Text(text),
         })?;
         next = read(&mut reader, &mut record);
     }
     let mut recording = rows.finish(losses)?;
+    notes.extend(texts.note());
+    notes.extend(empty_rows(empty));
     recording.notes.extend(notes);
     Ok(recording)
 }
@@ -99,29 +108,43 @@ fn read(reader: &mut csv::Reader<impl Read>, record: &mut ByteRecord) -> Result<
     })
 }
 
-/// How lines end, for a row's number: the reader has not taken the second sign of an end of two when it counts the next row.
+/// How lines are counted: the reader has not taken the second sign of an end of two when it counts the next row, and knows
+/// nothing of what stands before the names.
 #[derive(Clone, Copy)]
 struct Lines {
     of_two: bool,
+    before: u64,
 }
 
 impl Lines {
-    fn of(start: &[u8]) -> Self {
+    fn of(start: &[u8], before: u64) -> Self {
         let end = start.iter().position(|b| *b == b'\n').unwrap_or(0);
-        Self { of_two: start.get(..end).is_some_and(|line| line.ends_with(b"\r")) }
+        Self { of_two: start.get(..end).is_some_and(|line| line.ends_with(b"\r")), before }
     }
 
-    /// Line of a row below the header.
+    /// Line of the names.
+    fn header(self) -> u64 {
+        self.before + 1
+    }
+
+    /// Line of a row below the names.
     fn at(self, row: &ByteRecord) -> u64 {
-        row.position().map_or(0, |position| position.line() + u64::from(self.of_two))
+        row.position().map_or(0, |position| self.before + position.line() + u64::from(self.of_two))
     }
 }
 
-fn text(cell: &[u8], line: u64) -> Result<&str, Problem> {
-    match std::str::from_utf8(cell) {
-        Ok(text) if !text.contains('\0') => Ok(text),
-        _ => Err(Problem::NotUtf8 { place: Place::Line(line) }),
-    }
+/// A cell that [`Texts`] has taken.
+fn text(cell: &[u8]) -> &str {
+    std::str::from_utf8(cell).unwrap_or_default()
+}
+
+/// Spreadsheets write a line of delimiters where they have an empty one.
+fn is_empty(row: &ByteRecord) -> bool {
+    row.iter().all(|cell| cell.trim_ascii().is_empty())
+}
+
+fn empty_rows(count: u64) -> Option<String> {
+    (count > 0).then(|| format!("{count} row(s) without anything in them are passed over"))
 }
 
 /// Passes bytes on and remembers the last one.

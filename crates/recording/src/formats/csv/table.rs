@@ -1,31 +1,33 @@
 //! A CSV file of anyone as a table of numbers, to say what is in it.
 
-use std::io::BufRead;
+use std::io::Read;
 
 use csv::{ByteRecord, ReaderBuilder};
 
-use super::{Lines, read, text, units};
+use super::encoding::Texts;
+use super::opening::{self, DELIMITERS, Opening};
+use super::{Lines, empty_rows, is_empty, read, text, units};
 use crate::decimal::{has_comma, with_comma};
 use crate::error::Problem;
 use crate::log::propose::{is_time, symbol, time_factor};
 use crate::log::{Gather, Log};
 
 /// The whole file as one topic without a name; its stamps are those of the column that looks like time.
-pub(in crate::formats) fn log(mut input: impl BufRead, wanted: Option<&[String]>) -> Result<Log, Problem> {
-    let start = input.fill_buf().map_err(|e| Problem::Unreadable { message: e.to_string() })?;
-    let (delimiter, lines) = (delimiter(start), Lines::of(start));
+pub(in crate::formats) fn log(input: impl Read, wanted: Option<&[String]>) -> Result<Log, Problem> {
+    let Opening { rows: input, delimiter, lines, notes } = opening::open(input, None, &DELIMITERS, &[])?;
     let mut reader =
         ReaderBuilder::new().has_headers(false).flexible(true).delimiter(delimiter).from_reader(input);
     let mut record = ByteRecord::new();
     if !read(&mut reader, &mut record)? {
         return Err(Problem::Empty);
     }
-    let mut names = Vec::with_capacity(record.len());
-    for cell in &record {
-        names.push(text(cell, 1)?.trim().trim_start_matches('\u{feff}').to_string());
-    }
+    let mut texts = Texts::default();
+    texts.take(&mut record, lines.header())?;
+    let names: Vec<String> = record.iter().map(|cell| text(cell).trim().to_owned()).collect();
     let mut next = read(&mut reader, &mut record);
-    let below = if matches!(next, Ok(true)) { units::below(&names, &record) } else { None };
+    let line = lines.at(&record);
+    let is_text = matches!(next, Ok(true)) && texts.take(&mut record, line).is_ok();
+    let below = if is_text { units::below(&names, &record) } else { None };
     if below.is_some() {
         next = read(&mut reader, &mut record);
     }
@@ -48,12 +50,13 @@ pub(in crate::formats) fn log(mut input: impl BufRead, wanted: Option<&[String]>
         gather.field(topic, name, unit(place));
     }
     if below.is_some() {
-        gather.note("line 2 holds units, and is no row".into());
+        gather.note(units::said(line));
     }
+    notes.into_iter().for_each(|note| gather.note(note));
     let mut table =
         Table { lines, columns: names.len(), time, factor: factor.unwrap_or(1.0), topic, rows: 0 };
     let mut marks = Marks { points: gather, commas: None, pointed: false, first_comma: None };
-    let mut short = 0_u64;
+    let (mut short, mut empty) = (0_u64, 0_u64);
     loop {
         match next {
             Ok(true) => {}
@@ -64,13 +67,21 @@ pub(in crate::formats) fn log(mut input: impl BufRead, wanted: Option<&[String]>
             }
             Err(other) => return Err(other),
         }
-        short += u64::from(record.len() != names.len());
-        marks.row(&mut table, &record);
+        if is_empty(&record) {
+            empty += 1;
+        } else {
+            short += u64::from(record.len() != names.len());
+            let line = lines.at(&record);
+            // What is no text is counted as such, and refused by line where the log is read.
+            let _ = texts.take(&mut record, line);
+            marks.row(&mut table, &record);
+        }
         next = read(&mut reader, &mut record);
     }
     if short > 0 {
         marks.loss(&format!("{short} of {} rows are not as long as the header", table.rows));
     }
+    texts.note().into_iter().chain(empty_rows(empty)).for_each(|note| marks.note(&note));
     Ok(marks.finish())
 }
 
@@ -132,6 +143,13 @@ impl Marks<'_> {
         table.rows += 1;
     }
 
+    fn note(&mut self, words: &str) {
+        self.points.note(words.to_owned());
+        if let Some(commas) = &mut self.commas {
+            commas.note(words.to_owned());
+        }
+    }
+
     fn loss(&mut self, words: &str) {
         self.points.loss(words.to_owned());
         if let Some(commas) = &mut self.commas {
@@ -152,11 +170,4 @@ impl Marks<'_> {
         }
         self.points.finish()
     }
-}
-
-/// What parts the cells of the first line.
-fn delimiter(start: &[u8]) -> u8 {
-    let line = start.split(|b| *b == b'\n').next().unwrap_or(start);
-    let count = |wanted: u8| line.iter().filter(|b| **b == wanted).count();
-    [b',', b';', b'\t'].into_iter().max_by_key(|d| (count(*d), *d == b',')).unwrap_or(b',')
 }

@@ -36,6 +36,11 @@ pub(super) fn below(names: &[String], row: &ByteRecord) -> Option<Vec<Option<Str
     (known > 0 && 2 * known >= words).then_some(units)
 }
 
+/// That such a row was found.
+pub(super) fn said(line: u64) -> String {
+    format!("line {line} holds units, and is no row")
+}
+
 /// Whether each of them is the unit that its column's name ends in.
 pub(super) fn as_named(names: &[String], below: &[Option<String>]) -> bool {
     names.iter().zip(below).all(|(name, unit)| {
@@ -46,6 +51,7 @@ pub(super) fn as_named(names: &[String], below: &[Option<String>]) -> bool {
 
 /// Words for columns that are read in another unit than stands below their name.
 pub(super) fn differ<'a>(
+    line: u64,
     names: &[String],
     below: &[Option<String>],
     read: impl Iterator<Item = (&'a str, &'a Unit)>,
@@ -56,7 +62,8 @@ pub(super) fn differ<'a>(
     };
     let other = |(name, unit): (&str, &Unit)| {
         let said = said(name).filter(|said| said.symbol != unit.symbol)?.symbol;
-        Some(format!("line 2 of the file has `{name}` in {said}, the column map reads it in {}", unit.symbol))
+        let read = unit.symbol;
+        Some(format!("line {line} of the file has `{name}` in {said}, the column map reads it in {read}"))
     };
     read.filter_map(other).collect()
 }
