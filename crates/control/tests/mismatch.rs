@@ -114,7 +114,11 @@ fn a_second_fault_is_named_beside_the_first_and_each_is_let_go_of_by_itself() {
     assert!(watched.is(30.0, |m| off(m) == [Path::Shaft, Path::Sensor]).is_some());
     watched.switch(&[gain], &[]);
     let shaft = watched.is(WITHIN_S, |m| m.level[Path::Shaft as usize] == 0.0);
-    assert!(shaft.is_some() && watched.l.controller.mismatch().alarm == Some(Path::Sensor));
+    assert!(
+        shaft.is_some() && watched.l.controller.mismatch().alarm == Some(Path::Sensor),
+        "{shaft:?} {:?}",
+        watched.l.controller.mismatch()
+    );
     watched.switch(&[], &[]);
     let none = watched.is(WITHIN_S, |m| m.alarm.is_none());
     println!("shaft let go of after {shaft:?} s, all after {none:?} s");

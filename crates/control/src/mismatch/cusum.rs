@@ -1,13 +1,17 @@
 //! What is usual of a residual, sums of what is not, and the threshold that a rate of false alarms asks for.
 
+use super::channels::WAYS;
+use super::faults::Sides;
 use super::{BLOCK_S, LEARNT};
 
 /// Reference value of the CUSUM, standard deviations.
 const REFERENCE: f64 = 0.75;
 /// A block counts for no more than this, standard deviations: one bad block is no mismatch.
 const CLIP: f64 = 4.0;
-/// Least spread of a share: what nobody would call a mismatch.
-const LEAST: f64 = 0.001;
+/// Farthest off that is told from still farther, standard deviations.
+const FARTHEST: f64 = 1e3;
+/// Least spread of each way of being off: what nobody would call a mismatch.
+pub(super) const LEAST: [f64; WAYS] = [0.001, 0.01, 0.001, 0.1];
 
 /// Mean and squared deviations of a residual while learning (Welford 1962).
 #[derive(Clone, Copy, Debug, Default)]
@@ -25,15 +29,12 @@ impl Usual {
         self.squares += off * (x - self.mean);
     }
 
-    pub(super) fn standardised(&self, x: f64) -> Option<f64> {
-        (self.n >= LEARNT).then(|| {
-            let spread = (self.squares / f64::from(self.n - 1)).sqrt().max(LEAST);
-            ((x - self.mean) / spread).clamp(-CLIP, CLIP)
-        })
+    pub(super) fn standardised(&self, x: f64, least: f64) -> Option<f64> {
+        (self.n >= LEARNT).then(|| ((x - self.mean) / self.spread(least)).clamp(-FARTHEST, FARTHEST))
     }
 
-    pub(super) fn spread(&self) -> f64 {
-        (self.squares / f64::from(self.n.max(2) - 1)).sqrt().max(LEAST)
+    pub(super) fn spread(&self, least: f64) -> f64 {
+        (self.squares / f64::from(self.n.max(2) - 1)).sqrt().max(least)
     }
 }
 
@@ -66,12 +67,19 @@ pub(super) struct Cusum {
 }
 
 impl Cusum {
-    pub(super) fn take(&mut self, z: f64, most: f64, block_s: f64) {
-        for (side, sign) in [(0, 1.0), (1, -1.0)] {
-            let sum = self.sums[side] + sign * z - REFERENCE;
+    pub(super) fn take(&mut self, z: f64, sides: Sides, most: f64) {
+        let both = [(0, 1.0), (1, -1.0)];
+        for (side, sign) in both.into_iter().take(if sides == Sides::Both { 2 } else { 1 }) {
+            let sum = self.sums[side] + sign * z.clamp(-CLIP, CLIP) - REFERENCE;
             self.sums[side] = sum.clamp(0.0, most);
-            self.since_s[side] = if sum <= 0.0 { 0.0 } else { self.since_s[side] + block_s };
+            self.since_s[side] = if sum <= 0.0 { 0.0 } else { self.since_s[side] + BLOCK_S };
         }
+    }
+
+    /// An alarm on one side, since an onset that another sum has found.
+    pub(super) fn fill(&mut self, side: usize, most: f64, since_s: f64) {
+        *self = Self::default();
+        (self.sums[side], self.since_s[side]) = (most, since_s);
     }
 
     pub(super) fn level(&self) -> (f64, f64) {
