@@ -4,7 +4,8 @@
 //! away): the drive's current behind its lag, the shaft's torque balance, the blades' thrust in a flow that the
 //! model makes of the measured speed, and that flow. Over a block of time what is missing in each is regressed on what is
 //! expected, its rate of change and a constant: it is off in proportion, late, or by a constant, and it may be restless.
-//! Each of these signs is standardised with the mean and spread that the first blocks showed.
+//! Each of these signs is standardised with the mean and spread that the first blocks showed, and more spread where a block
+//! was driven less than those: of noise that is there anyway it has more.
 //!
 //! What a fault of each path does to all signs is rehearsed on the model before anything runs (`faults.rs`), and a two-sided
 //! CUSUM (Page 1954) sums the projection of every block on it. Once one reaches its threshold something is off; the path is
@@ -171,16 +172,16 @@ impl Monitor {
     fn end_block(&mut self) {
         let late = self.channels.late_share();
         let block = self.channels.block();
-        let told = TOLD.into_iter().map(|k| block[k]).chain([late]);
+        let told = TOLD.into_iter().map(|k| block[k].map(|sign| sign.value)).chain([late]);
         for (lately, x) in self.lately.iter_mut().zip(told) {
             x.into_iter().for_each(|x| lately.take(x));
         }
         let mut z = [None; SIGNS];
         for i in 0..SIGNS {
-            let Some(x) = block[i] else { continue };
-            z[i] = self.usual[i].standardised(x, LEAST[i % WAYS]);
+            let Some(sign) = block[i] else { continue };
+            z[i] = self.usual[i].standardised(sign, LEAST[i % WAYS]);
             if z[i].is_none() {
-                self.usual[i].take(x);
+                self.usual[i].take(sign);
             }
         }
         self.kept[self.oldest] = z;

@@ -27,7 +27,16 @@ pub(super) const RESTLESS: usize = 3;
 
 /// What a block says of each channel and way.
 pub(super) const SIGNS: usize = CHANNELS * WAYS;
-pub(super) type Block = [Option<f64>; SIGNS];
+pub(super) type Block = [Option<Sign>; SIGNS];
+
+/// What a block says of one.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sign {
+    pub(super) value: f64,
+    /// Mean square of what it was told by, share of full scale squared: of noise that is there anyway a value has the more, the
+    /// less that is.
+    pub(super) excitation: f64,
+}
 
 /// Place of a channel's way.
 pub(super) const fn sign(channel: usize, way: usize) -> usize {
@@ -63,30 +72,31 @@ impl Fit {
 
     /// One after the other (Gram and Schmidt): in proportion all that can be, late what the level leaves, constant what both
     /// leave. So steady running, which cannot tell a constant from a gain, still says that something is missing.
-    fn ways(&self) -> [Option<f64>; WAYS] {
+    fn ways(&self) -> [Option<Sign>; WAYS] {
         let [ll, lr, l, rr, r] = self.among;
         let [ml, mr, m] = self.missing;
         let n = self.ticks;
         let mut ways = [None; WAYS];
+        let told = |by: f64, energy: f64| Some(Sign { value: by / energy, excitation: energy / n });
         let (mut rr, mut r, mut mr) = (rr, r, mr);
         let (mut ones, mut m) = (n, m);
         if ll > EXCITED[0] * n {
-            ways[GAIN] = Some(ml / ll);
+            ways[GAIN] = told(ml, ll);
             let by = lr / ll;
             (rr, r, mr) = (rr - by * lr, r - by * l, mr - by * ml);
             (ones, m) = (ones - l * l / ll, m - l * ml / ll);
         }
         if rr > EXCITED[1] * n {
-            ways[LATE] = Some(mr / rr);
+            ways[LATE] = told(mr, rr);
             (ones, m) = (ones - r * r / rr, m - r * mr / rr);
         }
         if n > 0.0 && ones > APART * n {
-            ways[ZERO] = Some(m / ones);
+            ways[ZERO] = told(m, ones);
         }
         if n > 0.0 && self.fast > 0.0 {
-            ways[RESTLESS] = Some((self.fast / n).ln());
+            ways[RESTLESS] = Some(Sign { value: (self.fast / n).ln(), excitation: 1.0 });
         }
-        ways.map(|way| way.filter(|x| x.is_finite()))
+        ways.map(|way| way.filter(|sign| sign.value.is_finite()))
     }
 }
 
@@ -172,7 +182,7 @@ impl Channels {
     /// How much of the drive's largest current is late so far in the block, root mean square; negative where it lags.
     pub(super) fn late_share(&self) -> Option<f64> {
         let fit = &self.fits[DRIVE];
-        fit.ways()[LATE].map(|late| late * (fit.among[3] / fit.ticks).sqrt())
+        fit.ways()[LATE].map(|late| late.value * (fit.among[3] / fit.ticks).sqrt())
     }
 
     /// Ends the block: what it says.

@@ -1,6 +1,6 @@
 //! What is usual of a residual, sums of what is not, and the threshold that a rate of false alarms asks for.
 
-use super::channels::WAYS;
+use super::channels::{Sign, WAYS};
 use super::faults::Sides;
 use super::{BLOCK_S, LEARNT};
 
@@ -19,18 +19,25 @@ pub(super) struct Usual {
     pub(super) n: u32,
     mean: f64,
     squares: f64,
+    /// Mean of one over the excitation: the variance of noise that is there anyway goes with it.
+    per_excitation: f64,
 }
 
 impl Usual {
-    pub(super) fn take(&mut self, x: f64) {
+    pub(super) fn take(&mut self, sign: Sign) {
         self.n += 1;
-        let off = x - self.mean;
-        self.mean += off / f64::from(self.n);
-        self.squares += off * (x - self.mean);
+        let (n, off) = (f64::from(self.n), sign.value - self.mean);
+        self.mean += off / n;
+        self.squares += off * (sign.value - self.mean);
+        self.per_excitation += (1.0 / sign.excitation - self.per_excitation) / n;
     }
 
-    pub(super) fn standardised(&self, x: f64, least: f64) -> Option<f64> {
-        (self.n >= LEARNT).then(|| ((x - self.mean) / self.spread(least)).clamp(-FARTHEST, FARTHEST))
+    /// In standard deviations. Of a block that was driven less than usual the deviation is that of additive noise; of one driven
+    /// more it stays, as part of what is usual goes with what is expected.
+    pub(super) fn standardised(&self, sign: Sign, least: f64) -> Option<f64> {
+        let wider = (1.0 / (sign.excitation * self.per_excitation)).max(1.0).sqrt();
+        let off = (sign.value - self.mean) / (self.spread(least) * wider);
+        (self.n >= LEARNT).then(|| off.clamp(-FARTHEST, FARTHEST))
     }
 
     pub(super) fn spread(&self, least: f64) -> f64 {
@@ -113,6 +120,20 @@ mod tests {
     fn the_threshold_rises_as_alarms_become_rarer() {
         let (often, rarely) = (threshold(1.0, 8), threshold(1.0 / 30.0, 8));
         assert!(often > 5.0 && rarely > often + 2.0 && rarely < 20.0, "{often} {rarely}");
+    }
+
+    #[test]
+    fn a_block_that_was_hardly_driven_says_less() {
+        let mut usual = Usual::default();
+        (0..LEARNT)
+            .for_each(|k| usual.take(Sign { value: if k % 2 == 0 { 0.01 } else { -0.01 }, excitation: 0.2 }));
+        let off = |excitation| usual.standardised(Sign { value: 0.05, excitation }, 0.0).unwrap();
+        assert!((off(0.2) - 5.0).abs() < 0.05 && (off(0.2) - off(0.8)).abs() < 1e-9, "{}", off(0.2));
+        assert!(
+            (off(0.05) - 2.5).abs() < 0.05,
+            "a quarter of the excitation, twice the spread: {}",
+            off(0.05)
+        );
     }
 
     /// Siegmund's approximation against a simulated CUSUM.

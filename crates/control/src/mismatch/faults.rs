@@ -172,7 +172,7 @@ impl Thruster {
                 channels.tick(&Seen { model, measured: &measured, drive_a, driving: true, dt_s });
             }
         }
-        channels.block().map(|sign| sign.unwrap_or(0.0))
+        channels.block().map(|sign| sign.map_or(0.0, |sign| sign.value))
     }
 }
 
