@@ -57,26 +57,7 @@ fi
 # Nothing is built a second time here.
 export CARGO_INCREMENTAL=0
 say "cargo test --workspace"
-cargo test --workspace --no-run
-# Tests of live processes wait for most of their time: those that only compute run beside them, and give way also to the
-# diagnoses that a service runs at its lowest priority.
-live=(access console dashboards diagnoses drives faults gateway metrics openapi recorded rig servo_faults soak_live stack)
-computing=()
-shopt -s nullglob
-for file in tests/*.rs tests/*/main.rs {crates,services}/*/tests/*.rs {crates,services}/*/tests/*/main.rs; do
-  name="${file%/main.rs}"; name="$(basename "$name" .rs)"
-  [[ " ${live[*]} " == *" $name "* ]] || computing+=("$name")
-done
-idle=(nice -n 19); command -v chrt >/dev/null && idle=(chrt --idle 0)
-"${idle[@]}" cargo test --workspace --no-fail-fast --lib --bins "${computing[@]/#/--test=}" >"$tools/computing.log" 2>&1 &
-computes=$!
-trap 'kill "$computes" 2>/dev/null || true' EXIT
-failed=0
-cargo test --workspace --no-fail-fast "${live[@]/#/--test=}" || failed=1
-wait "$computes" || failed=1
-cat "$tools/computing.log"
-cargo test --workspace --doc || failed=1
-[ "$failed" = 0 ] || { say "tests failed"; exit 1; }
+cargo test --workspace --no-fail-fast
 
 if [ -n "${fetching:-}" ] && wait "$fetching"; then
   say "the Python package: wheel, types, tests, notebooks"
