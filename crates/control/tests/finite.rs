@@ -50,6 +50,9 @@ proptest! {
         rate in prop_oneof![Just(100.0), Just(500.0), Just(1000.0), Just(5000.0)],
     ) {
         for rig in rigs() {
+            // One controller for all: what it does at a switch is limited too, and each takes a rehearsal of faults to make.
+            let mut c = Controller::new(&rig, &ControllerConfig::default(), 1.0 / rate).unwrap();
+            let mut last = 0.0_f64;
             for law in LawKind::ALL {
                 for (observer, estimator) in [
                     (ObserverKind::OpenLoop, EstimatorKind::Off),
@@ -58,8 +61,7 @@ proptest! {
                     (ObserverKind::Ukf, EstimatorKind::Rls),
                 ] {
                     let config = ControllerConfig { law, observer, estimator, ..Default::default() };
-                    let mut c = Controller::new(&rig, &config, 1.0 / rate).unwrap();
-                    let mut last = 0.0_f64;
+                    c.configure(&config);
                     for (measured, reference, dt) in &inputs {
                         let out = c.tick(measured, *reference, *dt);
                         let who = format!("{} {} {}", rig.name, law.name(), observer.name());
