@@ -8,7 +8,7 @@ use common::watched::{Watched, learnt_on, rig};
 const CLEAN_S: f64 = 6.0 * 3600.0;
 /// Rigs with a force sensor and a flow meter, and the seed of reference and noise.
 const RIGS: [(&str, u64); 4] =
-    [("whitcomb-yoerger-1999", 41), ("ducted-small-vessel", 62), ("tunnel-10kw", 63), ("t500-class", 64)];
+    [("whitcomb-yoerger-1999", 41), ("ducted-small-vessel", 42), ("tunnel-10kw", 43), ("t500-class", 44)];
 
 /// Prints how near each path came to an alarm.
 #[test]

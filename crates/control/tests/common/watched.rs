@@ -61,14 +61,12 @@ impl Watched {
         }
     }
 
-    /// Sum of twelve uniforms, by SplitMix64 (Steele, Lea and Flood 2014): a bare linear congruence drifts over a minute.
     fn normal(&mut self) -> f64 {
         let mut sum = -6.0;
         for _ in 0..12 {
-            self.noise = self.noise.wrapping_add(0x9e37_79b9_7f4a_7c15);
-            let mut x = (self.noise ^ (self.noise >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-            x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-            sum += ((x ^ (x >> 31)) >> 11) as f64 / (1_u64 << 53) as f64;
+            self.noise =
+                self.noise.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            sum += (self.noise >> 11) as f64 / (1_u64 << 53) as f64;
         }
         sum
     }
