@@ -4,8 +4,11 @@
 //! away): the drive's current behind its lag, the shaft's torque balance, the blades' thrust in a flow that the
 //! model makes of the measured speed, and that flow. Over a block of time what is missing in each is regressed on what is
 //! expected, its rate of change and a constant: it is off in proportion, late, or by a constant, and it may be restless.
-//! Each of these signs is standardised with the mean and spread that the first blocks showed, and more spread where a block
-//! was driven less than those: of noise that is there anyway it has more.
+//! Each of these signs is standardised with mean and spread of the blocks before it, and more spread where a block
+//! was driven less than those: of noise that is there anyway it has more. The first blocks are learnt as they come; every
+//! later one once it is a minute old and nothing is off. So standardised, a sign is off by no more than it is by nature, however
+//! the first minutes fell out: a self-starting CUSUM (Hawkins 1987, The Statistician 36), where a mean learnt once and a third
+//! of a standard deviation wrong, as some of 150 blocks are, would stand in every later block.
 //!
 //! What a fault of each path does to all signs is rehearsed on the model before anything runs (`faults.rs`), and a two-sided
 //! CUSUM (Page 1954) sums the projection of every block on it. Once one reaches its threshold something is off; the path is
@@ -34,7 +37,7 @@ mod faults;
 use crate::model::ControlModel;
 use crate::signals::Measurement;
 
-use channels::{CHANNELS, Channels, DRIVE, GAIN, SIGNS, THRUST, TORQUE, WATER, WAYS, ZERO, sign};
+use channels::{Block, CHANNELS, Channels, DRIVE, GAIN, SIGNS, THRUST, TORQUE, WATER, WAYS, ZERO, sign};
 pub use cusum::threshold;
 use cusum::{Cusum, LEAST, Lately, Usual};
 use faults::{FAULTS, Sides, rehearsed};
@@ -72,7 +75,7 @@ impl Path {
 
 /// Length of a block, s.
 pub const BLOCK_S: f64 = 2.0;
-/// Blocks that mean and spread are learnt from: five minutes of driving.
+/// Blocks from which mean and spread are known well enough to begin: five minutes of driving.
 pub const LEARNT: u32 = 150;
 
 /// Blocks that a path is named from: a minute.
@@ -118,6 +121,8 @@ pub struct Monitor {
     cusums: [Cusum; FAULTS],
     /// The last blocks, standardised: a ring, and the place of the oldest.
     kept: [[Option<f64>; SIGNS]; KEPT],
+    /// The same as they were, to be learnt when they leave it; none while something is off.
+    to_learn: [Block; KEPT],
     oldest: usize,
     /// Which faults are off: how many went off up to each, zero for one that is not.
     off: [u32; FAULTS],
@@ -150,6 +155,7 @@ impl Monitor {
             faults: rehearsed(model),
             cusums: [Cusum::default(); FAULTS],
             kept: [[None; SIGNS]; KEPT],
+            to_learn: [[None; SIGNS]; KEPT],
             oldest: 0,
             off: [0; FAULTS],
         }
@@ -177,13 +183,16 @@ impl Monitor {
             x.into_iter().for_each(|x| lately.take(x));
         }
         let mut z = [None; SIGNS];
-        for i in 0..SIGNS {
-            let Some(sign) = block[i] else { continue };
-            z[i] = self.usual[i].standardised(sign, LEAST[i % WAYS]);
-            if z[i].is_none() {
-                self.usual[i].take(sign);
+        for (i, usual) in self.usual.iter_mut().enumerate() {
+            if usual.n < LEARNT {
+                block[i].into_iter().for_each(|sign| usual.take(sign));
+            } else {
+                z[i] = block[i].map(|sign| usual.standardised(sign, LEAST[i % WAYS]));
             }
         }
+        self.learn_oldest();
+        // What was learnt as it came is not learnt again.
+        self.to_learn[self.oldest] = std::array::from_fn(|i| z[i].and(block[i]));
         self.kept[self.oldest] = z;
         self.oldest = (self.oldest + 1) % KEPT;
         let views = self.views();
@@ -194,6 +203,16 @@ impl Monitor {
             }
         }
         self.judge(&views);
+    }
+
+    /// Learns the block that is about to leave the ring. Once something is off, nothing that may have shown it is learnt.
+    fn learn_oldest(&mut self) {
+        if self.off.iter().any(|off| *off > 0) {
+            self.to_learn = [[None; SIGNS]; KEPT];
+        }
+        for (usual, sign) in self.usual.iter_mut().zip(self.to_learn[self.oldest]) {
+            sign.into_iter().for_each(|sign| usual.take(sign));
+        }
     }
 
     /// Each fault's direction in standard deviations, of length one; of what a fault of another path touches that is off, nothing.
@@ -316,4 +335,33 @@ impl Monitor {
 fn projected(view: &[f64; SIGNS], z: &[Option<f64>; SIGNS]) -> (f64, f64) {
     let known = view.iter().zip(z).filter_map(|(d, z)| z.map(|z| (d, z)));
     known.fold((0.0, 0.0), |(along, length), (d, z)| (along + d * z, length + d * d))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::channels::Sign;
+    use super::*;
+    use crate::model::tests::stand;
+
+    /// Standard deviations in which a sign of 0.25 is told once a minute more of it has come, of a mean and spread of zero and
+    /// 0.1 that the first blocks had.
+    fn after_a_minute_more(off: bool) -> f64 {
+        let mut monitor = Monitor::new(&stand(), 1.0);
+        let sign = |value| Sign { value, excitation: 1.0 };
+        (0..LEARNT).for_each(|k| monitor.usual[0].take(sign(if k % 2 == 0 { 0.1 } else { -0.1 })));
+        let shown = std::array::from_fn(|i| (i == 0).then(|| sign(0.25)));
+        monitor.to_learn = [shown; KEPT];
+        monitor.off[0] = u32::from(off);
+        for oldest in 0..KEPT {
+            monitor.oldest = oldest;
+            monitor.learn_oldest();
+        }
+        monitor.usual[0].standardised(sign(0.25), 0.0)
+    }
+
+    #[test]
+    fn what_a_minute_showed_becomes_usual_unless_something_is_off() {
+        assert!((after_a_minute_more(true) - 2.5).abs() < 0.02);
+        assert!(after_a_minute_more(false) < 1.7, "{}", after_a_minute_more(false));
+    }
 }

@@ -163,6 +163,13 @@ fn measures(cases: &[Scored], bins: &[Bin]) -> Vec<Measure> {
             off,
             claims,
         ),
+        Measure::mean(
+            "calibration_error_by_chance",
+            "the same, were every `probability` right: what chance leaves of so many findings",
+            None,
+            bins.iter().map(off_by_chance).sum(),
+            claims,
+        ),
         Measure::share(
             "refused",
             "cases that were refused or failed",
@@ -201,9 +208,28 @@ pub fn calibration<'a>(claims: impl Iterator<Item = &'a Claim>) -> Vec<Bin> {
     bins
 }
 
+/// By how many findings a bin is off on average where each is right with the probability that is stated of it: the mean size of a
+/// normal number, with the binomial's variance.
+fn off_by_chance(bin: &Bin) -> f64 {
+    (std::f64::consts::FRAC_2_PI * bin.count as f64 * bin.stated * (1.0 - bin.stated)).sqrt()
+}
+
 #[cfg(test)]
 mod tests {
+    use statrs::distribution::Discrete;
+
     use super::*;
+
+    /// Against the binomial itself.
+    #[test]
+    fn what_chance_leaves_of_a_bin_is_what_a_binomial_is_off() {
+        let (count, stated) = (12_u64, 0.26);
+        let binomial = statrs::distribution::Binomial::new(stated, count).unwrap();
+        let off = |right: u64| binomial.pmf(right) * (right as f64 - stated * count as f64).abs();
+        let mean: f64 = (0..=count).map(off).sum();
+        let bin = Bin { count: count as usize, stated, right: 0.0 };
+        assert!((off_by_chance(&bin) - mean).abs() < 0.05 * mean, "{} {mean}", off_by_chance(&bin));
+    }
 
     fn scored(kind: CaseKind, verdict: &str, probability: f64, right: bool, strength: f64) -> Scored {
         let named = verdict == "explained";

@@ -13,7 +13,7 @@ const FARTHEST: f64 = 1e3;
 /// Least spread of each way of being off: what nobody would call a mismatch.
 pub(super) const LEAST: [f64; WAYS] = [0.001, 0.01, 0.001, 0.1];
 
-/// Mean and squared deviations of a residual while learning (Welford 1962).
+/// Mean and squared deviations of a residual (Welford 1962).
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Usual {
     pub(super) n: u32,
@@ -34,10 +34,9 @@ impl Usual {
 
     /// In standard deviations. Of a block that was driven less than usual the deviation is that of additive noise; of one driven
     /// more it stays, as part of what is usual goes with what is expected.
-    pub(super) fn standardised(&self, sign: Sign, least: f64) -> Option<f64> {
+    pub(super) fn standardised(&self, sign: Sign, least: f64) -> f64 {
         let wider = (1.0 / (sign.excitation * self.per_excitation)).max(1.0).sqrt();
-        let off = (sign.value - self.mean) / (self.spread(least) * wider);
-        (self.n >= LEARNT).then(|| off.clamp(-FARTHEST, FARTHEST))
+        ((sign.value - self.mean) / (self.spread(least) * wider)).clamp(-FARTHEST, FARTHEST)
     }
 
     pub(super) fn spread(&self, least: f64) -> f64 {
@@ -127,7 +126,7 @@ mod tests {
         let mut usual = Usual::default();
         (0..LEARNT)
             .for_each(|k| usual.take(Sign { value: if k % 2 == 0 { 0.01 } else { -0.01 }, excitation: 0.2 }));
-        let off = |excitation| usual.standardised(Sign { value: 0.05, excitation }, 0.0).unwrap();
+        let off = |excitation| usual.standardised(Sign { value: 0.05, excitation }, 0.0);
         assert!((off(0.2) - 5.0).abs() < 0.05 && (off(0.2) - off(0.8)).abs() < 1e-9, "{}", off(0.2));
         assert!(
             (off(0.05) - 2.5).abs() < 0.05,

@@ -155,7 +155,7 @@ impl Measured {
 pub fn cells(measure: &Measure) -> Vec<String> {
     let value = measure.value.map_or("-".to_owned(), |value| match measure.name {
         "seconds_per_case" => format!("{value:.1} s"),
-        "calibration_error" => format!("{value:.3}"),
+        name if name.starts_with("calibration_error") => format!("{value:.3}"),
         _ => format!("{:.1} %", 100.0 * value),
     });
     let whole = measure.numerator.fract() == 0.0;
