@@ -7,10 +7,10 @@ use kort_identify::fit::Fit;
 use kort_scenario::{EffectUse, NoReplays, Run, Scenario};
 use kort_thruster::effects::{Descriptor, Scale};
 use kort_thruster::parameters::Parameter;
-use kort_thruster::rig::Rig;
+use kort_thruster::rig::{Load, Rig};
 
 use crate::decide::Decision;
-use crate::flexible::is_term;
+use crate::flexible::{SHAFT_OVER_ANGLE, is_term};
 use crate::load_steps::LOAD_STEPS;
 use crate::report::NextExperiment;
 use crate::search::{Search, Set};
@@ -36,7 +36,7 @@ const SIGNALS: &[(&str, &str)] = &[
 /// The next experiment, if anything is left open.
 pub fn next(search: &Search, decision: &Decision, best: &Set, rig: &Rig) -> Option<NextExperiment> {
     let Some(place) = decision.named.iter().find(|n| !n.rivals.is_empty() && best.contains(&n.effect)) else {
-        return unexplained(search, decision);
+        return unexplained(search, decision, rig);
     };
     let rival = *place.rivals.first()?;
     let mut other: Set = best.iter().copied().filter(|id| *id != place.effect).collect();
@@ -99,25 +99,41 @@ fn why(search: &Search, chosen: &Descriptor, rival: &Descriptor, difference: f64
 }
 
 /// A real mismatch without a name: the richest signal there is, both ways.
-fn unexplained(search: &Search, decision: &Decision) -> Option<NextExperiment> {
+fn unexplained(search: &Search, decision: &Decision, rig: &Rig) -> Option<NextExperiment> {
     let term = search.descriptor(decision.term?)?;
-    let why = if term.id == LOAD_STEPS.id {
-        "with the change in force and without it, current recorded: a load takes the same torque at every level, a drive that loses gain a share of it".to_string()
-    } else {
-        format!(
-            "steady levels both ways show on the {} path how the unknown goes with speed and direction; then repeat this run to see whether it stays",
-            term.path.name()
-        )
-    };
     let (text, words) = SIGNALS[1];
+    let (excitation, why) = of_unknown(term, rig, words);
     let mut scenario: Scenario = toml::from_str(text).ok()?;
     scenario.name = "locate-the-unknown".into();
     Some(NextExperiment {
         separates: vec!["unknown".into()],
-        excitation: words.into(),
+        excitation,
         why,
         scenario: serde_json::to_value(&scenario).ok()?,
     })
+}
+
+/// What to run for a term without a name, of which a signal both ways tells most, and why.
+fn of_unknown(term: &Descriptor, rig: &Rig, both_ways: &str) -> (String, String) {
+    let why = format!(
+        "steady levels both ways show on the {} path how the unknown goes with speed and direction; then repeat this run to see whether it stays",
+        term.path.name()
+    );
+    if term.id == LOAD_STEPS.id {
+        let why = "with the change in force and without it, current recorded: a load takes the same torque at every level, a drive that loses gain a share of it";
+        return (both_ways.into(), why.into());
+    }
+    if term.id == SHAFT_OVER_ANGLE.id && rig.load == Load::None {
+        let again =
+            "this recording again, with what hangs on the shaft (a weight, a spring) stated in the rig";
+        let weight = "torque that goes with the shaft's angle is what a weight on an arm, a wheel out of balance, a spring or a cable does, and it hides all else; \
+                      a weight is stated as [load] kind = \"pendulum\", mass_kg, length_m";
+        return (
+            format!("{again}; where nothing does, {both_ways}"),
+            format!("{weight}. Where nothing hangs there, {why}"),
+        );
+    }
+    (both_ways.into(), why)
 }
 
 /// Whether an effect changes freely with time, and so comes again another way.
@@ -177,4 +193,28 @@ fn with_effects(mut scenario: Scenario, search: &Search, fit: &Fit) -> Scenario 
 
 fn named(effect: &Descriptor, values: &[f64], scale: &Scale) -> BTreeMap<String, f64> {
     (effect.parameters)(scale).iter().map(|s| s.name.to_string()).zip(values.iter().copied()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flexible::TERMS;
+
+    const SERVO: &str =
+        "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = 0.006\ntorque_constant_nm_a = 0.35\n";
+    const WEIGHT: &str = "[load]\nkind = \"pendulum\"\nmass_kg = 0.5\nlength_m = 0.1\n";
+
+    #[test]
+    fn what_pulls_at_an_angle_is_asked_for_where_the_rig_states_no_load() {
+        let [bare, loaded] =
+            [SERVO.to_string(), format!("{SERVO}{WEIGHT}")].map(|text| Rig::from_toml(&text).unwrap());
+        for term in TERMS {
+            let (excitation, why) = of_unknown(term, &bare, "a staircase");
+            let asked = term.id == SHAFT_OVER_ANGLE.id;
+            assert_eq!(excitation.contains("hangs on the shaft"), asked, "{}: {excitation}", term.id);
+            assert_eq!(why.contains("[load]"), asked, "{}: {why}", term.id);
+            assert!(excitation.contains("a staircase"));
+            assert_eq!(of_unknown(term, &loaded, "a staircase").0, "a staircase");
+        }
+    }
 }

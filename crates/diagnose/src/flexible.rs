@@ -141,7 +141,7 @@ impl<T: Real> Effect<T> for Term<T> {
 
 macro_rules! term {
     ($const:ident, $id:literal, $path:ident, $equation:literal, $needs:expr, $parameters:expr, $place:ident) => {
-        const $const: Descriptor = nameless! {
+        pub(crate) const $const: Descriptor = nameless! {
             id: $id,
             path: Path::$path,
             what: "a term that bends to anything",
@@ -199,7 +199,8 @@ term!(
     Shaft,
     "shaft torque [N m] over shaft_angle_rad",
     swings,
-    |s| heights("N m", 0.1 * s.torque_n_m, s.angle_rad),
+    // What hangs on a shaft that swings is what its motor was chosen to carry.
+    |s| heights("N m", 0.5 * s.torque_n_m, s.angle_rad),
     ShaftOverAngle
 );
 term!(

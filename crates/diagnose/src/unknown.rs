@@ -10,6 +10,7 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 
 use crate::flexible::TERMS;
+use crate::left::leaves_more;
 use crate::load_steps::{self, Change, LOAD_STEPS};
 use crate::search::{Search, Set, with};
 
@@ -28,29 +29,40 @@ pub fn look(
     let steps = terms.iter().any(|term| term.id == LOAD_STEPS.id);
     let grid = if steps { load_steps::on_a_grid(search.problem, fit) } else { Vec::new() };
     let beside = put_on(search, best, &terms, best, &grid);
-    if let Some(beside) = &beside {
+    if let Some(beside) = beside.first() {
         // Names that only stood for it, and names that show once it is there.
         search.refine(beside);
     }
+    if best.is_empty() {
+        return;
+    }
     // Where nothing pays on top of the names, only what does about as well as they do can stand in their place.
-    let place = if beside.is_some() { Set::new() } else { best.clone() };
-    if !best.is_empty()
-        && let Some(alone) = put_on(search, &Set::new(), &terms, &place, &grid)
-    {
+    let place = if beside.is_empty() { best.clone() } else { Set::new() };
+    for alone in put_on(search, &Set::new(), &terms, &place, &grid) {
         search.climb(alone, progress);
+        // A term that says little alone may be what the names need; it is tried while more than noise is left.
+        if cheapest(search).is_none_or(|fit| !leaves_more(search.problem, fit)) {
+            return;
+        }
     }
 }
 
-/// Fits the terms that promise most on top of a set; the best set with one, if a promise may earn its price and do as
-/// well as what is to be beaten.
+/// The fit of the set that costs least.
+fn cheapest<'a>(search: &'a Search) -> Option<&'a Fit> {
+    let set = search.fits.keys().min_by(|a, b| search.cost(a).total_cmp(&search.cost(b)))?;
+    search.fits.get(set)
+}
+
+/// Fits the terms that promise most on top of a set; the sets with one, the cheapest first, if a promise may earn its price
+/// and do as well as what is to be beaten.
 fn put_on(
     search: &mut Search,
     set: &Set,
     terms: &[&'static Descriptor],
     beaten: &Set,
     grid: &[Change],
-) -> Option<Set> {
-    let parent = search.fits.get(set)?.clone();
+) -> Vec<Set> {
+    let Some(parent) = search.fits.get(set).cloned() else { return Vec::new() };
     let mut promised: Vec<(f64, &'static Descriptor, Hypothesis)> =
         terms.par_iter().filter_map(|term| promise(search, &parent, term, grid)).collect();
     let best = promised.iter().map(|p| p.0).fold(f64::INFINITY, f64::min);
@@ -66,7 +78,8 @@ fn put_on(
         larger.push(set);
     }
     larger.retain(|set| search.fits.contains_key(set));
-    larger.into_iter().min_by(|a, b| search.cost(a).total_cmp(&search.cost(b)))
+    larger.sort_by(|a, b| search.cost(a).total_cmp(&search.cost(b)));
+    larger
 }
 
 /// Leaves changes of the load out of a set as long as that helps.
