@@ -32,9 +32,15 @@ fn press(page: &mut Browser, key: &str) {
     page.call("Input.dispatchKeyEvent", event("keyUp", ""));
 }
 
+/// The focus on a button that can be pressed: one that is off, as all are while the page's state is old, takes none.
+fn focus(page: &mut Browser, id: &str) {
+    page.until(&format!("!$('{id}').disabled && ($('{id}').focus(), document.activeElement === $('{id}'))"));
+}
+
 /// From the button before them on: the model's list, the summary, the first boxes behind it.
 fn chosen_by_keys(page: &mut Browser) {
-    page.eval("$('diagnosis-of').value = '60'; $('fit').focus()");
+    page.eval("$('diagnosis-of').value = '60'");
+    focus(page, "fit");
     let reach = |page: &mut Browser, what: &str| {
         for _ in 0..70 {
             if page.eval(&format!("document.activeElement === {what}")) == json!(true) {
@@ -128,7 +134,7 @@ fn an_operator_fits_reads_and_uses_what_was_fitted() {
 
         // Another model, and an effect taken as known: reached and chosen by the keyboard alone.
         chosen_by_keys(&mut page);
-        page.eval("$('fit').focus()");
+        focus(&mut page, "fit");
         press(&mut page, "Enter");
         page.until("fitted?.model === 'model1' && state.fit === null");
         page.until(
