@@ -56,6 +56,8 @@ fi
 
 # Nothing is built a second time here.
 export CARGO_INCREMENTAL=0
+# Most tests of the program wait for a running service; what computes, or draws a page, takes its turn by itself.
+export RUST_TEST_THREADS=4
 say "cargo test --workspace"
 cargo test --workspace --no-fail-fast
 

@@ -3,12 +3,30 @@
 use std::io::{BufRead, BufReader};
 use std::net::TcpStream;
 use std::process::{Child, Command, Stdio};
+use std::sync::{Condvar, Mutex};
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 use tokio_tungstenite::tungstenite::{self, Message, WebSocket, stream::MaybeTlsStream};
 
-use crate::common::{PATIENCE, wait};
+use crate::common::{PATIENCE, in_real_time, wait};
+
+/// Browsers that draw at a time: of more than two each is late on two cores.
+static FREE: (Mutex<usize>, Condvar) = (Mutex::new(2), Condvar::new());
+
+/// Runs a test of a page in real time, service and all, in its turn.
+pub fn in_its_turn(test: impl Fn()) {
+    struct Turn;
+    impl Drop for Turn {
+        fn drop(&mut self) {
+            *FREE.0.lock().unwrap() += 1;
+            FREE.1.notify_one();
+        }
+    }
+    *FREE.1.wait_while(FREE.0.lock().unwrap(), |free| *free == 0).unwrap() -= 1;
+    let _turn = Turn;
+    in_real_time(test);
+}
 
 /// A headless browser with one page.
 pub struct Browser {

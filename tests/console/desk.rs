@@ -2,14 +2,14 @@
 
 use serde_json::json;
 
-use crate::browser::Browser;
-use crate::common::{self, Site, Stack, wait};
+use crate::browser::{Browser, in_its_turn};
+use crate::common::{Site, Stack, wait};
 use crate::text_is;
 
 /// Recordings are tagged and found by it; law, observer and parameters go to a file and come from one.
 #[test]
 fn recordings_are_tagged_and_the_tuned_controller_is_kept_as_a_file() {
-    common::in_real_time(|| {
+    in_its_turn(|| {
         let stack = Stack::start();
         let Some(mut page) = Browser::open(&format!("http://127.0.0.1:{}/", stack.site.port)) else { return };
         page.until("document.readyState === 'complete' && typeof state !== 'undefined' && state !== null");
@@ -91,7 +91,7 @@ fn recordings_are_tagged_and_the_tuned_controller_is_kept_as_a_file() {
 /// Two thrusters beside each other: what one commands goes on while one looks at the other, and one stop ends both.
 #[test]
 fn two_thrusters_side_by_side_are_commanded_in_turn_and_stopped_at_once() {
-    common::in_real_time(|| {
+    in_its_turn(|| {
         let stack = Stack::start_at(Site::new().with_t2());
         let Some(mut page) = Browser::open(&format!("http://127.0.0.1:{}/", stack.site.port)) else { return };
         page.until("document.readyState === 'complete' && typeof state !== 'undefined' && state !== null");

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use crate::browser::Browser;
+use crate::browser::{Browser, in_its_turn};
 use crate::common::jobs::{held, stand_with_tolerances};
 use crate::common::{self, Stack};
 use crate::{FAINT, text_is};
@@ -76,7 +76,7 @@ fn chosen_by_keys(page: &mut Browser) {
 
 #[test]
 fn an_operator_fits_reads_and_uses_what_was_fitted() {
-    common::in_real_time(|| {
+    in_its_turn(|| {
         let mut stack = Stack::start();
         for newton in [60.0, -60.0, 120.0, 20.0, -100.0, 80.0] {
             stack.thrust(newton, 60_000);

@@ -5,8 +5,8 @@
 
 use std::time::Duration;
 
-use crate::browser::Browser;
-use crate::common::{self, Site, Stack};
+use crate::browser::{Browser, in_its_turn};
+use crate::common::{Site, Stack};
 use crate::text_is;
 
 /// Rows of the stream and pictures are counted beside the page's own work.
@@ -28,7 +28,7 @@ const WATCH: &str = r"(() => {
 #[test]
 fn eight_signals_at_50_hz_with_ten_minutes_in_view() {
     let seconds = std::env::var("KORT_CONSOLE_S").ok().and_then(|s| s.parse().ok()).unwrap_or(10.0f64);
-    common::in_real_time(|| {
+    in_its_turn(|| {
         let stack = Stack::start_at(Site::new().with_a_fast_controller());
         let Some(mut page) = Browser::open(&format!("http://127.0.0.1:{}/", stack.site.port)) else { return };
         page.until("document.readyState === 'complete' && typeof state !== 'undefined' && state !== null");

@@ -2,8 +2,8 @@
 
 use serde_json::json;
 
-use crate::browser::Browser;
-use crate::common::{self, Stack};
+use crate::browser::{Browser, in_its_turn};
+use crate::common::Stack;
 use crate::text_is;
 
 /// Fields and buttons whose edge, or own ground, is below 3:1 against what they stand on (WCAG 2.2, 1.4.11), and disabled
@@ -28,7 +28,7 @@ const FAINT: &str = r##"(() => {
 
 #[test]
 fn what_is_filled_in_or_pressed_is_seen_in_both_themes() {
-    common::in_real_time(|| {
+    in_its_turn(|| {
         let stack = Stack::start();
         let Some(mut page) = Browser::open(&format!("http://127.0.0.1:{}/", stack.site.port)) else { return };
         page.until("document.readyState === 'complete' && typeof state !== 'undefined'");

@@ -15,7 +15,7 @@ mod told;
 
 use std::time::Duration;
 
-use browser::Browser;
+use browser::{Browser, in_its_turn};
 use common::{Stack, wait};
 use serde_json::json;
 
@@ -27,7 +27,7 @@ fn text_is(id: &str, words: &str) -> String {
 
 #[test]
 fn an_operator_takes_command_thrusts_records_and_stops() {
-    common::in_real_time(|| {
+    in_its_turn(|| {
         let stack = Stack::start();
         let home = format!("http://127.0.0.1:{}/", stack.site.port);
         let Some(mut page) = Browser::open(&home) else { return };
@@ -116,7 +116,7 @@ fn an_operator_takes_command_thrusts_records_and_stops() {
 /// A test signal is previewed, played, ended and recorded; recordings come over the plots, one against the other.
 #[test]
 fn a_bench_engineer_plays_signals_and_compares_runs() {
-    common::in_real_time(|| {
+    in_its_turn(|| {
         let stack = Stack::start();
         let Some(mut page) = Browser::open(&format!("http://127.0.0.1:{}/", stack.site.port)) else { return };
         page.until("document.readyState === 'complete' && typeof state !== 'undefined'");
@@ -244,7 +244,7 @@ const FAINT: &str = r##"(() => {
 
 #[test]
 fn everything_can_be_read_heard_and_reached_by_keyboard() {
-    common::in_real_time(|| {
+    in_its_turn(|| {
         let stack = Stack::start();
         let Some(mut page) = Browser::open(&format!("http://127.0.0.1:{}/", stack.site.port)) else { return };
         page.until("document.readyState === 'complete' && typeof state !== 'undefined'");
@@ -324,7 +324,7 @@ fn everything_can_be_read_heard_and_reached_by_keyboard() {
 /// Path lights, a diagnosis that comes to its end in place, and the way back from a revision of the rig.
 #[test]
 fn an_operator_diagnoses_and_goes_back() {
-    common::in_real_time(|| {
+    in_its_turn(|| {
         let stack = Stack::start();
         let Some(mut page) = Browser::open(&format!("http://127.0.0.1:{}/", stack.site.port)) else { return };
         page.until("document.readyState === 'complete' && typeof state !== 'undefined' && state !== null");
@@ -350,7 +350,7 @@ fn an_operator_diagnoses_and_goes_back() {
 /// A revision of the rig that makes the thrust worse is told at the top of the page, and one button goes back, under way.
 #[test]
 fn an_operator_is_told_of_a_worse_revision_and_goes_back() {
-    common::in_real_time(|| {
+    in_its_turn(|| {
         let stack = Stack::start();
         let Some(mut page) = Browser::open(&format!("http://127.0.0.1:{}/", stack.site.port)) else { return };
         page.until("document.readyState === 'complete' && typeof state !== 'undefined' && state !== null");

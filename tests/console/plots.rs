@@ -2,8 +2,8 @@
 
 use serde_json::{Value, json};
 
-use crate::browser::Browser;
-use crate::common::{self, Stack};
+use crate::browser::{Browser, in_its_turn};
+use crate::common::Stack;
 use crate::text_is;
 
 /// Opened, and live.
@@ -36,7 +36,7 @@ fn table(page: &mut Browser) -> (Vec<String>, Vec<Vec<Option<f64>>>) {
 
 #[test]
 fn plots_go_by_keyboard_to_the_end_of_both_runs_and_are_saved_whole() {
-    common::in_real_time(|| {
+    in_its_turn(|| {
         let stack = Stack::start();
         let Some(mut page) = open(&stack) else { return };
         let reached = page.eval("[...document.querySelectorAll('.plots [tabindex=\"0\"]')].filter((e) => e.checkVisibility() && e.ariaLabel.includes('arrows')).length");
@@ -143,7 +143,7 @@ fn moved_by_keyboard_and_mouse(page: &mut Browser) {
 
 #[test]
 fn every_signal_of_the_stream_can_be_plotted() {
-    common::in_real_time(|| {
+    in_its_turn(|| {
         let stack = Stack::start();
         let Some(mut page) = open(&stack) else { return };
         page.until("state.estimated.parameters.length > 0 && state.mismatch !== null");
@@ -183,7 +183,7 @@ fn every_signal_of_the_stream_can_be_plotted() {
 /// What observer and estimator said before the page was opened, and while a recording was made, is in the plots as what they say now.
 #[test]
 fn estimates_are_shown_of_the_minutes_before_and_of_recordings() {
-    common::in_real_time(|| {
+    in_its_turn(|| {
         let mut stack = Stack::start();
         let Some(mut page) = open(&stack) else { return };
         page.eval("call('POST', '/v1/recordings', { name: 'held' }).then(() => { window.begun = true; }); 0");

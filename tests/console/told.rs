@@ -2,13 +2,13 @@
 
 use serde_json::{Value, json};
 
-use crate::browser::Browser;
+use crate::browser::{Browser, in_its_turn};
 use crate::common::{self, Site, Stack, wait};
 use crate::text_is;
 
 #[test]
 fn nothing_is_offered_or_shown_that_is_not_so() {
-    common::in_real_time(|| {
+    in_its_turn(|| {
         let stack = Stack::start();
         let Some(mut page) = Browser::open(&format!("http://127.0.0.1:{}/", stack.site.port)) else { return };
         page.until("document.readyState === 'complete' && typeof state !== 'undefined' && state !== null");
@@ -128,7 +128,7 @@ fn nothing_is_offered_or_shown_that_is_not_so() {
 /// Where tokens are asked for no link opens a refusal: what is behind it is fetched with the token, and opened.
 #[test]
 fn links_carry_the_token() {
-    common::in_real_time(|| {
+    in_its_turn(|| {
         let site = Site::new();
         site.add("[gateway]", "require_tokens = true");
         let mut command = std::process::Command::new(common::KORT);
@@ -170,7 +170,7 @@ fn links_carry_the_token() {
 /// What is old is not shown as now, nothing is commanded by it, and a stop that nobody confirms says so.
 #[test]
 fn a_frozen_gateway_is_seen_within_a_second() {
-    common::in_real_time(|| {
+    in_its_turn(|| {
         let mut stack = Stack::start();
         let Some(mut page) = Browser::open(&format!("http://127.0.0.1:{}/", stack.site.port)) else { return };
         page.until("document.readyState === 'complete' && typeof state !== 'undefined'");
