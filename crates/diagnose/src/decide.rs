@@ -16,6 +16,8 @@ pub struct Named {
     pub probability: f64,
     /// Effects that would do as well in its place.
     pub rivals: Vec<&'static str>,
+    /// Whether the data speak for it enough, and for none in its place.
+    pub believed: bool,
 }
 
 /// What was decided.
@@ -77,11 +79,9 @@ pub fn decide(posterior: &Posterior, circumstances: &Circumstances) -> Decision 
             .collect();
         let place: Vec<&'static str> = std::iter::once(*member).chain(rivals).collect();
         for effect in &place {
-            named.push(Named {
-                effect,
-                probability: stated(effect),
-                rivals: place.iter().copied().filter(|id| id != effect).collect(),
-            });
+            let rivals: Vec<&'static str> = place.iter().copied().filter(|id| id != effect).collect();
+            let believed = posterior.probability(effect) >= BELIEVED && rivals.is_empty();
+            named.push(Named { effect, probability: stated(effect), rivals, believed });
         }
     }
     // Names that cannot be parted are an answer where it is likelier one of them than none.
@@ -90,7 +90,6 @@ pub fn decide(posterior: &Posterior, circumstances: &Circumstances) -> Decision 
             named.iter().filter(|other| other.effect == n.effect || n.rivals.contains(&other.effect));
         !n.rivals.is_empty() && of_place.map(|n| n.probability).sum::<f64>() >= 0.5
     };
-    let believed = |n: &Named| posterior.probability(n.effect) >= BELIEVED && n.rivals.is_empty();
     let changes = |n: &Named| !circumstances.steady.contains(&n.effect);
     let verdict = if circumstances.broke_down
         || circumstances.thin.as_ref().is_some_and(|thin| thin.still)
@@ -98,7 +97,7 @@ pub fn decide(posterior: &Posterior, circumstances: &Circumstances) -> Decision 
         // physics it could be.
         || circumstances.thin.is_some()
             && term.is_none()
-            && !named.iter().any(|n| believed(n) && changes(n) || !n.rivals.is_empty())
+            && !named.iter().any(|n| n.believed && changes(n) || !n.rivals.is_empty())
     {
         Verdict::InsufficientData
     } else if named.is_empty() {
@@ -109,8 +108,8 @@ pub fn decide(posterior: &Posterior, circumstances: &Circumstances) -> Decision 
         }
     } else if named.iter().any(in_doubt) {
         Verdict::Ambiguous
-    } else if !named.iter().all(believed) {
-        if named.iter().any(believed) { Verdict::PartlyExplained } else { Verdict::Unexplained }
+    } else if !named.iter().all(|n| n.believed) {
+        if named.iter().any(|n| n.believed) { Verdict::PartlyExplained } else { Verdict::Unexplained }
     } else if term.is_some() && circumstances.left > PRACTICAL || circumstances.more_than_noise {
         Verdict::PartlyExplained
     } else {

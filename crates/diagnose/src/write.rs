@@ -11,7 +11,7 @@ use kort_thruster::rig::Rig;
 
 use crate::decide::{Circumstances, Decision, Named, decide};
 use crate::diagnose::Options;
-use crate::experiment;
+use crate::experiment::{self, Open};
 use crate::flexible::is_term;
 use crate::left::{self, Rest};
 use crate::load_steps;
@@ -252,7 +252,9 @@ impl<'a, 'p> Writer<'a, 'p> {
             parameters: scores::stated_parameters(self.baseline, &std_baseline),
             channels: scores::channels(problem, &self.held, &baseline_trained, &baseline_full, &self.floor),
         };
-        let next_experiment = experiment::next(self.search, &decision, &self.best, self.rig);
+        let thin = thin.as_ref().map(|thin| thin.why.as_str());
+        let open = Open::of(&decision, remainder.as_ref(), &mismatch, thin);
+        let next_experiment = experiment::next(self.search, &decision, &self.best, self.rig, open);
         let alternatives = self.alternatives(&decision, &circumstances.negligible, empty_cost);
         let summary = words::summary(&words::Told {
             verdict: decision.verdict,
@@ -263,7 +265,7 @@ impl<'a, 'p> Writer<'a, 'p> {
             remainder: remainder.as_ref(),
             next: next_experiment.as_ref(),
             baseline: &baseline,
-            thin: thin.as_ref().map(|thin| thin.why.as_str()),
+            thin,
             alternatives: &alternatives,
         });
         let report = Report {
