@@ -12,6 +12,7 @@ use serde::Deserialize;
 use thiserror::Error;
 
 use crate::columns::nearest;
+use crate::dates::Order;
 use crate::units::{self, Unit};
 
 use ask::Asked;
@@ -46,8 +47,8 @@ pub enum Time {
     Column {
         /// Source column.
         source: String,
-        /// Factor to seconds.
-        to_s: f64,
+        /// What they are.
+        stamps: Stamps,
         /// Rows whose stamp does not come after the one before are skipped, and counted as lost.
         drop_stale: bool,
     },
@@ -60,6 +61,21 @@ pub enum Time {
     Settled {
         /// Time a point is held, s.
         settle_s: f64,
+    },
+}
+
+/// What the stamps of a table are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Stamps {
+    /// Numbers.
+    Numbers {
+        /// Factor to seconds.
+        to_s: f64,
+    },
+    /// Dates with their time of day, counted from the first.
+    Dates {
+        /// What a date begins with, if the map says it; else the column must tell.
+        order: Option<Order>,
     },
 }
 
@@ -265,11 +281,11 @@ impl ColumnMap {
     /// Source columns that are taken as they stand, stamps too, with the unit that they are read in.
     pub(crate) fn units_as_they_stand(&self) -> impl Iterator<Item = (&str, &Unit)> {
         let time = match &self.time {
-            Time::Column { source, to_s, .. } => units::UNITS
+            Time::Column { source, stamps: Stamps::Numbers { to_s }, .. } => units::UNITS
                 .iter()
                 .find(|u| u.si == "s" && u.factor == *to_s)
                 .map(|unit| (source.as_str(), unit)),
-            Time::Clock { .. } | Time::Settled { .. } => None,
+            Time::Column { .. } | Time::Clock { .. } | Time::Settled { .. } => None,
         };
         let plain = |c: &&Mapped| c.scale == 1.0 && c.offset == 0.0 && c.table.is_empty();
         time.into_iter().chain(self.columns.iter().filter(plain).map(|c| (c.source.as_str(), &c.unit)))

@@ -5,8 +5,9 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 
 use super::ask::{Ask, Asked, Given};
-use super::{ColumnMap, MapError, Mapped, Select, Time, fail};
+use super::{ColumnMap, MapError, Mapped, Select, Stamps, Time, fail};
 use crate::columns;
+use crate::dates::{self, Order};
 use crate::units;
 
 #[derive(Deserialize)]
@@ -30,6 +31,7 @@ struct RawMap {
 struct RawTime {
     source: Option<String>,
     unit: Option<String>,
+    order: Option<String>,
     stale_rows: Option<String>,
     settle_s: Option<f64>,
     clock: Option<String>,
@@ -129,6 +131,36 @@ fn decimal_comma(map: &str, wanted: Option<&str>) -> Result<bool, MapError> {
     }
 }
 
+fn stamps(map: &str, unit: Option<&str>, order: Option<&str>) -> Result<Stamps, MapError> {
+    let Some(symbol) = unit else {
+        return Err(fail(
+            map,
+            "time.unit is missing",
+            "write unit = \"s\", \"ms\", \"us\" or \"ns\", or \"date\" for dates with their time of day; it is never guessed",
+        ));
+    };
+    if symbol == dates::UNIT {
+        return Ok(Stamps::Dates { order: order.map(|order| self::order(map, order)).transpose()? });
+    }
+    if order.is_some() {
+        return Err(fail(map, "time.order needs unit = \"date\"", "it says what a date begins with"));
+    }
+    let unit = units::find(symbol).filter(|unit| unit.si == "s").ok_or_else(|| {
+        let allowed = units::siblings("s");
+        let message =
+            format!("time.unit = \"{symbol}\" is no unit of time; allowed: {allowed}, \"{}\"", dates::UNIT);
+        fail(map, message, "write the unit of the stamps")
+    })?;
+    Ok(Stamps::Numbers { to_s: unit.factor })
+}
+
+fn order(map: &str, wanted: &str) -> Result<Order, MapError> {
+    Order::ALL.into_iter().find(|order| order.name() == wanted).ok_or_else(|| {
+        let allowed = Order::ALL.map(|order| format!("\"{}\"", order.name())).join(", ");
+        fail(map, format!("time.order = \"{wanted}\"; allowed: {allowed}"), "what a date begins with")
+    })
+}
+
 impl RawTime {
     fn of_messages(&self, map: &str, clock: &str) -> Result<Time, MapError> {
         if clock != "log" {
@@ -140,6 +172,7 @@ impl RawTime {
         }
         if self.source.is_some()
             || self.unit.is_some()
+            || self.order.is_some()
             || self.settle_s.is_some()
             || self.stale_rows.is_some()
         {
@@ -165,23 +198,7 @@ impl RawTime {
         }
         match (self.source, self.settle_s) {
             (Some(source), None) => {
-                let symbol = self.unit.ok_or_else(|| {
-                    fail(
-                        map,
-                        "time.unit is missing",
-                        "write unit = \"s\", \"ms\", \"us\" or \"ns\"; it is never guessed",
-                    )
-                })?;
-                let unit = units::find(&symbol).filter(|u| u.si == "s").ok_or_else(|| {
-                    fail(
-                        map,
-                        format!(
-                            "time.unit = \"{symbol}\" is no unit of time; allowed: {}",
-                            units::siblings("s")
-                        ),
-                        "write the unit of the stamps",
-                    )
-                })?;
+                let stamps = stamps(map, self.unit.as_deref(), self.order.as_deref())?;
                 let drop_stale = match self.stale_rows.as_deref() {
                     None | Some("refuse") => false,
                     Some("drop") => true,
@@ -193,7 +210,7 @@ impl RawTime {
                         ));
                     }
                 };
-                Ok(Time::Column { source, to_s: unit.factor, drop_stale })
+                Ok(Time::Column { source, stamps, drop_stale })
             }
             (None, Some(settle_s)) if settle_s.is_finite() && settle_s > 0.0 => {
                 Ok(Time::Settled { settle_s })
