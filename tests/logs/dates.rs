@@ -129,8 +129,8 @@ fn what_is_amiss_with_dates_is_said_with_what_to_do() {
     refused("unit = \"date\"\norder = \"day-first\"", &["line 2", "day-first; allowed: "]);
     refused(
         "unit = \"date\"\norder = \"dmy\"",
-        &["time.order = \"dmy\"; allowed: \"year-first\", \"day-first\""],
+        &["`time.order` = \"dmy\" is outside what is allowed: \"year-first\", \"day-first\""],
     );
-    refused("unit = \"ms\"\norder = \"day-first\"", &["time.order needs unit = \"date\""]);
-    refused("unit = \"day\"", &["time.unit = \"day\"", "\"min\", \"date\""]);
+    refused("unit = \"ms\"\norder = \"day-first\"", &["`time.order` needs unit = \"date\""]);
+    refused("unit = \"day\"", &["`time.unit` = \"day\"", "\"min\", \"date\""]);
 }

@@ -23,5 +23,5 @@ pub use dates::Order;
 pub use error::{Place, Problem, RecordingError};
 pub use formats::{Format, LiveMcap, TOPIC, Writer, message_schema, state_schema};
 pub use log::{Survey, survey};
-pub use map::{ColumnMap, MapError};
+pub use map::{ColumnMap, MapError, MapErrors};
 pub use recording::{Column, Gap, Recording, logs_in};
