@@ -18,6 +18,10 @@ const NAME: &str = "any.input";
 const MAP: &str = "[time]\nsource = \"t_ms\"\nunit = \"ms\"\nstale_rows = \"drop\"\n\
     [columns.shaft_speed_rad_s]\nsource = \"n\"\nunit = \"rev/s\"\nsign_of = \"pwm\"\nsign_zero = 1500\n";
 
+/// A map that takes columns of `seeds/csv/dated.csv`.
+const DATES: &str = "delimiter = \";\"\n[time]\nsource = \"Zeit\"\nunit = \"date\"\nstale_rows = \"drop\"\n\
+    [columns.thrust_n]\nsource = \"F\"\nunit = \"N\"\n";
+
 /// A map that takes what logs of messages have.
 const MESSAGES: &str =
     "[time]\nclock = \"log\"\n[columns.shaft_speed_rad_s]\nsource = \"ESC[0].RPM\"\nunit = \"rpm\"\n";
@@ -41,7 +45,7 @@ pub fn recording(bytes: &[u8]) -> Result<Recording, String> {
         }
         read.map_err(|e| located(NAME, e.to_string()))
     };
-    for map in [MAP, MESSAGES] {
+    for map in [MAP, DATES, MESSAGES] {
         let map = ColumnMap::from_toml("map", map).expect("a sound map");
         let _ = read(Some(&map));
     }

@@ -185,7 +185,13 @@ fn recordings_that_no_model_can_be_compared_with() {
     let flat = rest.iter().fold(flat, |t, column| t.map(column, |_, _| "0".into())).save("flat.csv");
     refused("all columns constant", &flat, STAND, &[], &["flat.csv", "no driving column"]);
     refused("unknown map", clean(), STAND, &["--columns", "rosa"], &["rosa-rotor-air"]);
-    refused("map without unit", clean(), STAND, &["--columns", &map_without_unit()], &["unit is missing"]);
+    refused(
+        "map without unit",
+        clean(),
+        STAND,
+        &["--columns", &map_without_unit()],
+        &["`columns.thrust_n.unit` is missing"],
+    );
 }
 
 fn empty_folder() -> String {

@@ -5,6 +5,8 @@
 mod bags;
 #[path = "logs/clocks.rs"]
 mod clocks;
+#[path = "logs/dates.rs"]
+mod dates;
 #[path = "common/lab.rs"]
 mod lab;
 #[path = "logs/preambles.rs"]

@@ -9,13 +9,14 @@ use kort_thruster::effects;
 
 /// What each crate of ours may depend on. Anything else is a wrong turn.
 const DIRECTION: &[(&str, &[&str])] = &[
-    ("crates/thruster", &[]),
+    ("crates/complaints", &[]),
+    ("crates/thruster", &["kort-complaints"]),
     ("crates/scenario", &["kort-thruster"]),
     ("crates/truth", &[]),
     ("crates/proof", &["kort-truth", "kort-recording"]),
     ("crates/emulators", &["kort-thruster", "kort-proto"]),
     ("proto", &[]),
-    ("crates/recording", &["kort-proto"]),
+    ("crates/recording", &["kort-complaints", "kort-proto"]),
     ("crates/control", &["kort-thruster"]),
     ("crates/identify", &["kort-thruster"]),
     ("crates/diagnose", &["kort-thruster", "kort-scenario", "kort-identify"]),
@@ -50,6 +51,7 @@ const DIRECTION: &[(&str, &[&str])] = &[
 
 /// Crates without clock, thread, file or socket.
 const PURE: &[&str] = &[
+    "crates/complaints",
     "crates/thruster",
     "crates/scenario",
     "crates/truth",

@@ -55,3 +55,28 @@ fn what_is_proposed_can_be_done() {
     let px4 = kort(&["columns", "tests/recordings/logs/px4-uavcan-escs.ulg.gz"]);
     assert!(String::from_utf8_lossy(&px4.stdout).contains("kort diagnose"), "{px4:?}");
 }
+
+/// As of a rig, a scenario or a controller: who mends a map does not meet the next mistake after each try.
+#[test]
+fn all_that_is_wrong_with_a_column_map_is_said_at_once() {
+    let map = "decimal = \";\"\n[time]\nsource = \"t\"\nunit = \"h\"\n\
+        [columns.thrust_n]\nsource = \"F\"\nunit = \"V\"\nsign = 2\n[columns.torque]\nsource = \"M\"\nunit = \"N m\"\n";
+    let map = write("many-mistakes.toml", map);
+    let log = write("many-mistakes.csv", "t,F,M\n0,1,2\n1,2,3\n");
+    let all = [
+        "`decimal` = \";\"",
+        "`time.unit` = \"h\"",
+        "`columns.thrust_n.unit` = \"V\"",
+        "`columns.thrust_n.sign` = 2",
+        "did you mean `torque_n_m`?",
+    ];
+    let words = refused(&["diagnose", &log, "--rig", "t200", "--columns", &map], &all);
+    assert_eq!(words.matches("hint:").count(), all.len(), "{words}");
+    let said = kort(&["check", &map, "--json"]);
+    assert_eq!(said.status.code(), Some(2), "{}", stderr(&said));
+    let report: serde_json::Value = serde_json::from_slice(&said.stdout).unwrap();
+    let problems = report["problems"].as_array().unwrap();
+    assert_eq!(problems.len(), all.len(), "{report}");
+    let sign = problems.iter().find(|one| one["key"] == "columns.thrust_n.sign").unwrap();
+    assert_eq!((&sign["found"], &sign["allowed"]), (&"2".into(), &"1 or -1".into()), "{sign}");
+}

@@ -2,23 +2,13 @@
 
 use std::cmp::Reverse;
 
+use crate::cell::Cell;
 use crate::columns::{self, nearest};
-use crate::decimal::with_comma;
+use crate::dates::Dates;
 use crate::error::{Place, Problem};
 use crate::log::{Back, longest_is_read};
-use crate::map::{ColumnMap, Mapped, Time};
+use crate::map::{ColumnMap, Mapped, Stamps, Time};
 use crate::recording::{Column, Recording};
-
-/// One cell as a format has it.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Cell<'a> {
-    /// Not sampled then.
-    Empty,
-    /// Text yet to be read.
-    Text(&'a str),
-    /// A number.
-    Number(f64),
-}
 
 /// Name of the first column where rows come from a log of messages with a clock of its own.
 pub(crate) const CLOCK: &str = "the log's clock";
@@ -47,8 +37,49 @@ pub(crate) struct Assembler<'m> {
 }
 
 enum TimeColumn {
-    Stamps { index: usize, to_s: f64, drop_stale: bool },
+    Stamps { index: usize, clock: Clock, drop_stale: bool },
     Settled { settle_s: f64 },
+}
+
+/// What the stamps are.
+enum Clock {
+    Numbers { to_s: f64 },
+    Dates(Dates),
+}
+
+/// Stamps of our own, and those of a log of messages.
+const SECONDS: Clock = Clock::Numbers { to_s: 1.0 };
+
+impl Clock {
+    fn of(stamps: Stamps) -> Self {
+        match stamps {
+            Stamps::Numbers { to_s } => Clock::Numbers { to_s },
+            Stamps::Dates { order } => Clock::Dates(Dates::new(order)),
+        }
+    }
+
+    /// A stamp, in the file's unit; NaN for an empty cell.
+    fn read(&mut self, place: Place, column: &str, cell: Cell<'_>, comma: bool) -> Result<f64, Problem> {
+        match self {
+            Clock::Numbers { .. } => cell.number(place, column, comma),
+            Clock::Dates(dates) => dates.take(place, column, cell),
+        }
+    }
+
+    fn to_s(&self) -> f64 {
+        match self {
+            Clock::Numbers { to_s } => *to_s,
+            Clock::Dates(_) => 1.0,
+        }
+    }
+
+    /// Two stamps one after the other, as the file has them.
+    fn said(&self, before: f64, now: f64) -> [String; 2] {
+        match self {
+            Clock::Numbers { .. } => [before, now].map(|stamp| stamp.to_string()),
+            Clock::Dates(dates) => dates.newest_two(),
+        }
+    }
 }
 
 /// One column to fill, from one source column.
@@ -97,18 +128,19 @@ impl<'m> Assembler<'m> {
                 return Ok(());
             }
         }
-        let time_s = match &self.time {
-            TimeColumn::Settled { settle_s } => self.rows as f64 * settle_s,
-            TimeColumn::Stamps { index, to_s, drop_stale } => {
-                let raw = self.number(place, *index, cell(*index))?;
+        let time_s = match &mut self.time {
+            TimeColumn::Settled { settle_s } => self.rows as f64 * *settle_s,
+            TimeColumn::Stamps { index, clock, drop_stale } => {
+                let column = &self.source[*index];
+                let raw = clock.read(place, column, cell(*index), self.decimal_comma)?;
                 if raw.is_nan() {
-                    return Err(Problem::TimeEmpty { place, column: self.source[*index].clone() });
+                    return Err(Problem::TimeEmpty { place, column: column.clone() });
                 }
-                let time_s = raw * to_s;
+                let time_s = raw * clock.to_s();
                 if let Some(before) = self.last_time.filter(|before| raw <= *before) {
-                    if !drop_stale {
-                        let column = self.source[*index].clone();
-                        return Err(Problem::TimeNotIncreasing { place, column, before, value: raw });
+                    if !*drop_stale {
+                        let ([before, value], column) = (clock.said(before, raw), column.clone());
+                        return Err(Problem::TimeNotIncreasing { place, column, before, value });
                     }
                     let stretch = &self.recording.time_s[self.stretches.last().copied().unwrap_or(0)..];
                     match Back::of(time_s, stretch) {
@@ -124,14 +156,15 @@ impl<'m> Assembler<'m> {
                 time_s
             }
         };
+        let number = |index: usize| cell(index).number(place, &self.source[index], self.decimal_comma);
         self.row.clear();
         for take in &self.takes {
-            let mut value = self.number(place, take.index, cell(take.index))?;
+            let mut value = number(take.index)?;
             if let Some(how) = take.how {
                 value = how.apply(value);
             }
             if let Some((index, zero)) = take.sign_of {
-                let side = self.number(place, index, cell(index))? - zero;
+                let side = number(index)? - zero;
                 value *= if side == 0.0 { 0.0 } else { side.signum() };
             }
             self.row.push(value);
@@ -184,37 +217,6 @@ impl<'m> Assembler<'m> {
         lost
     }
 
-    fn number(&self, place: Place, index: usize, cell: Cell<'_>) -> Result<f64, Problem> {
-        let text = match cell {
-            Cell::Empty => return Ok(f64::NAN),
-            Cell::Number(x) if x.is_finite() => return Ok(x),
-            Cell::Number(x) => {
-                return Err(Problem::NotFinite {
-                    place,
-                    column: self.source[index].clone(),
-                    text: x.to_string(),
-                });
-            }
-            Cell::Text(text) => text.trim(),
-        };
-        if text.is_empty() {
-            return Ok(f64::NAN);
-        }
-        let column = || self.source[index].clone();
-        let number = if self.decimal_comma { with_comma(text) } else { text.parse().ok() };
-        match number {
-            Some(x) if x.is_finite() => Ok(x),
-            Some(_) => Err(Problem::NotFinite { place, column: column(), text: text.into() }),
-            None if self.decimal_comma && text.contains('.') => {
-                Err(Problem::PointBesideComma { place, column: column(), text: text.into() })
-            }
-            None => {
-                let text = text.chars().take(40).collect();
-                Err(Problem::NotANumber { place, column: column(), text })
-            }
-        }
-    }
-
     /// Ends the recording; `losses` are those of the format.
     pub(crate) fn finish(mut self, losses: Vec<String>) -> Result<Recording, Problem> {
         if let Some((index, wanted, mut seen)) = self.select.take().filter(|_| self.rows == 0) {
@@ -233,7 +235,10 @@ impl<'m> Assembler<'m> {
             let rows = self.stale_rows;
             recording.losses.push(format!("{rows} row(s) with a stale time stamp skipped"));
         }
-        if matches!(self.time, TimeColumn::Stamps { .. }) {
+        if let TimeColumn::Stamps { clock, .. } = &self.time {
+            if let Clock::Dates(dates) = clock {
+                recording.notes.push(format!("time_s counts from {}", dates.first()));
+            }
             count_from_the_first(&mut recording);
             note_gaps(&mut recording);
         }
@@ -320,7 +325,7 @@ fn native<'m>(source: &[String], recording: &mut Recording) -> Result<Plan<'m>, 
         recording.columns.push(Column::new(name.as_str(), Vec::new()));
         takes.push(Take { index, how: None, sign_of: None, command: false });
     }
-    Ok((TimeColumn::Stamps { index: time, to_s: 1.0, drop_stale: false }, None, takes))
+    Ok((TimeColumn::Stamps { index: time, clock: SECONDS, drop_stale: false }, None, takes))
 }
 
 /// A foreign log through its map.
@@ -339,13 +344,14 @@ fn mapped<'m>(source: &[String], map: &'m ColumnMap, recording: &mut Recording) 
         Ok(index)
     };
     let time = match &map.time {
-        Time::Column { source, to_s, drop_stale } => {
-            TimeColumn::Stamps { index: find(source)?, to_s: *to_s, drop_stale: *drop_stale }
+        Time::Column { source, stamps, drop_stale } => {
+            let (index, clock) = (find(source)?, Clock::of(*stamps));
+            TimeColumn::Stamps { index, clock, drop_stale: *drop_stale }
         }
         Time::Settled { settle_s } => TimeColumn::Settled { settle_s: *settle_s },
         Time::Clock { .. } if source.first().is_some_and(|first| first == CLOCK) => {
             find(CLOCK)?;
-            TimeColumn::Stamps { index: 0, to_s: 1.0, drop_stale: false }
+            TimeColumn::Stamps { index: 0, clock: SECONDS, drop_stale: false }
         }
         Time::Clock { .. } => return Err(Problem::TableWanted { map: map.name.clone() }),
     };

@@ -4,6 +4,7 @@ use std::fmt;
 
 use thiserror::Error;
 
+use crate::dates::{FORMS, is_date};
 use crate::decimal::has_comma;
 use crate::log::propose::symbol;
 
@@ -158,10 +159,39 @@ pub enum Problem {
         place: Place,
         /// The time column.
         column: String,
-        /// Time of the row before.
-        before: f64,
+        /// Time of the row before, as the file has it.
+        before: String,
         /// Time found.
-        value: f64,
+        value: String,
+    },
+    /// A stamp that is no date, where the column map says that the stamps are dates.
+    #[error(
+        "{place}, column `{column}`: \"{text}\" is no date with its time of day, {orders}; allowed: {}",
+        FORMS
+    )]
+    NotADate {
+        /// Where.
+        place: Place,
+        /// The time column.
+        column: String,
+        /// The cell.
+        text: String,
+        /// What a date may begin with there.
+        orders: String,
+    },
+    /// A date whose day and month may be either.
+    #[error(
+        "{place}, column `{column}`: \"{text}\" may be {orders}, each at another time after the first row, and no row up to there has a number above 12; allowed: the order stated, or the year first"
+    )]
+    DateOrder {
+        /// Where.
+        place: Place,
+        /// The time column.
+        column: String,
+        /// The cell.
+        text: String,
+        /// What it may begin with.
+        orders: String,
     },
     /// A cell that is no number.
     #[error(
@@ -305,11 +335,23 @@ impl Problem {
                 "cells are parted by commas, or what the column map's `delimiter` says; a decimal comma or a comma in a text must be quoted there".into()
             }
             Problem::TimeEmpty { .. } => "fill in the time, or remove the row".into(),
+            Problem::TimeNotIncreasing { before, value, .. } if before == value => {
+                "where rows come faster than their stamps can tell, as stamps of whole seconds, have the logger write fractions of a second; of rows with one stamp a column map may keep the first: [time] stale_rows = \"drop\"".into()
+            }
             Problem::TimeNotIncreasing { .. } => {
                 "sort the rows and remove repeated stamps; separate runs belong in separate files; a column map may say [time] stale_rows = \"drop\"".into()
             }
             Problem::NotANumber { text, .. } if has_comma(text) => {
                 "a decimal comma is read where the column map says decimal = \",\"; `kort columns LOG` proposes such a map".into()
+            }
+            Problem::NotANumber { text, .. } if is_date(text) => {
+                "dates are read where the column map says [time] unit = \"date\"; `kort columns LOG` proposes such a map".into()
+            }
+            Problem::NotADate { .. } => {
+                "write all stamps in one of these forms, or as numbers with their unit; the column map may state `order` in [time]: \"year-first\", \"day-first\" or \"month-first\"".into()
+            }
+            Problem::DateOrder { .. } => {
+                "say in the column map [time] order = \"day-first\" or \"month-first\"; `kort columns LOG` proposes it where a later row tells".into()
             }
             Problem::NotANumber { place: Place::Line(2), text, .. } if symbol(text).is_some() => {
                 "a row of units below names of our own must repeat the units that they end in; other names come in through a column map: `kort columns LOG` proposes one".into()

@@ -8,7 +8,9 @@
 //! same for a path.
 
 mod assemble;
+mod cell;
 pub mod columns;
+mod dates;
 mod decimal;
 mod error;
 pub mod formats;
@@ -17,8 +19,9 @@ pub mod map;
 mod recording;
 pub mod units;
 
+pub use dates::Order;
 pub use error::{Place, Problem, RecordingError};
 pub use formats::{Format, LiveMcap, TOPIC, Writer, message_schema, state_schema};
 pub use log::{Survey, survey};
-pub use map::{ColumnMap, MapError};
+pub use map::{ColumnMap, MapError, MapErrors};
 pub use recording::{Column, Gap, Recording, logs_in};

@@ -2,8 +2,10 @@
 //! refused, never guessed.
 
 mod ask;
+mod column;
 mod read;
 mod shipped;
+mod time;
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -12,6 +14,7 @@ use serde::Deserialize;
 use thiserror::Error;
 
 use crate::columns::nearest;
+use crate::dates::Order;
 use crate::units::{self, Unit};
 
 use ask::Asked;
@@ -46,8 +49,8 @@ pub enum Time {
     Column {
         /// Source column.
         source: String,
-        /// Factor to seconds.
-        to_s: f64,
+        /// What they are.
+        stamps: Stamps,
         /// Rows whose stamp does not come after the one before are skipped, and counted as lost.
         drop_stale: bool,
     },
@@ -60,6 +63,21 @@ pub enum Time {
     Settled {
         /// Time a point is held, s.
         settle_s: f64,
+    },
+}
+
+/// What the stamps of a table are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Stamps {
+    /// Numbers.
+    Numbers {
+        /// Factor to seconds.
+        to_s: f64,
+    },
+    /// Dates with their time of day, counted from the first.
+    Dates {
+        /// What a date begins with, if the map says it; else the column must tell.
+        order: Option<Order>,
     },
 }
 
@@ -126,14 +144,25 @@ pub struct MapError {
     pub hint: String,
 }
 
+/// All that is wrong with a column map, at least one.
+#[derive(Debug, Error, Clone, PartialEq)]
+#[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
+pub struct MapErrors(pub Vec<MapError>);
+
+impl From<MapError> for MapErrors {
+    fn from(error: MapError) -> Self {
+        MapErrors(vec![error])
+    }
+}
+
 impl ColumnMap {
     /// Finds a map: a path to a TOML file, or the name of one in `config/columns/` or of a shipped
     /// one. `NAME:VALUE` takes the run `VALUE` of a file that holds several; `NAME:KEY=VALUE,KEY=VALUE` says what
     /// the map asks for.
     ///
     /// # Errors
-    /// No such map (naming the shipped ones), or a map with an error in it.
-    pub fn find(wanted: &str) -> Result<Self, MapError> {
+    /// No such map (naming the shipped ones), or all that is wrong with it.
+    pub fn find(wanted: &str) -> Result<Self, MapErrors> {
         let whole = Path::new(wanted);
         let (name, run) = match wanted.rsplit_once(':') {
             Some((name, run)) if !whole.exists() && !name.is_empty() => (name, Some(run)),
@@ -149,14 +178,15 @@ impl ColumnMap {
                         name,
                         format!("`:{value}` asks for one run of several, but the map has no [select]"),
                         "leave out the colon and what follows",
-                    ));
+                    )
+                    .into());
                 }
             }
         }
         Ok(map)
     }
 
-    fn load(name: &str, asked: &Asked) -> Result<Self, MapError> {
+    fn load(name: &str, asked: &Asked) -> Result<Self, MapErrors> {
         let in_config = Path::new("config/columns").join(format!("{name}.toml"));
         let is_path = name.ends_with(".toml") || name.contains(['/', '\\']);
         let path = if is_path { Path::new(name) } else { in_config.as_path() };
@@ -173,7 +203,7 @@ impl ColumnMap {
             Some(near) => format!("did you mean \"{near}\"?"),
             None => "give a shipped map's name or the path of a TOML file".into(),
         };
-        Err(fail(name, format!("there is no such map; shipped maps: {}", names.join(", ")), &hint))
+        Err(fail(name, format!("there is no such map; shipped maps: {}", names.join(", ")), &hint).into())
     }
 
     /// A shipped map with its own examples in the place of what it asks for.
@@ -265,11 +295,11 @@ impl ColumnMap {
     /// Source columns that are taken as they stand, stamps too, with the unit that they are read in.
     pub(crate) fn units_as_they_stand(&self) -> impl Iterator<Item = (&str, &Unit)> {
         let time = match &self.time {
-            Time::Column { source, to_s, .. } => units::UNITS
+            Time::Column { source, stamps: Stamps::Numbers { to_s }, .. } => units::UNITS
                 .iter()
                 .find(|u| u.si == "s" && u.factor == *to_s)
                 .map(|unit| (source.as_str(), unit)),
-            Time::Clock { .. } | Time::Settled { .. } => None,
+            Time::Column { .. } | Time::Clock { .. } | Time::Settled { .. } => None,
         };
         let plain = |c: &&Mapped| c.scale == 1.0 && c.offset == 0.0 && c.table.is_empty();
         time.into_iter().chain(self.columns.iter().filter(plain).map(|c| (c.source.as_str(), &c.unit)))
@@ -283,8 +313,8 @@ impl ColumnMap {
     /// Reads a map; where it asks for something, its own example or default stands.
     ///
     /// # Errors
-    /// [`MapError`] names the field, the value found and what is allowed.
-    pub fn from_toml(name: &str, text: &str) -> Result<Self, MapError> {
+    /// All that is wrong with it; each names the field, the value found and what is allowed.
+    pub fn from_toml(name: &str, text: &str) -> Result<Self, MapErrors> {
         read::map(name, text, None)
     }
 }

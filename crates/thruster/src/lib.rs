@@ -14,7 +14,8 @@ pub mod models;
 pub mod momentum;
 pub mod motor;
 pub mod parameters;
-pub mod place;
 pub mod plant;
 pub mod real;
 pub mod rig;
+
+pub use kort_complaints as place;

@@ -35,8 +35,7 @@ impl Kind {
         }
     }
 
-    /// Reads the text as this kind is read; words that name key, value and what is allowed: everything that is wrong, of a column
-    /// map the first that its reader finds.
+    /// Reads the text as this kind is read; words that name key, value and what is allowed: everything that is wrong.
     ///
     /// # Errors
     /// What is wrong with it, at least one.
@@ -56,7 +55,7 @@ impl Kind {
             }
             Kind::Columns => {
                 let name = path.file_stem().unwrap_or_default().to_string_lossy();
-                ColumnMap::from_toml(&name, text).map(drop).map_err(|error| vec![error.to_string()])
+                ColumnMap::from_toml(&name, text).map(drop).map_err(|wrong| all(wrong.0))
             }
             Kind::Controller => ControllerConfig::from_toml_with_all(text).map(drop).map_err(all),
         }

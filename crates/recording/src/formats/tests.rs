@@ -72,11 +72,21 @@ fn bad_input_is_named() {
         ("time_s,thrust_n,\n0,1,\n", Problem::UnnamedColumn { position: 3 }),
         (
             "time_s,thrust_n\n0,1\n0,2\n",
-            Problem::TimeNotIncreasing { place, column: "time_s".into(), before: 0.0, value: 0.0 },
+            Problem::TimeNotIncreasing {
+                place,
+                column: "time_s".into(),
+                before: "0".into(),
+                value: "0".into(),
+            },
         ),
         (
             "time_s,thrust_n\n1,1\n0.5,2\n",
-            Problem::TimeNotIncreasing { place, column: "time_s".into(), before: 1.0, value: 0.5 },
+            Problem::TimeNotIncreasing {
+                place,
+                column: "time_s".into(),
+                before: "1".into(),
+                value: "0.5".into(),
+            },
         ),
         ("time_s,thrust_n\n1,1\n,2\n", Problem::TimeEmpty { place, column: "time_s".into() }),
         (

@@ -7,7 +7,8 @@
 use std::collections::BTreeMap;
 
 use super::{Log, said, same_source};
-use crate::assemble::{Assembler, CLOCK, Cell};
+use crate::assemble::{Assembler, CLOCK};
+use crate::cell::Cell;
 use crate::columns::nearest;
 use crate::error::{Place, Problem};
 use crate::map::{ColumnMap, Time};

@@ -4,8 +4,10 @@ pub(crate) mod join;
 pub(crate) mod propose;
 mod said;
 mod shipped;
+pub(crate) mod stamps;
 mod survey;
 
+use crate::dates::Dates;
 pub use survey::{FieldSurvey, GapSurvey, Incomplete, Lack, Proposal, Survey, TopicSurvey, survey};
 
 /// A stamp that lies further than this behind its topic's newest begins the clock anew, s; less is disorder of the
@@ -54,6 +56,8 @@ pub(crate) struct Log {
     pub delimiter: u8,
     /// Numbers of a table have a decimal comma.
     pub decimal_comma: bool,
+    /// The stamps of a table, if they are dates.
+    pub dates: Option<Dates>,
     /// In the order of their first message.
     pub topics: Vec<Topic>,
     /// How often the clock began anew.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use super::survey::Proposal;
-use super::{Field, Log, Topic, shipped};
+use super::{Field, Log, Topic, shipped, stamps};
 use crate::columns;
 use crate::map::ColumnMap;
 use crate::units::{self, Unit};
@@ -194,7 +194,7 @@ pub(crate) fn symbol(text: &str) -> Option<&'static Unit> {
     units::find(ours)
 }
 
-fn unit_of(field: &Field) -> Option<&'static Unit> {
+pub(super) fn unit_of(field: &Field) -> Option<&'static Unit> {
     field.unit.as_deref().map_or_else(|| unit_in(&field.name), symbol)
 }
 
@@ -293,20 +293,7 @@ fn toml(log: &Log, chosen: &Chosen, table: bool) -> String {
         out += "decimal = \",\"   # in the whole file\n";
     }
     out += "\n[time]\n";
-    if !table {
-        out += "clock = \"log\"\n";
-    } else if let Some(time) = log.topics[0].fields.iter().find(|f| is_time(&f.name)) {
-        let _ = writeln!(out, "source = {:?}", time.name);
-        out += &match unit_of(time).filter(|u| u.si == "s") {
-            Some(unit) => format!("unit = {:?}\n", unit.symbol),
-            None => "# unit = \"…\"   the log does not say it: s, ms, us or ns\n".into(),
-        };
-        if log.resets > 0 || log.topics[0].stale > 0 {
-            out += "stale_rows = \"drop\"   # there are such rows; where the clock begins anew the longest stretch is read\n";
-        }
-    } else {
-        out += "# source = \"…\"   no column looks like a time stamp; settle_s = 2.0 instead for settled points\n";
-    }
+    out += &if table { stamps::proposed(log) } else { "clock = \"log\"\n".into() };
     for ((topic, field), column) in chosen {
         let (topic, field) = (&log.topics[*topic], &log.topics[*topic].fields[*field]);
         let _ = write!(out, "\n[columns.{column}]\nsource = {:?}\n", topic.source(field));
@@ -323,36 +310,6 @@ fn toml(log: &Log, chosen: &Chosen, table: bool) -> String {
         }
     }
     out
-}
-
-/// Whether a table's column looks like its stamps.
-pub(crate) fn is_time(name: &str) -> bool {
-    let names = words(name);
-    const TIME: &[&str] = &[
-        "time",
-        "timestamp",
-        "stamp",
-        "t",
-        "ms",
-        "us",
-        "millis",
-        "micros",
-        "zeit",
-        "zeitstempel",
-        "messzeit",
-    ];
-    names.first().is_some_and(|first| TIME.contains(&first.as_str()))
-        || unit_in(name).is_some_and(|u| u.si == "s") && names.iter().any(|n| TIME.contains(&n.as_str()))
-}
-
-/// Factor to seconds of a table's stamps, if their name says it.
-pub(crate) fn time_factor(name: &str) -> Option<f64> {
-    let first = words(name).into_iter().next().unwrap_or_default();
-    match first.as_str() {
-        "ms" | "millis" => Some(1e-3),
-        "us" | "micros" => Some(1e-6),
-        _ => unit_in(name).filter(|u| u.si == "s").map(|u| u.factor),
-    }
 }
 
 #[cfg(test)]
@@ -374,11 +331,5 @@ mod tests {
         }
         assert_eq!(unit_in("output[1]").map(|u| u.symbol), None);
         assert_eq!(unit_in("erpm").map(|u| u.symbol), None, "electrical turns are no turns of the shaft");
-        assert!(is_time("ms_today") && is_time("t_s") && is_time("Time") && !is_time("temp"));
-        assert!(
-            is_time("Zeit") && is_time("Zeit [s]") && is_time("Time (ms)") && is_time("Elapsed Time (s)")
-        );
-        assert_eq!(time_factor("ms_today"), Some(1e-3));
-        assert_eq!(time_factor("Time"), None);
     }
 }

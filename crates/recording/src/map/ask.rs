@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 
 use serde::Deserialize;
 
+use super::read::Wrong;
 use super::{MapError, fail};
 
 /// One thing asked for.
@@ -48,7 +49,7 @@ pub(super) struct Given(BTreeMap<String, String>);
 
 impl Given {
     /// From what the map asks and the user says; without a user the examples stand.
-    pub fn new(map: &str, asks: &BTreeMap<String, Ask>, said: Option<&Asked>) -> Result<Self, MapError> {
+    pub fn new(map: &str, asks: &BTreeMap<String, Ask>, said: Option<&Asked>, wrong: &mut Wrong) -> Self {
         let list = |wanted: &dyn Fn(&Ask) -> bool| {
             let of = |(key, ask): (&String, &Ask)| {
                 wanted(ask).then(|| {
@@ -62,35 +63,37 @@ impl Given {
             .flat_map(|said| &said.0)
             .filter_map(|(key, value)| Some((key.as_deref()?, value.as_str())))
             .collect();
-        if let Some((key, _)) = pairs.iter().find(|(key, _)| !asks.contains_key(*key)) {
+        for (key, _) in pairs.iter().filter(|(key, _)| !asks.contains_key(*key)) {
             let known: Vec<&str> = asks.keys().map(String::as_str).collect();
             let known = if known.is_empty() { "nothing".into() } else { known.join(", ") };
-            return Err(fail(
+            wrong.say(fail(
                 map,
                 format!("`{key}` is nothing that the map asks for; it asks for: {known}"),
                 "correct what follows the colon of --columns",
             ));
         }
-        let mut given = BTreeMap::new();
-        for (key, ask) in asks {
+        let value = |key: &String, ask: &Ask| {
             let stated = pairs.iter().find(|(name, _)| name == key).map(|(_, value)| *value);
             let spare = if said.is_none() { ask.example.as_deref() } else { None };
-            let Some(value) = stated.or(ask.default.as_deref()).or(spare) else {
-                let (message, hint) = match said {
-                    Some(_) => (
-                        format!("`{key}` is not given: {}", ask.meaning),
-                        format!("--columns {map}:{}", list(&|ask| ask.default.is_none())),
-                    ),
-                    None => (
-                        format!("ask.{key} has neither `default` nor `example`"),
-                        "an example lets the map be checked".into(),
-                    ),
-                };
-                return Err(fail(map, message, &hint));
-            };
-            given.insert(key.clone(), value.to_string());
-        }
-        Ok(Self(given))
+            stated.or(ask.default.as_deref()).or(spare).map(str::to_owned).ok_or_else(|| match said {
+                Some(_) => fail(
+                    map,
+                    format!("`{key}` is not given: {}", ask.meaning),
+                    &format!("--columns {map}:{}", list(&|ask| ask.default.is_none())),
+                ),
+                None => fail(
+                    map,
+                    format!("`ask.{key}`: neither `default` nor `example` is given"),
+                    "an example lets the map be checked",
+                ),
+            })
+        };
+        // What is lacking was told: with a number in its place all else can be read.
+        let given = asks.iter().map(|(key, ask)| {
+            let value = wrong.take(value(key, ask)).unwrap_or_else(|| "1".into());
+            (key.clone(), value)
+        });
+        Self(given.collect())
     }
 
     /// A text with what is given in the place of `{name}` and `{name+1}`.

@@ -12,11 +12,11 @@ fn message(text: &str) -> String {
 fn a_unit_is_never_guessed() {
     let error = message(&format!("{HEAD}[columns.shaft_speed_rad_s]\nsource = \"n\""));
     assert!(
-        error.contains("columns.shaft_speed_rad_s.unit is missing") && error.contains("hint:"),
+        error.contains("`columns.shaft_speed_rad_s.unit` is missing") && error.contains("hint:"),
         "{error}"
     );
     let error = message("[time]\nsource = \"t\"\n[columns.thrust_n]\nsource = \"f\"\nunit = \"N\"");
-    assert!(error.contains("time.unit is missing"), "{error}");
+    assert!(error.contains("`time.unit` is missing"), "{error}");
 }
 
 #[test]
@@ -30,8 +30,8 @@ fn a_unit_of_another_kind_is_refused() {
 #[test]
 fn bad_numbers_and_keys_are_named() {
     for (line, word) in [
-        ("sign = 2", "sign = 2"),
-        ("scale = 0", "scale = 0"),
+        ("sign = 2", "sign` = 2"),
+        ("scale = 0", "scale` = 0"),
         ("offset = nan", "offset"),
         ("table = [[1, 2]]", "table"),
         ("table = [[2, 2], [1, 0]]", "table"),
@@ -41,6 +41,42 @@ fn bad_numbers_and_keys_are_named() {
         let error = message(&format!("{HEAD}[columns.thrust_n]\nsource = \"f\"\nunit = \"N\"\n{line}"));
         assert!(error.contains(word), "{line}: {error}");
     }
+}
+
+/// Keys that nobody knows and values of another kind are told together; where there are none, all that may not stand.
+#[test]
+fn all_that_is_wrong_is_said_at_once() {
+    let all = |text: &str| {
+        let wrong = ColumnMap::from_toml("m", text).unwrap_err();
+        wrong.0.iter().map(|error| error.message.clone()).collect::<Vec<_>>()
+    };
+    let said = all(
+        "decimal = 1\n[time]\nsource = \"t\"\nunti = \"ms\"\n[columns.thrust_n]\nsource = \"f\"\nscael = 2\nsign = \"-\"\n",
+    );
+    assert_eq!(said.len(), 4, "{said:?}");
+    for key in ["`decimal` = 1", "`time.unti`", "`columns.thrust_n.scael`", "`columns.thrust_n.sign` = \"-\""]
+    {
+        assert!(said.iter().any(|words| words.contains(key)), "{key} in {said:?}");
+    }
+    let said = all("delimiter = \"|\"\n[ask]\nmotor = { meaning = \"which\" }\n\
+        [time]\nsource = \"t\"\nunit = \"h\"\nstale_rows = \"keep\"\norder = \"dmy\"\n\
+        [columns.thrust_n]\nsource = \"f[{motor}]\"\nunit = \"V\"\nsign = 2\nscale = 0\n\
+        [columns.torque]\nsource = \"m\"\nunit = \"N m\"\n[columns.depth_m]\nsource = \"d\"\n");
+    let keys = [
+        "`delimiter` = \"|\"",
+        "`ask.motor`: neither",
+        "`time.order` = \"dmy\"",
+        "`time.order` needs",
+        "`time.unit` = \"h\"",
+        "`time.stale_rows` = \"keep\"",
+        "`columns.depth_m.unit` is missing",
+        "`columns.thrust_n.unit` = \"V\"",
+        "`columns.thrust_n.sign` = 2",
+        "`columns.thrust_n.scale` = 0",
+        "`columns.torque`: no SI unit",
+    ];
+    assert!(said.iter().zip(keys).all(|(words, key)| words.contains(key)), "{said:#?}");
+    assert_eq!(said.len(), keys.len(), "{said:#?}");
 }
 
 #[test]

@@ -9,7 +9,8 @@ use std::io::{self, Read, Write};
 
 use csv::{ByteRecord, ErrorKind, ReaderBuilder};
 
-use crate::assemble::{Assembler, Cell};
+use crate::assemble::Assembler;
+use crate::cell::Cell;
 use crate::error::{Place, Problem};
 use crate::map::ColumnMap;
 use crate::recording::Recording;

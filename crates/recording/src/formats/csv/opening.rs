@@ -7,6 +7,7 @@ use encoding_rs_io::DecodeReaderBytesBuilder;
 
 use super::encoding::Texts;
 use super::{Lines, units};
+use crate::dates::is_date;
 use crate::decimal::with_comma;
 use crate::error::Problem;
 
@@ -239,9 +240,10 @@ fn filled(row: &ByteRecord) -> usize {
     row.iter().filter(|cell| !cell.trim_ascii().is_empty()).count()
 }
 
+/// Dates are numbers too: no name is one.
 fn numbers(row: &ByteRecord) -> usize {
-    let number = |cell: &&[u8]| text(cell).parse::<f64>().is_ok() || with_comma(text(cell)).is_some();
-    row.iter().filter(number).count()
+    let number = |text: &str| text.parse::<f64>().is_ok() || with_comma(text).is_some() || is_date(text);
+    row.iter().filter(|cell| number(text(cell))).count()
 }
 
 /// More than a word with its value, as `Rate;100` in lines about the measurement.

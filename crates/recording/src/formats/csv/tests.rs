@@ -81,7 +81,7 @@ fn decimal_marks_that_do_not_agree_are_named_by_line() {
         assert!(words.contains(part), "{part} in {words}");
     }
     let error = ColumnMap::from_toml("m", &map.replace("decimal = \",\"", "decimal = \";\"")).unwrap_err();
-    assert!(error.to_string().contains("decimal = \";\"; allowed: "), "{error}");
+    assert!(error.to_string().contains("`decimal` = \";\" is outside what is allowed: "), "{error}");
 }
 
 /// The number of a line counts ends of two signs as one.

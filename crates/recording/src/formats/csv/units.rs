@@ -3,7 +3,8 @@
 use csv::ByteRecord;
 
 use crate::decimal::with_comma;
-use crate::log::propose::{is_time, symbol};
+use crate::log::propose::symbol;
+use crate::log::stamps::is_time;
 use crate::units::{self, Unit};
 
 /// What stands where a column has no unit.

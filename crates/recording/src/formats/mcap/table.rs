@@ -7,7 +7,8 @@ use serde_json::Value;
 
 use super::ABOUT;
 use super::schemas::BESIDE;
-use crate::assemble::{Assembler, Cell};
+use crate::assemble::Assembler;
+use crate::cell::Cell;
 use crate::error::{Place, Problem};
 use crate::map::ColumnMap;
 use crate::recording::Recording;
