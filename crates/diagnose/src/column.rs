@@ -1,10 +1,9 @@
 //! Terms driven by a column that no part of the model reads: an unknown signal as a possible cause of what is
 //! left. A gain and an offset, on the path where it acts.
 
-use kort_identify::data::COLUMN;
 use kort_thruster::both;
 use kort_thruster::effects::{
-    Available, Descriptor, Effect, Hooks, Path, Spec, free_shaft, one_start, thrust_measured, wet,
+    Available, Descriptor, EXTRA, Effect, Hooks, Path, Spec, free_shaft, one_start, thrust_measured, wet,
 };
 use kort_thruster::plant::{Balance, Drive, Local, Sensed, Tick};
 use kort_thruster::real::Real;
@@ -70,7 +69,7 @@ fn sizes(unit: &'static str, size: f64) -> Vec<Spec> {
 }
 
 fn column_there(available: &Available) -> Result<(), &'static str> {
-    if available.has(COLUMN) { Ok(()) } else { Err("no column is recorded that the model has no use for") }
+    if available.has(EXTRA) { Ok(()) } else { Err("no column is recorded that the model has no use for") }
 }
 
 macro_rules! driven {

@@ -1,4 +1,4 @@
-//! A column that the model has no use for, and that truly drives the shaft, is told by its name.
+//! A column that the model has no use for is told by its name where it truly drives the shaft; a neighbour's jet is physics.
 
 use kort_diagnose::diagnose::{Options, diagnose};
 use kort_identify::data::Series;
@@ -72,4 +72,42 @@ fn a_column_that_drives_the_shaft_is_told_by_its_name() {
     // 0.4 N m at full opening, by standard deviation of the opening.
     let gain = term.parameters.iter().find(|p| p.name == "gain").unwrap().value;
     assert!((gain / (-0.4 * 0.375) - 1.0).abs() < 0.15, "{gain}");
+}
+
+/// A neighbour that mostly thrusts ahead, and rests in between; its current, A.
+fn neighbour(t: f64) -> f64 {
+    [0.0, 6.0, -3.0, 8.0, 0.0, 5.0][(t / 6.7) as usize % 6]
+}
+
+#[test]
+fn the_jet_of_a_neighbour_is_named_and_is_none_where_the_neighbour_rests() {
+    let rig = Rig::from_toml(include_str!("../../../config/thrusters/whitcomb-yoerger-1999.toml")).unwrap();
+    let mut plant = Plant::new(ModelName::Model2, &rig, &Parameters::stated(&rig), &[], TICK_S);
+    let levels = [0.0, 4.0, -3.0, 6.0, 2.0, -5.0, 3.0];
+    let mut rows: Vec<[f64; 5]> = Vec::new();
+    for k in 0..20_000_u32 {
+        let t = f64::from(k) * TICK_S;
+        let command = levels[(t / 1.9) as usize % levels.len()];
+        if k % 10 == 0 {
+            let shown = plant.sensed();
+            rows.push([t, command, neighbour(t), shown.shaft_speed_rad_s, shown.thrust_n]);
+        }
+        let jet_m_s = 0.03 * neighbour(t);
+        plant.step(&Tick { time_s: t, command, ambient_m_s: (jet_m_s, jet_m_s), ..Tick::default() });
+    }
+    let column = |i: usize| rows.iter().map(|row| row[i]).collect::<Vec<f64>>();
+    let columns = vec![
+        ("current_cmd_a".into(), column(1)),
+        ("neighbour_current".into(), column(2)),
+        ("shaft_speed_rad_s".into(), column(3)),
+        ("thrust_n".into(), column(4)),
+    ];
+    let log = Series { name: "jet".into(), time_s: column(0), columns };
+    let options = Options { model: ModelName::Model2, seed: 1, with: Vec::new() };
+    let report = diagnose(&[log], &rig, &options, &|_| ()).unwrap().report;
+    let names: Vec<&str> = report.findings.iter().map(|f| f.effect.as_str()).collect();
+    assert_eq!(names, ["thrust_deduction_interaction"], "{}", report.summary);
+    // 0.03 m/s an ampere, by standard deviation of the current.
+    let flow = &report.findings[0].parameters[0];
+    assert!((flow.value / (0.03 * 4.0) - 1.0).abs() < 0.15, "{flow:?}");
 }

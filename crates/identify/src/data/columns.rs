@@ -67,6 +67,7 @@ impl Prepared {
                 row += 1;
             }
             tick.extra = (linear(&self.time_s, &values, row, tick.time_s) - mean) / deviation;
+            tick.extra_at_zero = -mean / deviation;
         }
         self.extra = Some(name.into());
     }

@@ -31,7 +31,7 @@ pub use fresh::fresh;
 pub use grain::Grain;
 pub use observed::OBSERVER_RAD_S;
 pub use pauses::pause_s;
-pub use scale::{COLUMN, available, scale};
+pub use scale::{available, scale};
 
 use command::steps_of;
 use driving::{choose_driving, driving_power, instead};

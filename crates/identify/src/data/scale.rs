@@ -1,6 +1,6 @@
 //! Sizes in use, and what recordings offer to effects.
 
-use kort_thruster::effects::{ANGLE_KNOWN, Available, Scale};
+use kort_thruster::effects::{ANGLE_KNOWN, Available, EXTRA, Scale};
 use kort_thruster::models::ModelName;
 use kort_thruster::rig::{AmplifierKind, Rig};
 
@@ -133,9 +133,6 @@ fn one_way(series: &[Series]) -> bool {
 /// Share of the largest size below which a sign says nothing.
 const TRIFLE: f64 = 0.02;
 
-/// Name under which [`Available`] lists that a column is laid beside the inputs ([`Prepared::lay_extra`]).
-pub const COLUMN: &str = "a column of its own";
-
 /// What the recordings offer, for the effects' `needs`.
 pub fn available(model: ModelName, series: &[Series], all: &[Prepared]) -> Available {
     let mut columns: Vec<String> = series
@@ -143,7 +140,7 @@ pub fn available(model: ModelName, series: &[Series], all: &[Prepared]) -> Avail
         .flat_map(|s| s.columns.iter().filter(|c| s.column(&c.0).is_some()).map(|c| c.0.clone()))
         .collect();
     if all.iter().any(|p| p.extra.is_some()) {
-        columns.push(COLUMN.into());
+        columns.push(EXTRA.into());
     }
     if angle_known(all) {
         columns.push(ANGLE_KNOWN.into());

@@ -32,8 +32,8 @@ impl Available {
     }
 }
 
-/// Name under which [`Available`] lists a recorded signal laid into [`Tick::extra`].
-pub const EXTRA: &str = "extra";
+/// Name under which [`Available`] lists that a column of the log is laid into [`Tick::extra`].
+pub const EXTRA: &str = "a column of its own";
 
 /// Name under which [`Available`] lists that the shaft angle is known: recorded, or counted from the recorded speed.
 pub const ANGLE_KNOWN: &str = "shaft angle";

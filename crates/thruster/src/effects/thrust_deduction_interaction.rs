@@ -10,7 +10,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     id: "thrust_deduction_interaction",
     path: Path::Flow,
     what: "the jet of a neighbouring thruster feeds or starves this one, and suction on the hull takes some of the thrust",
-    equation: "va += C n; y = T (1 - t); n a neighbour's recorded signal (standardised) [1], C [m/s], t [1]",
+    equation: "va += C n; y = T (1 - t); n a neighbour's recorded signal over its standard deviation, 0 where it is at rest [1], C [m/s], t [1]",
     signature: "thrust and flow follow another thruster's command; thrust is low in proportion",
     confused_with: &[
         "ambient_axial_flow",
@@ -60,7 +60,8 @@ impl<T: Real> Effect<T> for Interaction<T> {
     }
 
     fn drive(&mut self, tick: &Tick, _: &mut Drive<T>) {
-        self.neighbour = tick.extra;
+        // A neighbour at rest has no jet.
+        self.neighbour = tick.extra - tick.extra_at_zero;
     }
 
     fn balance(&self, _: &Local<T>, _: &[T], balance: &mut Balance<T>, _: &mut [T]) {

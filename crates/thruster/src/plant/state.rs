@@ -27,6 +27,8 @@ pub struct Tick {
     pub temperature_c: Option<f64>,
     /// Another recorded signal (a neighbour's speed, an unknown column), standardised.
     pub extra: f64,
+    /// What [`Self::extra`] is where that signal is zero: a neighbour at rest.
+    pub extra_at_zero: f64,
     /// The drive is released: its terminals are open, no current flows, whatever the command.
     pub released: bool,
     /// Recorded shaft angle at the tick's end, rad, for the observer ([`super::Plant::with_observer`]).
