@@ -31,6 +31,14 @@ pub struct Decision {
     pub term: Option<&'static str>,
 }
 
+impl Decision {
+    /// Whether a name is in doubt beside others that are believed: what it takes may be something else's.
+    pub fn doubts(&self, effect: &str) -> bool {
+        self.verdict == Verdict::PartlyExplained
+            && self.named.iter().any(|n| n.effect == effect && !n.believed)
+    }
+}
+
 /// From this probability on a name is believed.
 const BELIEVED: f64 = 0.7;
 /// A remainder below this share of what was to be explained is of no practical size.

@@ -83,7 +83,7 @@ pub struct SetReport {
     pub probability: f64,
 }
 
-/// What the named effects leave.
+/// What the named effects leave; where one of them is in doubt and nothing else is left, what stays without that one.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Remainder {
     /// Of the squared error above the noise.
@@ -96,6 +96,14 @@ pub struct Remainder {
     pub regime: String,
     /// Root mean square over full scale by channel, everything named taken into account.
     pub nrmse: BTreeMap<String, f64>,
+}
+
+impl Remainder {
+    /// What is left at a place.
+    pub fn at(place: Mismatch, share_of_excess_error: f64, nrmse: BTreeMap<String, f64>) -> Self {
+        let Mismatch { path, channel, regime, .. } = place;
+        Self { share_of_excess_error, path, channel, regime, nrmse }
+    }
 }
 
 /// An effect that was tried and set aside.

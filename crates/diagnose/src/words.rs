@@ -194,6 +194,8 @@ pub struct Told<'a> {
     pub without_name: &'a str,
     /// What is left.
     pub remainder: Option<&'a Remainder>,
+    /// The name without which that is left, if it is what a name in doubt takes.
+    pub in_doubt: Option<&'a str>,
     /// What to run next.
     pub next: Option<&'a NextExperiment>,
     /// The baseline.
@@ -234,8 +236,12 @@ pub fn summary(told: &Told) -> String {
         Verdict::PartlyExplained => {
             let mut text = format!("{model} leaves out {}.{}", named(told.findings), shows(told));
             if let Some(left) = told.remainder {
+                let (who, what) = match told.in_doubt {
+                    Some(effect) => ("Those that are likely", format!("it may be {}", plain(effect))),
+                    None => ("They", "that has no name here".into()),
+                };
                 text.push_str(&format!(
-                    " They leave {:.0} % of the error above the noise, on the {} path, most in {}, {}: that has no name here.",
+                    " {who} leave {:.0} % of the error above the noise, on the {} path, most in {}, {}: {what}.",
                     100.0 * left.share_of_excess_error,
                     left.path,
                     left.channel,

@@ -150,6 +150,7 @@ impl<'a, 'p> Writer<'a, 'p> {
             rows.iter().map(|rows| rows.iter().map(|s| s.true_speed_rad_s).collect()).collect();
 
         let (mut findings, mut mismatch) = (Vec::new(), Vec::new());
+        let mut doubted: Option<(&str, Remainder)> = None;
         let stated = |id: &&str| decision.term == Some(*id) || decision.named.iter().any(|n| n.effect == *id);
         let members = self.best.iter().copied().filter(stated);
         let empty_cost = self.search.cost(&Set::new());
@@ -164,7 +165,13 @@ impl<'a, 'p> Writer<'a, 'p> {
             let gain = (smaller.noise.misfit - self.last.noise.misfit).max(0.0);
             let share = ((self.excess(&smaller_full) - self.excess(&last_full)) / whole).clamp(0.0, 1.0);
             let path = self.path(member);
-            mismatch.push((share, mismatch_of(path, &located, gain, share)));
+            let place = mismatch_of(path, &located, gain, share);
+            // Of what is in doubt the most.
+            if decision.doubts(member) && doubted.as_ref().is_none_or(|d| d.1.share_of_excess_error < share) {
+                let left = Remainder::at(place.clone(), share, words::nrmse(problem, &smaller_full));
+                doubted = Some((member, left));
+            }
+            mismatch.push((share, place));
             let here: Vec<&Named> = decision
                 .named
                 .iter()
@@ -212,27 +219,17 @@ impl<'a, 'p> Writer<'a, 'p> {
             _ if decision.named.is_empty() => None,
             (Some(term), _) => {
                 let located = locate(problem, &named_full, &last_full, &speed);
-                Some(Remainder {
-                    share_of_excess_error: left.min(1.0),
-                    path: self.path(term).into(),
-                    channel: located.channel.into(),
-                    regime: located.regime,
-                    nrmse: words::nrmse(problem, &named_full),
-                })
+                let place = mismatch_of(self.path(term), &located, 0.0, left);
+                Some(Remainder::at(place, left.min(1.0), words::nrmse(problem, &named_full)))
             }
             (None, Some(rest)) => {
                 let bare = self.bare(rest, &last_full, &speed);
                 let share = self.excess(&last_full) / self.excess(&baseline_full).max(1e-300);
-                Some(Remainder {
-                    share_of_excess_error: share.clamp(0.0, 1.0),
-                    path: bare.path,
-                    channel: bare.channel,
-                    regime: bare.regime,
-                    nrmse: words::nrmse(problem, &last_full),
-                })
+                Some(Remainder::at(bare, share.clamp(0.0, 1.0), words::nrmse(problem, &last_full)))
             }
-            (None, None) => None,
+            (None, None) => doubted.as_ref().map(|d| d.1.clone()),
         };
+        let in_doubt = doubted.filter(|d| remainder.as_ref() == Some(&d.1)).map(|d| d.0);
         if findings.len() > 1 {
             let everything = self.score(&baseline_trained, &last_trained).excess_error_removed;
             notes.push(format!(
@@ -263,6 +260,7 @@ impl<'a, 'p> Writer<'a, 'p> {
             term: empirical_term.as_ref(),
             without_name: decision.term.and_then(|id| self.search.descriptor(id)).map_or("", |d| d.what),
             remainder: remainder.as_ref(),
+            in_doubt,
             next: next_experiment.as_ref(),
             baseline: &baseline,
             thin,

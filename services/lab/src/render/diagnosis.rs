@@ -189,7 +189,7 @@ fn explanations(report: &Report) -> Markup {
     html! {
         (table(&["effects", "probability"], &rows))
         @if let Some(left) = &report.remainder {
-            p { "The names leave " (percent(left.share_of_excess_error)) " of the error above the noise, on the "
+            p { (percent(left.share_of_excess_error)) " of the error above the noise is left, on the "
                 (left.path) " path, most in " (left.channel) ", " (left.regime) "." }
         }
     }
