@@ -7,7 +7,9 @@ use kort_thruster::rig::Rig;
 use crate::data::{Series, pause_s};
 use crate::gaps::GAP_INTERVALS;
 
+mod spikes;
 mod supply;
+use spikes::spikes;
 pub use supply::{Sag, supply_sag};
 
 /// What the checks found: words for the report, and rows to leave out.
@@ -25,8 +27,6 @@ const FROZEN_ROWS: usize = 40;
 const FROZEN_MOVES: f64 = 3.0;
 /// A drive may answer a step of its command this many rows late.
 const LATE_ROWS: usize = 10;
-/// A spike stands out of its neighbours by this many times their usual distance.
-const SPIKE_RATIO: f64 = 40.0;
 /// Columns that say what is asked of the drive.
 const COMMANDS: [&str; 5] = ["current_cmd_a", "voltage_cmd_v", "duty_cmd", "speed_cmd_rad_s", "thrust_cmd_n"];
 /// Share of the largest command that counts as a step of it.
@@ -45,7 +45,7 @@ pub fn check(series: &Series, rig: &Rig) -> Checked {
     for name in ["thrust_n", "shaft_speed_rad_s", "torque_n_m", "current_a"] {
         if let Some(column) = series.column(name) {
             frozen(series, name, column, &mut out);
-            spikes(&series.name, name, column, &series.time_s, &mut out);
+            spikes(series, name, column, &mut out);
         }
     }
     unsigned_speed(series, &mut out);
@@ -93,8 +93,7 @@ fn frozen(series: &Series, name: &str, column: &[f64], out: &mut Checked) {
     if !varies(column) {
         return;
     }
-    let commands = COMMANDS.iter().filter_map(|name| series.column(name));
-    let commands: Vec<(&[f64], f64)> = commands.map(|c| (c, STEP_SHARE * largest(c))).collect();
+    let commands = commands(series);
     let mut from = 0;
     for k in 1..=column.len() {
         if k < column.len() && column[k] == column[from] {
@@ -124,6 +123,12 @@ fn frozen(series: &Series, name: &str, column: &[f64], out: &mut Checked) {
     }
 }
 
+/// The commands, each with the least change that is a step of it.
+fn commands(series: &Series) -> Vec<(&[f64], f64)> {
+    let there = COMMANDS.iter().filter_map(|name| series.column(name));
+    there.map(|command| (command, STEP_SHARE * largest(command))).collect()
+}
+
 /// Whether a command changes within these rows by more than this.
 fn steps(commands: &[(&[f64], f64)], rows: Range<usize>) -> bool {
     commands.iter().any(|(command, least)| {
@@ -142,33 +147,6 @@ fn largest(column: &[f64]) -> f64 {
 fn varies(column: &[f64]) -> bool {
     let same = column.windows(2).filter(|w| w[0] == w[1]).count();
     (same as f64) < 0.5 * column.len() as f64
-}
-
-fn spikes(recording: &str, name: &str, column: &[f64], time_s: &[f64], out: &mut Checked) {
-    let jump = |k: usize| (column[k] - 0.5 * (column[k - 1] + column[k + 1])).abs();
-    let known: Vec<usize> = (1..column.len().saturating_sub(1))
-        .filter(|k| (k - 1..=k + 1).all(|i| column[i].is_finite()))
-        .collect();
-    let mut sizes: Vec<f64> = known.iter().map(|k| jump(*k)).collect();
-    sizes.sort_by(f64::total_cmp);
-    let Some(usual) = sizes.get(sizes.len() / 2).copied() else { return };
-    let scale = largest(column);
-    let limit = (SPIKE_RATIO * usual).max(0.25 * scale);
-    let found: Vec<usize> = known
-        .into_iter()
-        .filter(|k| {
-            let alone = (column[k - 1] - column[k + 1]).abs() < 0.2 * jump(*k);
-            usual > 0.0 && jump(*k) > limit && alone
-        })
-        .collect();
-    if let Some(first) = found.first() {
-        out.notes.push(format!(
-            "{recording}: {name} spikes in {} single rows (first at {:.2} s); they are left out",
-            found.len(),
-            time_s[*first]
-        ));
-        found.into_iter().for_each(|k| out.masked[k] = true);
-    }
 }
 
 /// Readings below zero by more than this share of the largest are more than a sensor's noise about rest.

@@ -158,7 +158,7 @@ impl Prepared {
             _ => ("what drives the model", "how late a response comes"),
         };
         Some(format!(
-            "{}: {} of {} steps of {what} fall between rows, {usual_s:.3} s apart in the mean; where each lay is fitted, so {of} within that shows only in part: log {what} at the control rate",
+            "{}: {} of {} steps of {what} may fall between rows, {usual_s:.3} s apart in the mean; where each lay is fitted, so {of} within that shows only in part: log {what} at the control rate",
             self.name,
             gaps.len(),
             self.edges.len(),

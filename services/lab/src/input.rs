@@ -96,6 +96,12 @@ impl Input {
         let files = self.files()?;
         let (mut recordings, mut skipped) = (Vec::new(), Vec::new());
         for (path, in_folder) in &files {
+            if path.extension().is_some_and(|e| e == "json") && !path.exists() {
+                let file = path.display();
+                return Err(Failure::input(format!(
+                    "{file}: there is no such file\nhint: --json takes no file, it prints: kort … --json > {file}"
+                )));
+            }
             match Recording::read(path, map.as_ref()) {
                 Ok(short) if files.len() > 1 && short.rows() < FEWEST_ROWS => {
                     let rows = short.rows();
@@ -179,7 +185,11 @@ impl Input {
                 time_s: recording.time_s,
                 columns: recording.columns.into_iter().map(|c| (c.name, c.values)).collect(),
             };
-            out.lossy |= checks::check(&series, &out.rig).masked.contains(&true);
+            let checked = checks::check(&series, &out.rig);
+            if checked.masked.contains(&true) {
+                out.lossy = true;
+                checked.notes.iter().for_each(|note| eprintln!("warning: {note}"));
+            }
             out.series.push(series);
         }
         Ok(out)
