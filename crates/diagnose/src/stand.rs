@@ -10,8 +10,8 @@ use rand::{Rng as _, SeedableRng};
 
 use crate::constants::Constants;
 
-const RIG: &str = "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = 0.01\ntorque_constant_nm_a = 0.1\n\
-                   viscous_friction_nm_s = 0.02\n";
+/// Nothing brakes it: an observer keeps the simulation with the recorded speed.
+const RIG: &str = "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = 0.01\ntorque_constant_nm_a = 0.1\n";
 const ROWS: usize = 4000;
 
 /// Looks at a residual of the shaft's speed that is this function of the simulated speed (over its usual size), of time
