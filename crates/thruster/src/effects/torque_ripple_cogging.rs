@@ -48,6 +48,9 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     build: both!(build),
 };
 
+/// Waves of an order that the shaft must turn through to show that they come again.
+const WAVES: f64 = 2.0;
+
 /// Names of one order's values.
 macro_rules! names {
     ($($n:literal)*) => {
@@ -81,12 +84,13 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
 
 /// One start a first order: what an eccentric rotor and misalignment give, the poles, the slots, six times the pole pairs, and the
 /// least common multiple of slots and poles of common windings. Nothing acts at the other orders. Of one that the shaft never
-/// turns through a whole wave nothing tells that it comes again: a weight or a spring does the same.
+/// turns through two waves nothing tells that it comes again: several such bend to any curve over the angle, as a weight, a spring
+/// or a stop makes.
 fn starts(scale: &Scale) -> Vec<Vec<f64>> {
     let (torque, per_a) = (0.02 * scale.torque_n_m, 0.02 * scale.torque_n_m / scale.current_a);
     [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 14, 18, 21, 24, 30, 36, 42, 48, 60, 72, 84]
         .iter()
-        .filter(|order| f64::from(**order) * scale.turned_rad >= std::f64::consts::TAU)
+        .filter(|order| f64::from(**order) * scale.turned_rad >= WAVES * std::f64::consts::TAU)
         .map(|order| {
             let mut values = vec![f64::from(*order), torque, torque, per_a, per_a];
             USUAL[1..].iter().for_each(|usual| values.extend([*usual, 0.0, 0.0, 0.0, 0.0]));
