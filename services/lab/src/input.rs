@@ -164,6 +164,7 @@ impl Input {
             }
             let named = |text: &String| format!("{}: {text}", recording.name);
             out.lossy |= !recording.losses.is_empty();
+            let read = out.notes.len() + recording.losses.len();
             out.notes.extend(recording.losses.iter().chain(&recording.notes).map(named));
             if self.rig.is_none()
                 && let Some(since_s) = recording.about.get("rig_since_s.2")
@@ -188,7 +189,7 @@ impl Input {
             let checked = checks::check(&series, &out.rig);
             if checked.masked.contains(&true) {
                 out.lossy = true;
-                checked.notes.iter().for_each(|note| eprintln!("warning: {note}"));
+                out.notes[read..].iter().chain(&checked.notes).for_each(|note| eprintln!("note: {note}"));
             }
             out.series.push(series);
         }
