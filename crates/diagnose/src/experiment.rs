@@ -39,7 +39,7 @@ const SIGNALS: [Signal; 5] = [
 ];
 
 /// What a recording leaves open beside its names.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy)]
 pub struct Open<'a> {
     /// The path on which what is left acts, where that is more than noise.
     pub path: Option<&'a str>,
