@@ -9,6 +9,7 @@
 )]
 
 mod analysis;
+mod app;
 pub mod bodies;
 mod bus;
 mod calibration;
@@ -45,20 +46,17 @@ pub mod token;
 mod view;
 mod windows;
 
-use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
-use axum::body::Bytes;
-use kort_control::ControllerConfig;
 use kort_proto::config::Config;
-use kort_proto::transport::{Deployment, Watched};
+use kort_proto::transport::Deployment;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::watch;
-use utoipa::openapi::OpenApi;
 
 use analysis::Analyses;
+pub(crate) use app::{App, Streams};
 use bus::{Bell, Pulse};
 use calibration::Calibrations;
 use check::{certificate, tokens};
@@ -68,11 +66,8 @@ use durations::Durations;
 pub use error::GatewayError;
 use events::Events;
 use gate::Gate;
-use openapi::Document;
-use problem::{Kind, Problem};
-use record::{Recorder, Subject};
+use record::Recorder;
 use rig::RigDesk;
-use ring::Ring;
 use settings::Deployed;
 pub use settings::Settings;
 use tally::Tally;
@@ -82,199 +77,6 @@ use thruster::Thruster;
 const BODY_BYTES_MAX: usize = 16 * 1024;
 /// By then a thruster whose gateway is silent is at zero, on a busy machine too.
 const RAMPED_WITHIN: Duration = Duration::from_secs(1);
-
-/// Everything the routes share.
-#[derive(Debug)]
-pub(crate) struct App {
-    thrusters: Vec<Arc<Thruster>>,
-    rigs: Vec<Arc<RigDesk>>,
-    controllers: Vec<ControllerConfig>,
-    rings: Vec<Ring>,
-    analyses: Arc<Analyses>,
-    calibrations: Arc<Calibrations>,
-    tallies: Vec<Arc<Tally>>,
-    recorder: Arc<Recorder>,
-    events: Arc<Events>,
-    gate: Gate,
-    connections: Arc<Connections>,
-    streams: Streams,
-    address: String,
-    disks: [PathBuf; 2],
-    watched: PathBuf,
-    answers: [AtomicU64; 4],
-    durations: Durations,
-    stopping: watch::Receiver<bool>,
-    document: OnceLock<Document>,
-    patterns: OnceLock<Vec<String>>,
-}
-
-impl App {
-    fn thrusters(&self) -> &[Arc<Thruster>] {
-        &self.thrusters
-    }
-
-    fn thruster(&self, id: &str) -> Result<&Arc<Thruster>, Problem> {
-        self.thrusters.iter().find(|thruster| thruster.id == id).ok_or_else(|| {
-            Problem::new(Kind::UnknownThruster, format!("there is no thruster {id:?}"))
-                .hint("GET /v1/thrusters lists them")
-                .allowed(self.thrusters.iter().map(|thruster| thruster.id.clone()))
-        })
-    }
-
-    /// What a recording of this thruster holds.
-    fn subject(&self, id: &str) -> Result<Subject, Problem> {
-        Ok(Subject { thruster: Arc::clone(self.thruster(id)?), rig: Arc::clone(self.rig(id)?) })
-    }
-
-    /// The rig description of this thruster.
-    fn rig(&self, id: &str) -> Result<&Arc<RigDesk>, Problem> {
-        Ok(&self.rigs[self.place(id)?])
-    }
-
-    /// Its controller as the deployment states it.
-    fn stated_controller(&self, id: &str) -> Result<&ControllerConfig, Problem> {
-        Ok(&self.controllers[self.place(id)?])
-    }
-
-    /// The last minutes of this thruster.
-    fn ring(&self, id: &str) -> Result<&Ring, Problem> {
-        Ok(&self.rings[self.place(id)?])
-    }
-
-    /// Its place among all: each has one rig, one ring and one tally.
-    fn place(&self, id: &str) -> Result<usize, Problem> {
-        let thruster = self.thruster(id)?;
-        Ok(self.thrusters.iter().position(|other| Arc::ptr_eq(other, thruster)).unwrap_or_default())
-    }
-
-    fn analyses(&self) -> &Arc<Analyses> {
-        &self.analyses
-    }
-
-    fn calibrations(&self) -> &Arc<Calibrations> {
-        &self.calibrations
-    }
-
-    fn tallies(&self) -> &[Arc<Tally>] {
-        &self.tallies
-    }
-
-    fn recorder(&self) -> &Arc<Recorder> {
-        &self.recorder
-    }
-
-    fn events(&self) -> &Events {
-        &self.events
-    }
-
-    fn gate(&self) -> &Gate {
-        &self.gate
-    }
-
-    fn connections(&self) -> &Connections {
-        &self.connections
-    }
-
-    /// The pattern of the route a path belongs to; `other` for what no route has.
-    fn pattern(&self, path: &str) -> &str {
-        let matches = |pattern: &str| {
-            let (mut theirs, mut ours) = (path.split('/'), pattern.split('/'));
-            loop {
-                match (theirs.next(), ours.next()) {
-                    (None, None) => return true,
-                    (Some(part), Some(of)) if part == of || (of.starts_with('{') && !part.is_empty()) => (),
-                    _ => return false,
-                }
-            }
-        };
-        let patterns = self.patterns.get().map_or(&[][..], Vec::as_slice);
-        patterns.iter().map(String::as_str).find(|pattern| matches(pattern)).unwrap_or("other")
-    }
-
-    /// Scheme and address listened on.
-    fn address(&self) -> &str {
-        &self.address
-    }
-
-    /// Free and whole size of the disks that are written to, bytes, by what is written there.
-    fn disks(&self) -> impl Iterator<Item = (&'static str, f64, f64)> {
-        ["recordings", "events"].into_iter().zip(&self.disks).filter_map(|(what, folder)| {
-            let disk = rustix::fs::statvfs(folder).ok()?;
-            let block = disk.f_frsize as f64;
-            Some((what, disk.f_bavail as f64 * block, disk.f_blocks as f64 * block))
-        })
-    }
-
-    fn durations(&self) -> &Durations {
-        &self.durations
-    }
-
-    fn streams(&self) -> &Streams {
-        &self.streams
-    }
-
-    /// What the supervisor notes beside the shared memory.
-    fn watched(&self) -> Watched {
-        Watched::read(&self.watched)
-    }
-
-    fn stopping(&self) -> watch::Receiver<bool> {
-        self.stopping.clone()
-    }
-
-    /// The OpenAPI document, once the routes are known.
-    fn publish(&self, document: OpenApi) {
-        let _ = self.patterns.set(document.paths.paths.keys().cloned().collect());
-        let _ = self.document.set(Document(document));
-    }
-
-    /// The OpenAPI document, with the setpoints that are allowed now.
-    fn document(&self) -> Bytes {
-        let Some(Document(document)) = self.document.get() else { return Bytes::new() };
-        let mut document = document.clone();
-        openapi::finish(&mut document, self);
-        serde_json::to_vec_pretty(&document).unwrap_or_default().into()
-    }
-
-    fn count_answer(&self, status: u16) {
-        if let Some(count) =
-            (status / 100).checked_sub(2).and_then(|class| self.answers.get(usize::from(class)))
-        {
-            count.fetch_add(1, Ordering::Relaxed);
-        }
-    }
-
-    fn answers(&self) -> impl Iterator<Item = (&'static str, u64)> {
-        ["2xx", "3xx", "4xx", "5xx"]
-            .into_iter()
-            .zip(self.answers.iter().map(|count| count.load(Ordering::Relaxed)))
-    }
-}
-
-/// How many streams are open.
-#[derive(Debug, Default)]
-pub(crate) struct Streams(Arc<AtomicU64>);
-
-impl Streams {
-    /// One more, until the guard is dropped.
-    fn open(&self) -> StreamGuard {
-        self.0.fetch_add(1, Ordering::Relaxed);
-        StreamGuard(Arc::clone(&self.0))
-    }
-
-    fn count(&self) -> u64 {
-        self.0.load(Ordering::Relaxed)
-    }
-}
-
-/// Counts as an open stream for as long as it lives.
-pub(crate) struct StreamGuard(Arc<AtomicU64>);
-
-impl Drop for StreamGuard {
-    fn drop(&mut self) {
-        self.0.fetch_sub(1, Ordering::Relaxed);
-    }
-}
 
 /// Serves until SIGINT, SIGTERM or SIGHUP; then commands nothing any more, sees what is armed come to zero, closes running
 /// recordings and returns.

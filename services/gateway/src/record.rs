@@ -5,7 +5,9 @@
 //! with the cause; what was written stays readable.
 
 mod counts;
+mod info;
 mod kept;
+mod names;
 mod set;
 mod write;
 
@@ -23,8 +25,6 @@ use axum::body::Bytes;
 use kort_proto::events::{Event, EventKind};
 use kort_proto::faults::Fault;
 use kort_proto::messages::Telemetry;
-use serde::{Deserialize, Serialize};
-use utoipa::ToSchema;
 
 use crate::events::Events;
 use crate::problem::{Kind, Problem};
@@ -33,7 +33,10 @@ use crate::settings::RecordingLimits;
 use crate::thruster::{Thruster, lock};
 use crate::token::{Identity, Role};
 pub use counts::Totals;
+pub use info::{RecordingInfo, RecordingState};
 pub use kept::{TAGS_MAX, check_tags};
+use names::is_word;
+pub use names::{check_new_name, is_name};
 pub use set::{RecordingSet, Together};
 use write::{Item, Job};
 
@@ -43,59 +46,6 @@ const QUEUE_ROWS: usize = 10_000;
 const AT_ONCE: usize = 40;
 /// Ending of a recording's file.
 pub const ENDING: &str = "mcap";
-
-/// A recording, running or done.
-#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
-pub struct RecordingInfo {
-    /// Name; the file is `NAME.mcap`. What a full file is followed by is called `NAME-2`, `NAME-3`, ….
-    #[schema(example = "t1-20260101T120000Z")]
-    pub name: String,
-    /// The thruster.
-    #[schema(example = "t1")]
-    pub thruster: String,
-    /// The set that it was started with, one recording of every thruster on one time; null if it was started alone.
-    #[serde(default)]
-    pub set: Option<String>,
-    /// Who started it: name of the token, `local` where none is asked for.
-    #[serde(default)]
-    pub owner: String,
-    /// Words to find it by, in the order given.
-    #[serde(default)]
-    #[schema(example = json!(["bollard", "new-propeller"]))]
-    pub tags: Vec<String>,
-    /// Is it running, complete, torn or failed?
-    pub state: RecordingState,
-    /// Why it ended by itself; null if it runs or was stopped.
-    #[serde(default)]
-    pub cause: Option<String>,
-    /// Wall time of the first row, RFC 3339.
-    pub started: String,
-    /// Largest rate of rows, Hz.
-    pub rate_hz: f64,
-    /// Rows on the disk: of what is under way, since the last flush (every half second).
-    pub rows: u64,
-    /// From the first row to the last, s.
-    pub duration_s: f64,
-    /// Samples of the servo that are missing because the gateway or the disk came too late.
-    pub lost_samples: u64,
-    /// Size of the file, bytes, by its ending.
-    #[serde(default)]
-    pub bytes: BTreeMap<String, u64>,
-}
-
-/// State of a recording.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum RecordingState {
-    /// Rows are being written.
-    Recording,
-    /// Ended, whole.
-    Complete,
-    /// The gateway was killed while it ran: readable up to its last second.
-    Torn,
-    /// The disk refused: readable up to what it took; `cause` says why.
-    Failed,
-}
 
 /// What a recording holds beside the samples: the thruster, and what is said of it to a stranger.
 #[derive(Clone, Debug)]
@@ -442,30 +392,4 @@ fn may(who: &Identity, owner: &str, name: &str) -> Result<(), Problem> {
         format!("recording {name:?} belongs to {owner:?}, not to {:?}", who.name),
     )
     .hint("its owner may, and whoever has a token of role admin"))
-}
-
-/// May this be chosen as a name: 1 to 64 letters, digits, `.`, `_` or `-`, the first a letter or digit?
-pub fn is_name(name: &str) -> bool {
-    name.len() <= 64 && is_word(name)
-}
-
-/// The same of any length: a recording that goes on in further files has its number behind its name.
-fn is_word(name: &str) -> bool {
-    name.starts_with(|c: char| c.is_ascii_alphanumeric())
-        && name.bytes().all(|b| b.is_ascii_alphanumeric() || b"._-".contains(&b))
-}
-
-/// May a new recording be called so? With the ending of a file it would stand for a file of another recording.
-pub fn check_new_name(field: &str, name: &str) -> Result<(), Problem> {
-    let refused =
-        |hint| Err(Problem::new(Kind::OutOfRange, format!("{field} = {name:?} is not allowed")).hint(hint));
-    if !is_name(name) {
-        return refused("1 to 64 letters, digits, dots, underscores or hyphens; the first a letter or digit");
-    }
-    if [".csv", ".mcap", ".parquet"].iter().any(|ending| name.ends_with(ending)) {
-        return refused(
-            "without the ending: a recording NAME is fetched as NAME.mcap, NAME.csv and NAME.parquet",
-        );
-    }
-    Ok(())
 }
