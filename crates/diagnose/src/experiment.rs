@@ -83,29 +83,17 @@ pub fn next(
         .or_else(|| from_absence(search, best, rig, doubted?))
         .or_else(|| steady_levels((STAIRCASE.1.into(), along(open.path?))));
     found.map(|mut next| {
-        if let Some(key) = largest_command_unstated(rig) {
+        if let Err(key) = rig.amplifier.largest_command(rig.motor.torque_constant_nm_a.value) {
             next.why += &format!("; its levels are shares of the largest command: state {key} in the rig");
         }
         next
     })
 }
 
-/// The key of a rig that would state the largest command of its drive, where it does not.
-fn largest_command_unstated(rig: &Rig) -> Option<&'static str> {
-    match rig.amplifier.kind {
-        AmplifierKind::Current => {
-            (!rig.amplifier.current_limit_a.is_finite()).then_some("amplifier.current_limit_a")
-        }
-        AmplifierKind::Voltage | AmplifierKind::Speed => {
-            rig.amplifier.supply_v.is_none().then_some("amplifier.supply_v")
-        }
-    }
-}
-
 /// The rig with a largest command where it states none: as much as was recorded.
 fn with_largest_command(rig: &Rig, scale: &Scale, torque_constant_nm_a: f64) -> Rig {
     let mut rig = rig.clone();
-    if largest_command_unstated(&rig).is_some() {
+    if rig.amplifier.largest_command(torque_constant_nm_a).is_err() {
         match rig.amplifier.kind {
             AmplifierKind::Current => rig.amplifier.current_limit_a = scale.current_a,
             AmplifierKind::Voltage => rig.amplifier.supply_v = Some(scale.command),
@@ -364,7 +352,7 @@ mod tests {
         ] {
             let winding = "winding_resistance_ohm = 1.0\n";
             let rig = Rig::from_toml(&format!("{SERVO}{winding}[amplifier]\n{drive}\n")).unwrap();
-            assert_eq!(largest_command_unstated(&rig), key);
+            assert_eq!(rig.amplifier.largest_command(0.35).err(), key);
             let parameters = Parameters::stated(&rig);
             let rig = with_largest_command(&rig, &Scale::ANY, 0.35);
             for (text, words) in SIGNALS {

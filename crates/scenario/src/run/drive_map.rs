@@ -61,25 +61,15 @@ impl DriveMap {
                 return fail("it has no propeller that gives thrust", "command it by torque or current");
             }
             Command::DutyCmd | Command::Share => {
-                let kt = map.torque_constant_nm_a;
-                let limit = match (kind, rig.amplifier.supply_v) {
-                    (AmplifierKind::Current, _) => {
-                        Some(rig.amplifier.current_limit_a).filter(|a| a.is_finite())
-                    }
-                    (AmplifierKind::Voltage, supply) => supply,
-                    // Speed at which the supply just drives the propeller, winding neglected.
-                    (AmplifierKind::Speed, supply) => supply.map(|v| v / kt),
-                };
-                match limit {
-                    Some(limit) => map.full = limit,
-                    None => {
-                        let key = if kind == AmplifierKind::Current { "current_limit_a" } else { "supply_v" };
+                map.full = match rig.amplifier.largest_command(map.torque_constant_nm_a) {
+                    Ok(full) => full,
+                    Err(key) => {
                         return fail(
-                            &format!("its largest command is not stated (amplifier.{key})"),
-                            &format!("state amplifier.{key}, or give the values as {}", own.name()),
+                            &format!("its largest command is not stated ({key})"),
+                            &format!("state {key}, or give the values as {}", own.name()),
                         );
                     }
-                }
+                };
             }
             _ => {}
         }

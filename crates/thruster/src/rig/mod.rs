@@ -170,6 +170,23 @@ pub struct Amplifier {
     pub supply_v: Option<f64>,
 }
 
+impl Amplifier {
+    /// The command of which others are shares: the current limit, A; the supply, V; of a speed drive the speed, rad/s, at
+    /// which the supply just turns a motor of this torque constant, its winding neglected.
+    ///
+    /// # Errors
+    /// The key of the rig that would state it.
+    pub fn largest_command(&self, torque_constant_nm_a: f64) -> Result<f64, &'static str> {
+        let supply = self.supply_v.ok_or("amplifier.supply_v");
+        match self.kind {
+            AmplifierKind::Current if self.current_limit_a.is_finite() => Ok(self.current_limit_a),
+            AmplifierKind::Current => Err("amplifier.current_limit_a"),
+            AmplifierKind::Voltage => supply,
+            AmplifierKind::Speed => supply.map(|v| v / torque_constant_nm_a),
+        }
+    }
+}
+
 /// The measuring chain. What is not stated is ideal.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Sensors {
