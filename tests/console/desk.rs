@@ -57,6 +57,8 @@ fn recordings_are_tagged_and_the_tuned_controller_is_kept_as_a_file() {
         page.click("switch");
         page.until("state.controller === 'thrust_pi' && state.observer === 'luenberger' && late > 0");
         page.eval("holds = false");
+        // What the law in force uses comes first, the rest is folded.
+        page.until("[...document.querySelectorAll('#law-parameters input')].some((i) => i.ariaLabel.startsWith('thrust_pi_bandwidth_ratio')) && [...document.querySelectorAll('#other-parameters input')].some((i) => i.ariaLabel.startsWith('look_ahead_horizon'))");
         let margin = "[...document.querySelectorAll('#law-parameters input')].find((i) => i.ariaLabel.startsWith('phase_margin_deg in deg, 30 to 85'))";
         let tune = |page: &mut Browser, value: &str| {
             page.eval(&format!("(() => {{ const i = {margin}; i.value = '{value}'; i.dispatchEvent(new Event('change')); }})()"));
@@ -98,6 +100,7 @@ fn two_thrusters_side_by_side_are_commanded_in_turn_and_stopped_at_once() {
         page.until(
             "!$('fleet').hidden && fleet.size === 2 && [...fleet.values()].every((m) => m.state !== null)",
         );
+        page.until("[...fleet.values()].every((m) => m.plot?.axes[1]._splits.length >= 2)");
         page.eval("lease_ttl_ms = 5000");
         // A gateway that answers late: the signal of the larger thruster is not asked of the smaller one meanwhile.
         page.eval("(() => { const now = fetch; window.fetch = (url, ...how) => String(url).endsWith('/t2') ? new Promise((on) => setTimeout(on, 600)).then(() => now(url, ...how)) : now(url, ...how); })()");

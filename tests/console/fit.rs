@@ -106,6 +106,11 @@ fn an_operator_fits_reads_and_uses_what_was_fitted() {
         page.until("fitted !== null && fitted.state === 'done' && state.fit === null");
         page.until(&text_is("fit-text", ": 5 values of model2 fitted to the last"));
         let found = rows(&mut page, "fitted");
+        // What the fit needs for itself is nobody's business.
+        let told = text_of(&mut page, "fit-text") + &text_of(&mut page, "fit-open");
+        assert!(!told.contains("sampling_delay_s") && !told.contains("averaging_s"), "{told}");
+        let warns = page.eval("leftOver({ usable: true, heldout: [{ channel: 'thrust_n', nrmse: 0.1, noise_floor: 0.002, white: false }] })");
+        assert!(warns.as_str().unwrap().contains("thrust 10 % of full scale, 50 times its noise"), "{warns}");
         let lift = found.iter().find(|row| row[0] == "lift_max").unwrap_or_else(|| panic!("{found:?}"));
         assert_eq!((lift[1].as_str(), lift[3].as_str()), ("0.542 ± 15 %", "1"), "{lift:?}");
         let (value, doubt) = lift[2].split_once(" ± ").unwrap_or_else(|| panic!("{lift:?}"));

@@ -228,3 +228,22 @@ fn estimates_are_shown_of_the_minutes_before_and_of_recordings() {
         assert_eq!(page.errors, Vec::<String>::new());
     });
 }
+
+/// What is commanded is within its slew, live as in recordings; disarmed it is nothing.
+#[test]
+fn the_command_in_the_plots_is_the_one_in_force() {
+    in_its_turn(|| {
+        let mut stack = Stack::start();
+        let Some(mut page) = open(&stack) else { return };
+        for newton in [100.0, -100.0] {
+            stack.thrust(newton, 60_000);
+            page.until(&format!("live.of('thrust_cmd_n').at(-1) === {newton}"));
+        }
+        let between = page
+            .eval("live.of('thrust_cmd_n').filter((v) => v !== null && v > -99 && v < 99 && v !== 0).length");
+        assert!(between.as_u64().unwrap() > 2, "{between}");
+        page.click("stop");
+        page.until("!state.armed && live.of('thrust_cmd_n').at(-1) === null");
+        assert_eq!(page.errors, Vec::<String>::new());
+    });
+}

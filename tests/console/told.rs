@@ -52,6 +52,22 @@ fn nothing_is_offered_or_shown_that_is_not_so() {
         page.until(&text_is("signal-text", "A field is empty"));
         choose(&mut page, "staircase");
 
+        // A limit that was set stays, and only comes down to what is allowed.
+        let limit = |page: &mut Browser, typed: &str| {
+            page.eval(&format!(
+                "$('signal-limit').value = '{typed}'; $('signal-limit').dispatchEvent(new Event('input'))"
+            ));
+        };
+        limit(&mut page, "22.5");
+        choose(&mut page, "sine");
+        assert_eq!(page.eval("$('signal-limit').value"), json!("22.5"));
+        limit(&mut page, "100000");
+        choose(&mut page, "ramp");
+        assert_eq!(page.eval("Number($('signal-limit').value) === limitsOf.thrust_n"), json!(true));
+        limit(&mut page, "");
+        choose(&mut page, "staircase");
+        assert_eq!(page.eval("$('signal-limit').value"), json!("60"));
+
         // A chip that is orange has its words.
         let told = |page: &mut Browser, level: Value, alarm: Value, torque: f64| -> String {
             let mismatch = json!({"alarm": alarm, "since_s": 3.0, "agrees": torque.abs() <= 0.05,
@@ -106,6 +122,13 @@ fn nothing_is_offered_or_shown_that_is_not_so() {
         page.until(&text_is("diagnosis-text", "d2: cancelled"));
         assert_eq!(page.eval("found.id"), "d1");
         page.until("document.querySelector('#report a').textContent === 'report of d1'");
+        // Sizes stand beside the names, and earlier diagnoses can be opened again.
+        let found = json!({"findings": [{"effect": "coulomb_friction",
+            "parameters": [{"name": "coulomb_torque_n_m", "value": 0.8139, "unit": "N m", "std_error": 0.0263}]}]});
+        let sizes =
+            page.eval(&format!("sizesOf({found}, 'coulomb_friction').join('').replaceAll('\\u00a0', ' ')"));
+        assert_eq!(sizes, json!("coulomb torque 0.814 ± 0.026 N m"));
+        assert_eq!(page.eval("$('earlier-list').rows.length"), json!(2), "d2 and d1 are listed");
         // On a phone its words have the page's width.
         let statement = "The wake turns with the propeller: the blades meet less than the shaft's own speed, and lose lift with it.";
         page.eval(&format!("$('findings').replaceChildren(cells(['rotational flow', 'blade', '0.97', '85 %', {statement:?}]))"));

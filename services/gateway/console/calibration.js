@@ -44,7 +44,7 @@ click("calibration-abort", async () => {
 });
 click("calibration-use", async () => {
   const answer = await fetch(`${calibrationsOf()}/${calibrated.id}/rig`, { headers: token ? { Authorization: `Bearer ${token}` } : {} });
-  if (!answer.ok) { log(`rig of ${calibrated.id}: ${answer.status}`, true); return; }
+  if (!answer.ok) { refused(`rig of ${calibrated.id}: ${answer.status}`); return; }
   await adopt({ toml: await answer.text(), note: `calibration ${calibrated.id}` });
 });
 $("thruster").addEventListener("change", () => {

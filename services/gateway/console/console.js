@@ -24,9 +24,17 @@ function log(message, bad) {
   while ($("log").children.length > 200) $("log").lastChild.remove();
 }
 
-// One request; a problem document becomes a line in the log (unless it is told elsewhere) and a thrown error.
+// What was refused is told where it is seen wherever one has scrolled to, until one does the next thing.
+function refused(words) { log(words, true); says("refused-text", words); }
+const forget = (event) => { if (event.target.closest?.("button, select, input, a")) says("refused-text", ""); };
+for (const kind of ["click", "change"]) document.addEventListener(kind, forget, true); // before what is asked for next is answered
+$("refused-close").addEventListener("click", () => says("refused-text", ""));
+const says = (id, words) => { if ($(id).textContent !== words) $(id).textContent = words; }; // read aloud when it changes
+
+// One request; a problem document becomes a line in the log (unless it is told elsewhere) and a thrown error. What the page itself
+// looks up all the time is no request of the operator: of that the log alone tells.
 async function call(method, path, body, quiet, leaseId = lease) {
-  const headers = {};
+  const headers = {}, tell = method === "GET" ? (words) => log(words, true) : refused, sent_ms = Date.now();
   if (body !== undefined) headers["Content-Type"] = "application/json";
   if (leaseId) headers["Lease-Id"] = leaseId;
   if (token) headers.Authorization = `Bearer ${token}`;
@@ -35,14 +43,15 @@ async function call(method, path, body, quiet, leaseId = lease) {
     const signal = AbortSignal.timeout(WAIT_MS);
     answer = await fetch(path, { method, headers, signal, body: body === undefined ? undefined : JSON.stringify(body) });
   } catch (error) {
-    log(`${method} ${path}: the gateway does not answer`, true);
+    tell(`${method} ${path}: the gateway does not answer`);
     throw error;
   }
+  heardDate(answer.headers.get("date"), sent_ms);
   if (answer.status === 204) return null;
   if (answer.status === 401) askToken();
   const answered = await answer.json();
   if (!answer.ok) {
-    if (!quiet) log(`${answered.title}: ${answered.detail}${answered.hint ? ` (hint: ${answered.hint})` : ""}`, true);
+    if (!quiet) tell(`${answered.title}: ${answered.detail}${answered.hint ? ` (hint: ${answered.hint})` : ""}`);
     throw new Error(quiet ? answered.detail : answered.title);
   }
   return answered;
@@ -56,7 +65,7 @@ async function openPage(event, link) {
   if (!token) return;
   event.preventDefault();
   const answer = await fetch(link.href, { headers: { Authorization: `Bearer ${token}`, Accept: "text/html, */*" } });
-  if (!answer.ok) { log(`${link.textContent}: ${answer.status}`, true); return; }
+  if (!answer.ok) { refused(`${link.textContent}: ${answer.status}`); return; }
   window.open(URL.createObjectURL(await answer.blob()), "_blank");
 }
 $("metrics").addEventListener("click", (event) => openPage(event, $("metrics")));
@@ -80,12 +89,12 @@ function connect() {
     const next = JSON.parse(message.data);
     if (next.stopped) { stopConfirmed(`the stream: ${next.stopped.join(", ")}`); return; }
     if (next.status && next.title) {
-      log(`${next.title}: ${next.detail}`, true);
+      refused(`${next.title}: ${next.detail}`);
       if (next.type === "urn:kort:problem:lease-lost") lease = null;
       return;
     }
     const first = !state;
-    state = next; heard_ms = performance.now();
+    state = next; heard_ms = performance.now(); heardTime(state);
     if (first) proposeInForce();
     record(state);
   };
@@ -93,14 +102,16 @@ function connect() {
 }
 
 function record(s) {
-  const set = s.setpoint || {}, cmd = s.commanded || {}, { parameters, ...est } = s.estimated;
+  const { parameters, ...est } = s.estimated;
   const estimates = [...Object.entries(est).map(([name, v]) => [`estimated_${name}`, "", v]),
     ...parameters.flatMap((p) => [...(p.name in est ? [] : [[`estimated_${p.name}`, p.unit, p.value]]), [`estimated_${p.name}${DOUBT}`, p.unit, p.std_error]]),
     ...(s.mismatch?.paths ?? []).map(({ path, level }) => [`mismatch_${path}`, LEVEL, level]),
     ...(s.mismatch?.residuals ?? []).map(({ residual, share }) => [`residual_${residual}`, "1", share])];
   const before_s = live.t[live.t.length - 1];
   if (s.time_s - before_s > HOLE_S) loadHistory(before_s, s.time_s).catch(() => {});
-  live.push(s.time_s, { ...s.measured, ...cmd, ...estimatesRow(estimates), thrust_cmd_n: set.thrust_n ?? cmd.thrust_cmd_n, speed_cmd_rad_s: set.speed_rad_s ?? cmd.speed_cmd_rad_s });
+  // What is commanded is what the controller asks for now, within its slew, as the gateway keeps it and as recordings and the service's
+  // own judgement of a revision have it: no setpoint that is still to be reached.
+  live.push(s.time_s, { ...s.measured, ...s.commanded, ...estimatesRow(estimates) });
 }
 
 function show() {
@@ -127,20 +138,23 @@ function showState(s, fresh) {
   if (performance.now() - shown < 100) return;
   shown = performance.now();
   TILES.forEach(([, , value, digits], i) => { $("tiles").children[i].querySelector("i").textContent = text(value(s), digits); });
-  $("time").textContent = `servo time ${s.time_s.toFixed(2)} s`;
+  $("time").textContent = `servo time ${s.time_s.toFixed(2)} s${clock.zero_ms === null || run ? "" : `, ${clockAt(s.time_s)}`}`;
   chip("armed", !fresh ? `${s.armed ? "armed" : "disarmed"} when last heard` : s.armed ? "armed" : "disarmed", s.armed && fresh ? "warn" : "");
   $("arm").disabled = s.armed || !fresh; $("disarm").disabled = false;
 
   const mine = lease && s.lease;
   // A state that was on its way when the lease was granted does not know of it.
-  if (lease && !s.lease && heard_ms > taken_ms + 500) { lease = null; log("the lease ran out", true); }
+  if (lease && !s.lease && heard_ms > taken_ms + 500) { lease = null; refused("the lease ran out"); }
   $("lease-text").textContent = !s.lease ? "Nobody has the lease."
     : mine ? "You have the lease." : `“${s.lease.holder}” has the lease.`;
   $("lease-bar").style.width = s.lease ? `${Math.min(100, s.lease.expires_in_ms / lease_ttl_ms * 100)}%` : "0";
   $("take").textContent = s.lease && !mine ? "Take over" : "Take lease";
   $("take").disabled = Boolean(mine) || !fresh; $("give").disabled = !lease;
+  if (limitsOf && (limitsOf.thrust_n !== s.range.thrust_n || limitsOf.speed_rad_s !== s.range.speed_rad_s)) { limitsOf = s.range; showBounds(); } // another rig
   $("setpoint-text").textContent = `in force: ${Object.entries(s.setpoint).map(([name, value]) => `${name} = ${value.toFixed(2)}`).join(", ")}`
     + (!lease ? " — take the lease to change it" : !s.armed ? " — arm to change it" : "");
+
+  if (!lease && !entered && ![$("entry"), $("slider")].includes(document.activeElement)) followInForce();
 
   $("fault-chip").hidden = s.faults.length === 0;
   chip("fault-chip", s.faults.length === 1 ? "1 fault" : `${s.faults.length} faults`, "bad");
@@ -150,7 +164,7 @@ function showState(s, fresh) {
     $("faults").replaceChildren(...(s.faults.length ? s.faults.map(faultItem) : [none("No fault is latched.")]));
   }
   $("limits").textContent = s.limits.length ? `limit in force: ${s.limits.map((limit) => limit.name ?? limit).join(", ")}` : "No limit is in force.";
-  if (document.activeElement !== $("controller") && $("controller").dataset.running !== s.controller) loadController().catch(() => {});
+  if (s.controller && document.activeElement !== $("controller") && $("controller").dataset.running !== runningLaw(s)) loadController().catch(() => {});
   $("estimator-text").textContent = `observer ${s.observer ?? "–"} · estimator ${s.estimator ?? "–"}${s.estimator_frozen ? ", frozen for want of excitation" : ""}`;
   charts.forEach((chart) => chart.describe());
   $("parameters").replaceChildren(...s.estimated.parameters.map((p) => cells([p.name, text(p.value, 4), text(p.std_error, 4), p.unit])));
@@ -216,13 +230,15 @@ function seenArmed() {
 }
 function stopAll() {
   clearTimeout(stopping); unconfirmed_ms = null; stopped_ms = null;
+  const byStream = socket && socket.readyState === WebSocket.OPEN;
+  stopsSent.push({ at_ms: gatewayNow(), ways: byStream ? 2 : 1, told: 0 });
   $("stop-text").className = "bad"; $("stop-text").textContent = "Stop sent, not confirmed yet.";
   stopping = setTimeout(() => {
     stopping = null; unconfirmed_ms = performance.now();
     $("stop-text").textContent = "STOP IS NOT CONFIRMED: the gateway or a servo does not answer. Cut the supply if the shaft turns.";
     log("stop is not confirmed", true);
   }, 1500);
-  if (socket && socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify({ stop: true }));
+  if (byStream) socket.send(JSON.stringify({ stop: true }));
   call("POST", "/v1/stop").then((answer) => stopConfirmed(answer.stopped.join(", "))).catch(() => {});
 }
 $("stop").addEventListener("click", stopAll);
@@ -231,32 +247,35 @@ click("clear", async () => { await call("POST", `${base()}/clear-faults`); log("
 
 const kind = () => document.querySelector("input[name=kind]:checked").value;
 const send = async (value) => {
-  if (isStale()) { log("nothing is sent while the values shown are old", true); return; }
-  const of = thruster, applied = await call("PUT", `${base()}/setpoint`, { [kind()]: value });
-  if (thruster === of) { $("entry").value = value; $("slider").value = value; }
+  if (isStale()) { refused("nothing is sent while the values shown are old"); return; }
+  const of = thruster, applied = await call("PUT", `${base()}/setpoint`, { [kind()]: value }).catch((error) => { showRange(value); throw error; });
+  if (thruster === of) { $("entry").value = value; $("slider").value = value; entered = false; showRange(); }
   return applied;
 };
 click("send", async () => {
-  if ($("entry").value === "") { log("nothing is sent: the setpoint is no number", true); return; }
+  if ($("entry").value === "") { refused("nothing is sent: the setpoint is no number"); return; }
   const value = Number($("entry").value), of = thruster; await send(value); log(`setpoint of ${of}: ${kind()} = ${value}`);
 });
 click("zero-button", async () => { $("entry").value = 0; $("slider").value = 0; await send(0); log("setpoint zero"); });
 $("entry").addEventListener("keydown", (event) => { if (event.key === "Enter") $("send").click(); });
 // The slider proposes, Send (or Enter) commands: a key such as End must not mean full thrust by itself.
-$("slider").addEventListener("input", () => { $("entry").value = $("slider").value; });
+let entered = false; // something that was not sent yet: it stays
+$("slider").addEventListener("input", () => { entered = true; $("entry").value = $("slider").value; showRange(); });
 $("slider").addEventListener("keydown", (event) => { if (event.key === "Enter") $("send").click(); });
-$("entry").addEventListener("input", () => { $("slider").value = $("entry").value; });
-document.querySelectorAll("input[name=kind]").forEach((radio) => radio.addEventListener("change", showKind));
+$("entry").addEventListener("input", () => { entered = true; $("slider").value = $("entry").value; showRange(); });
+document.querySelectorAll("input[name=kind]").forEach((radio) => radio.addEventListener("change", () => { entered = true; showKind(); }));
 // What is in force when the page begins is what it proposes.
 function proposeInForce() {
   const named = Object.keys(state.setpoint ?? {})[0], radio = document.querySelector(`input[name=kind][value=${named}]`);
   if (radio) radio.checked = true;
   showKind();
 }
+// A page that does not command goes on to show what is in force, until something is entered.
+function followInForce() { if (Number($("entry").value) !== inForce() || !(kind() in state.setpoint)) proposeInForce(); }
+const inForce = () => Number((state?.setpoint?.[kind()] ?? 0).toFixed(2)); // the field shows no more digits
 function showKind() {
   showBounds();
-  const now = state?.setpoint?.[kind()] ?? 0;
-  $("slider").value = now; $("entry").value = now;
+  $("slider").value = inForce(); $("entry").value = inForce();
 }
 function showBounds() {
   const bound = limitsOf?.[kind()] ?? 100;
@@ -265,53 +284,23 @@ function showBounds() {
   $("slider").min = -end; $("slider").max = end; $("slider").step = step;
   $("entry").min = -bound; $("entry").max = bound;
   $("slider").value = $("entry").value;
+  showRange();
 }
-
-let lawChanges = 0; // an answer asked for before a change was made shows what was before
-async function loadController() {
-  const of = thruster, asked = lawChanges, answer = await call("GET", `${base()}/controller`);
-  if (thruster !== of) return;
-  if (lawChanges !== asked) return loadController();
-  $("controller").dataset.running = answer.controller;
-  for (const [id, names, chosen] of [["controller", answer.available, answer.controller], ["observer", answer.observers, answer.observer], ["estimator", answer.estimators, answer.estimator]]) {
-    $(id).replaceChildren(...names.map((name) => new Option(name, name, false, name === chosen)));
-  }
-  $("law-parameters").replaceChildren(...answer.parameters.map((p) => {
-    const range = `${p.low} to ${p.high}`;
-    const entry = Object.assign(document.createElement("input"), { type: "number", step: "any", value: p.value, min: p.low, max: p.high, ariaLabel: `${p.name} in ${p.unit}, ${range}` });
-    entry.addEventListener("change", () => { // an emptied field is no zero
-      if (entry.value === "") { entry.value = p.value; return; }
-      const value = Number(entry.value);
-      lawChanges += 1;
-      call("PUT", `${base()}/controller`, { parameters: { [p.name]: value } })
-        .then(() => { lawChanges += 1; p.value = value; log(`${p.name} = ${value}${p.unit === "1" ? "" : ` ${p.unit}`}`); }).catch(() => { entry.value = p.value; });
-    });
-    const small = Object.assign(document.createElement("small"), { textContent: range });
-    return cells([[p.name, document.createElement("br"), small], entry, p.unit]);
-  }));
+// The range stands beside the entry; louder where the setpoint that was sent is beyond it.
+function showRange(sent = 0) {
+  const bound = limitsOf?.[kind()], beyond = Math.abs(sent) > bound;
+  says("range-text", bound === undefined ? "" : `${beyond ? "refused: " : ""}allowed is −${bound} to ${bound} ${$("unit").textContent}`);
+  $("range-text").className = beyond ? "warn-text" : "quiet"; $("entry").setAttribute("aria-invalid", String(beyond));
 }
-click("switch", async () => {
-  const answer = await call("PUT", `${base()}/controller`, { controller: $("controller").value, observer: $("observer").value, estimator: $("estimator").value });
-  log(`control law ${answer.controller}, observer ${answer.observer}, estimator ${answer.estimator}`);
-});
-// Tuned values go to a file and come from one: the same that kort.toml and kort soak take.
-click("controller-save", async () => {
-  const answer = await fetch(`${base()}/controller/file`, { headers: token ? { Authorization: `Bearer ${token}` } : {} });
-  if (!answer.ok) { log(`controller file: ${(await answer.json()).detail ?? answer.status}`, true); return; }
-  const name = /filename="([^"]+)"/.exec(answer.headers.get("content-disposition") ?? "")?.[1] ?? `${thruster}-controller.toml`;
-  save(name, await answer.blob()); log(`controller saved as ${name}`);
-});
-$("controller-load").addEventListener("click", () => $("controller-file").click());
-$("controller-file").addEventListener("change", async () => {
-  const file = $("controller-file").files[0];
-  if (!file) return;
-  $("controller-file").value = "";
-  await call("PUT", `${base()}/controller/file`, { toml: await file.text() })
-    .then((answer) => { log(`${file.name} is in force: ${answer.controller}`); setTimeout(() => loadController().catch(() => {}), 500); }).catch(() => {});
-});
 
 // Event log ------------------------------------------------------------------------------------------------
 let lastEvent = 0, eventsComing = null;
+// A stop of this page goes out by two ways, and the service tells of each: shown is one of the two.
+const stopsSent = [], STOP_TOLD_MS = 3000;
+function isTold(event) {
+  const of = event.kind === "stopped" && stopsSent.find((stop) => stop.told < stop.ways && Math.abs(Date.parse(event.time) - stop.at_ms) < STOP_TOLD_MS && (stop.who ??= event.who) === event.who);
+  return Boolean(of) && ++of.told > 1;
+}
 // One request at a time: two on their way at once would both bring what came since the last.
 function loadEvents() { return (eventsComing ??= newEvents().finally(() => { eventsComing = null; })); }
 async function newEvents() {
@@ -319,6 +308,8 @@ async function newEvents() {
   for (const event of events) {
     if (event.id <= lastEvent) continue; // shown already
     lastEvent = event.id;
+    seenRevision(event);
+    if (isTold(event)) continue;
     const item = document.createElement("li");
     item.textContent = `${new Date(event.time).toLocaleTimeString()}  ${event.thruster ?? "all"}  ${event.detail}`;
     if (["tripped", "fault_inherited", "process_ended", "process_hung", "recording_ended"].includes(event.kind)) item.className = "bad";
@@ -332,24 +323,14 @@ click("pause", async () => {
   paused_s = paused_s === null && state ? state.time_s : null;
   $("pause").textContent = paused_s === null ? "Pause plots" : "Go on";
 });
-$("thruster").addEventListener("change", () => choose($("thruster").value));
-async function choose(id) {
-  if (lease) held.set(thruster, lease); // what one commands goes on while one looks at another
-  thruster = id; lease = held.get(id) ?? null; taken_ms = performance.now(); held.delete(id);
-  disconnect(); state = null; live.clear(); // nothing that is still under way of the one before is shown, or proposed, as this one's
-  limitsOf = null; // nobody's, until the thruster told its own: a signal is not previewed within another's
-  connect();
-  const { range } = await call("GET", base());
-  if (thruster !== id) return; // another was chosen meanwhile
-  limitsOf = range; showBounds(); showFields();
-  loadHistory().catch(() => {}); await loadController();
-}
 $("login").addEventListener("submit", (event) => {
   event.preventDefault();
   token = $("token").value.trim();
   sessionStorage.setItem("kort-token", token);
   location.reload();
 });
+// How high the line that stays on top is: what is scrolled to stands below it.
+new ResizeObserver(([header]) => document.documentElement.style.setProperty("--head", `${header.target.offsetHeight}px`)).observe(document.querySelector("header"));
 async function start() {
   $("tiles").replaceChildren(...TILES.map(([name, unit]) => {
     const tile = document.createElement("div");

@@ -19,6 +19,13 @@ const LEVEL = "1 = alarm"; // unit of the paths' levels
 const TITLES = { [LEVEL]: "mismatch", N: "thrust", "rad/s": "shaft speed", A: "motor current", "m/s": "axial flow", V: "voltage", "N m": "torque", "°C": "temperature", 1: "shares", rad: "angle", m: "depth" };
 const IDS = { N: "plot-thrust", "rad/s": "plot-speed", A: "plot-current", "m/s": "plot-flow" };
 const HUES = ["--blue", "--orange", "--green", "--purple", "--red"];
+// Of two runs the second has colours and a line of its own: what is commanded is dashed in the first already.
+const SECOND_DASH = [10, 3, 2, 3];
+// A name without its unit at the end, in words.
+function plainName(name, unit) {
+  const end = `_${(unit ?? "").toLowerCase().replace("^", "").replace(/[^a-z0-9]+/g, "_")}`, found = [end, end.replace("_n_m_", "_nm_")].find((one) => one.length > 1 && name.endsWith(one));
+  return (found ? name.slice(0, -found.length) : name).replaceAll("_", " ");
+}
 const shownSignals = new Set(SIGNALS.filter((signal) => signal[5]).map(([name]) => name));
 
 // Columns over time. Nothing measured is null: a gap.
@@ -33,6 +40,12 @@ class Columns {
     for (const [name] of SIGNALS) this.of(name).push((name === "thrust_error_n" ? error : row[name]) ?? null);
     this.t.push(t);
     if (this.t.length > LIVE_POINTS) { this.t.splice(0, 2000); for (const name in this.c) this.c[name].splice(0, 2000); }
+  }
+  // Rows that were missing, put where they belong.
+  insert(place, part) {
+    for (const name in part.c) this.of(name);
+    this.t.splice(place, 0, ...part.t);
+    for (const name in this.c) this.c[name].splice(place, 0, ...part.of(name));
   }
   // A column as it is drawn; of a recording, which grows no more, without the rows between seldom samples.
   line(name) { return this.done ? (this.lines[name] ??= bridge(this.t, this.of(name))) : this.of(name); }
@@ -155,7 +168,8 @@ class Chart {
       this.plot.setCursor({ left, top: this.plot.over.clientHeight / 2 }, true, true);
       const { idx } = this.plot.cursor;
       const said = this.plot.series.flatMap((series, k) => (series.show && k > 0 ? [`${series.label} ${text(this.plot.data[k][idx], 2)}`] : []));
-      says("cursor-text", `${text(this.plot.data[0][idx], 2)} s: ${said.join(", ")} ${this.unit}`);
+      const t = this.plot.data[0][idx], clock = clockAt(t);
+      says("cursor-text", `${text(t, 2)} s: ${said.join(", ")}${clock ? `, at ${clock}, in` : ""} ${this.unit}`);
     } else if (closer) {
       const { left } = this.plot.cursor;
       zoomBy(closer, left >= 0 ? left / this.plot.over.clientWidth : 0.5);
@@ -182,12 +196,12 @@ class Chart {
     else return;
     event.preventDefault();
   }
-  // Series: each signal of run A and of run B; what is compared is dashed.
+  // Series: each signal of run A and of run B.
   build() {
     const css = getComputedStyle(document.documentElement), color = (name) => css.getPropertyValue(name).trim();
     const axis = { stroke: color("--quiet"), grid: { stroke: color("--grid"), width: 1 }, ticks: { show: false }, font: "12px system-ui, 'DejaVu Sans', sans-serif" };
     const series = (second) => this.signals.map(([, , label, hue, dash]) => ({
-      label: second ? `${label}, B` : label, stroke: color(hue), width: 1.5, dash: second ? [2, 4] : dash, points: { show: false },
+      label: second ? `${label}, B` : label, stroke: color(second ? `${hue}-b` : hue), width: 1.5, dash: second ? SECOND_DASH : dash, points: { show: false },
       value: (_, v) => text(v, 2),
     }));
     // Between the two sides of an estimate's standard error.
@@ -199,7 +213,7 @@ class Chart {
       cursor: { sync: { key: "kort" }, drag: { x: true, y: false, setScale: false } },
       scales: { x: { time: false }, y: { range: (u, low, high) => this.range(low, high) } },
       axes: [{ ...axis, size: 32, gap: 9, values: (_, ticks) => ticks.map((t) => `${+t.toFixed(2)} s`) }, { ...axis, size: 52 }],
-      series: [{ label: "time", value: (_, t) => (t === null || t === undefined ? "–" : `${t.toFixed(2)} s`) }, ...series(false), ...series(true)],
+      series: [{ label: "time", value: (_, t) => (t === null || t === undefined ? "–" : [`${t.toFixed(2)} s`, clockAt(t)].filter((words) => words).join(", ")) }, ...series(false), ...series(true)],
       hooks: { setSelect: [(u) => {
         if (u.select.width < 4) return;
         zoomTo(u.posToVal(u.select.left, "x"), u.posToVal(u.select.left + u.select.width, "x"));
@@ -229,6 +243,7 @@ class Chart {
         const on = shownSignals.has(name);
         this.plot.setSeries(i + 1, { show: on && !difference }, false);
         this.plot.setSeries(i + 1 + this.signals.length, { show: on && both }, false);
+        this.plot.series[i + 1 + this.signals.length].dash = difference ? [] : SECOND_DASH; // alone it needs no dash
         // uPlot gives every series its row of the legend; those that are not asked for are no use there.
         const rows = this.box.querySelectorAll(".u-series");
         const [mine, theirs] = [rows[i + 1], rows[i + 1 + this.signals.length]];
@@ -276,12 +291,12 @@ function estimatesRow(estimates) {
   const row = {}, doubts = {};
   for (const [name, unit, v] of estimates) {
     if (name.endsWith(DOUBT)) { doubts[name.slice(0, -DOUBT.length)] = [v, unit]; continue; }
-    const words = name.replace(/^(estimated|mismatch)_/, "").replaceAll("_", " ");
+    const words = plainName(name.replace(/^(estimated|mismatch)_/, ""), unit);
     if (name.startsWith("mismatch_")) addSignal(name, LEVEL, words); else addSignal(name, unit, name.startsWith("estimated_") ? `${words}, estimated` : words);
     row[name] = v;
   }
   for (const [name, [doubt, unit]] of Object.entries(doubts)) {
-    const v = row[name] ?? null, side = SIDES[name] ?? name, words = name.slice(10).replaceAll("_", " ");
+    const v = row[name] ?? null, side = SIDES[name] ?? name, words = plainName(name.slice(10), unit);
     addSignal(`${side}_low`, unit, `${words} − σ`, name); addSignal(`${side}_high`, unit, `${words} + σ`, name);
     if (doubt === null || v === null) continue;
     row[`${side}_low`] = v - doubt; row[`${side}_high`] = v + doubt;
@@ -300,6 +315,30 @@ function estimatesAt({ time_s, columns }) {
   };
 }
 const live = new Columns();
+
+// The servo's seconds on the wall clock. The browser's clock may be wrong: the gateway tells its own in every answer, in whole seconds
+// (Date), and what all answers allow is soon known to some milliseconds. A state is as old as it says, and its way to here: the quickest counts.
+const clock = { ahead_ms: [-Infinity, Infinity], zero_ms: null };
+function heardDate(date, sent_ms) {
+  const at_ms = Date.parse(date ?? ""), told = [at_ms - Date.now(), at_ms + 1000 - sent_ms];
+  if (!Number.isFinite(at_ms)) return;
+  const both = [Math.max(told[0], clock.ahead_ms[0]), Math.min(told[1], clock.ahead_ms[1])];
+  clock.ahead_ms = both[0] <= both[1] ? both : told; // a clock was set
+}
+function heardTime(s) {
+  const zero_ms = Date.now() - 1000 * (s.time_s + (s.age_s ?? 0));
+  if (clock.zero_ms === null || zero_ms < clock.zero_ms || zero_ms > clock.zero_ms + 500) clock.zero_ms = zero_ms;
+}
+const gatewayNow = () => Date.now() + (Number.isFinite(clock.ahead_ms[0]) ? (clock.ahead_ms[0] + clock.ahead_ms[1]) / 2 : 0);
+const servoAt = (wall_ms) => (clock.zero_ms === null ? null : (wall_ms - (gatewayNow() - Date.now()) - clock.zero_ms) / 1000);
+// Where the plots' time begins on the wall clock; of two runs there are two such times, and none is said.
+const wallZero = () => (run ? (run.b ? null : run.zero_ms ?? null) : clock.zero_ms === null ? null : clock.zero_ms + gatewayNow() - Date.now());
+function clockAt(t) {
+  const zero_ms = wallZero();
+  if (zero_ms === null || t === null || t === undefined) return "";
+  return new Date(zero_ms + 1000 * t).toLocaleTimeString(undefined, { hour: "2-digit", minute: "2-digit", second: "2-digit", fractionalSecondDigits: 1 });
+}
+
 let zoomed = null; // [from_s, to_s], or none: the usual window
 function zoomTo(from_s, to_s) {
   zoomed = from_s === null ? null : [from_s, to_s];
@@ -316,52 +355,4 @@ function panBy(share) {
   const first_s = Math.min(whole_from, a.t[0] ?? whole_from), last_s = Math.max(whole_to, a.t.at(-1) ?? whole_to, b?.t.at(-1) ?? whole_to);
   const begin_s = Math.max(first_s, Math.min(last_s - span_s, from_s + share * span_s));
   if (Math.abs(begin_s - from_s) > 1e-6 * span_s) zoomTo(begin_s, begin_s + span_s);
-}
-
-// What is shown, as a table and as a picture.
-function save(name, blob) {
-  const url = URL.createObjectURL(blob);
-  Object.assign(document.createElement("a"), { href: url, download: name }).click();
-  setTimeout(() => URL.revokeObjectURL(url), 1000);
-}
-function tableOf({ a, b, difference, less }, from_s, to_s) {
-  const names = SIGNALS.map(([name]) => name).filter((name) => shownSignals.has(name));
-  const parts = [["", a], ...(b ? [["b_", b]] : []), ...(difference ? [["difference_", less]] : [])];
-  const rows = [["time_s", ...parts.flatMap(([before]) => names.map((name) => `${before}${name}`))].join(",")];
-  for (let i = lowerBound(a.t, from_s); i < a.t.length && a.t[i] <= to_s; i += 1) {
-    rows.push([a.t[i], ...parts.flatMap(([, of]) => names.map((name) => of.of(name)[i]))].map((v) => v ?? "").join(","));
-  }
-  return `${rows.join("\n")}\n`;
-}
-// Words one after the other in lines of this width: [words, hue, left, line].
-function inLines(pen, words, width, edge, gap) {
-  let left = edge, line = 0;
-  return words.map(([said, hue]) => {
-    const wide = pen.measureText(said).width;
-    if (left > edge && left + wide > width - edge) { left = edge; line += 1; }
-    const placed = [said, hue, left, line];
-    left += wide + gap;
-    return placed;
-  });
-}
-function pictureOf({ b, difference }) {
-  const of = !b ? "" : difference ? ", B − A" : ", B dashed", scale = window.devicePixelRatio || 1, line = 20 * scale;
-  const sheet = document.createElement("canvas"), pen = sheet.getContext("2d"), css = getComputedStyle(document.documentElement);
-  const font = `${13 * scale}px system-ui, sans-serif`, shown = charts.filter((chart) => !chart.figure.hidden && chart.plot);
-  pen.font = font;
-  const parts = shown.map((chart) => {
-    const { canvas } = chart.plot.ctx, signals = chart.signals.filter((signal) => shownSignals.has(signal[0]));
-    const words = inLines(pen, [[`${chart.title} [${chart.unit}]${of}`, "--ink"], ...signals.map(([, , label, hue]) => [label, hue])], canvas.width, 6 * scale, 12 * scale);
-    return { canvas, words, above: (words.at(-1)[3] + 1) * line + 4 * scale };
-  });
-  sheet.width = Math.max(...parts.map((part) => part.canvas.width)); sheet.height = parts.reduce((sum, part) => sum + part.above + part.canvas.height, 0);
-  pen.fillStyle = css.getPropertyValue("--card"); pen.fillRect(0, 0, sheet.width, sheet.height);
-  pen.font = font; // a canvas that is sized begins anew
-  let top = 0;
-  for (const { canvas, words, above } of parts) {
-    for (const [said, hue, left, row] of words) { pen.fillStyle = css.getPropertyValue(hue); pen.fillText(said, left, top + row * line + 16 * scale); }
-    pen.drawImage(canvas, 0, top + above);
-    top += above + canvas.height;
-  }
-  return new Promise((done) => sheet.toBlob(done, "image/png"));
 }

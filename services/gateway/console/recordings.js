@@ -1,11 +1,11 @@
 "use strict";
 // Recordings over the plots: one played back, or two compared; live again at a click.
-let run = null; // { a, b, names, at_s, playing, difference }, of two runs also what is drawn of them: { lines }
+let run = null; // { a, b, names, at_s, playing, difference }, of one its time on the wall: { zero_ms }, of two what is drawn of them: { lines }
 
 async function fetchRun(name) {
   const asked = async (what) => {
     const answer = await fetch(`/v1/recordings/${encodeURIComponent(name)}${what}`, { headers: token ? { Authorization: `Bearer ${token}` } : {} });
-    if (!answer.ok) { log(`recording ${name}: ${(await answer.json()).detail ?? answer.status}`, true); throw new Error(name); }
+    if (!answer.ok) { refused(`recording ${name}: ${(await answer.json()).detail ?? answer.status}`); throw new Error(name); }
     return answer;
   };
   const answer = await asked("?format=csv");
@@ -30,15 +30,24 @@ function showRun(next) {
   $("run").hidden = !run;
   document.body.classList.toggle("past", Boolean(run));
   if (!run) return;
-  const told = (columns, name) => { const error = columns.rms("thrust_error_n"); return `${name} (${lengthOf(columns).toFixed(1)} s${error === null ? "" : `, thrust error ${error.toFixed(2)} N rms`})`; };
-  says("run-text", run.b ? `A: ${told(run.a, run.names[0])} · B, dashed: ${told(run.b, run.names[1])}` : `Not live: ${told(run.a, run.names[0])}`);
+  tellRun();
   $("run-at").max = endOf(run); $("run-at").value = 0; $("difference").checked = false;
   $("difference").parentElement.hidden = !run.b; $("run-play").textContent = "Play";
 }
-async function replay(name) { showRun({ a: await fetchRun(name), b: null, names: [name], at_s: null, playing: null, difference: false }); }
+// What the plots show, as it is drawn now.
+function tellRun() {
+  const told = (columns, name) => { const error = columns.rms("thrust_error_n"); return `${name} (${lengthOf(columns).toFixed(1)} s${error === null ? "" : `, thrust error ${error.toFixed(2)} N rms`})`; };
+  const [a, b] = [told(run.a, run.names[0]), run.b && told(run.b, run.names[1])];
+  const words = !b ? `Not live: ${a}` : run.difference ? `B − A: ${b} less ${a}` : `A: ${a} · B, dash-dotted and in colours of its own: ${b}`;
+  says("run-text", `${words}${run.words ? `. ${run.words}` : ""}`);
+}
+async function replay(name) {
+  const [a, { started }] = await Promise.all([fetchRun(name), call("GET", `/v1/recordings`).then((list) => list.find((item) => item.name === name) ?? {})]);
+  showRun({ a, b: null, names: [name], at_s: null, playing: null, difference: false, zero_ms: started ? Date.parse(started) : null });
+}
 async function compare(name) {
-  if (!run) { log("show a recording first, then compare another with it", true); return; }
-  showRun({ ...run, b: await fetchRun(name), names: [run.names[0], name], at_s: null, playing: null, difference: false });
+  if (!run) { refused("show a recording first, then compare another with it"); return; }
+  showRun({ ...run, words: "", b: await fetchRun(name), names: [run.names[0], name], at_s: null, playing: null, difference: false });
 }
 // What the plots show now, and between which instants if nothing is zoomed.
 function wholeNow() {
@@ -68,15 +77,67 @@ $("run-play").addEventListener("click", () => {
 });
 $("run-speed").addEventListener("change", () => { if (run?.playing) run.playing = { from_s: run.at_s, at_ms: performance.now() }; });
 $("run-at").addEventListener("input", () => { stopRun(); run.at_s = Number($("run-at").value); });
-$("difference").addEventListener("change", () => { run.difference = $("difference").checked; });
+$("difference").addEventListener("change", () => { run.difference = $("difference").checked; tellRun(); });
 $("run-whole").addEventListener("click", () => { stopRun(); run.at_s = null; zoomTo(null, null); });
 $("run-live").addEventListener("click", () => showRun(null));
 
 // The tools of the plots.
 $("zoom-out").addEventListener("click", () => zoomTo(null, null));
 $("fix-y").addEventListener("change", () => charts.forEach((chart) => chart.fix($("fix-y").checked)));
-$("save-csv").addEventListener("click", () => { const [source, from_s, to_s] = shownNow(); save(`${thruster}-plots.csv`, new Blob([tableOf(source, from_s, to_s)], { type: "text/csv" })); });
-$("save-png").addEventListener("click", async () => save(`${thruster}-plots.png`, await pictureOf(shownNow()[0])));
+$("save-csv").addEventListener("click", () => { const [source, from_s, to_s] = shownNow(); save(`${namedBy(from_s)}.csv`, new Blob([tableOf(source, from_s, to_s)], { type: "text/csv" })); });
+$("save-png").addEventListener("click", async () => { const shown = shownNow(); save(`${namedBy(shown[1])}.png`, await pictureOf(...shown)); });
+// What is shown, as a table and as a picture.
+function save(name, blob) {
+  const url = URL.createObjectURL(blob);
+  Object.assign(document.createElement("a"), { href: url, download: name }).click();
+  setTimeout(() => URL.revokeObjectURL(url), 1000);
+}
+// A saved file says in its name when it was that it begins, in universal time: its rows count the servo's seconds.
+function namedBy(from_s) {
+  const zero_ms = wallZero(), at = zero_ms === null ? "" : `-${new Date(zero_ms + 1000 * from_s).toISOString().replace(/[-:]|\.\d+/g, "")}`;
+  return `${thruster}-plots${at}`;
+}
+function tableOf({ a, b, difference, less }, from_s, to_s) {
+  const names = SIGNALS.map(([name]) => name).filter((name) => shownSignals.has(name));
+  const parts = [["", a], ...(b ? [["b_", b]] : []), ...(difference ? [["difference_", less]] : [])];
+  const rows = [["time_s", ...parts.flatMap(([before]) => names.map((name) => `${before}${name}`))].join(",")];
+  for (let i = lowerBound(a.t, from_s); i < a.t.length && a.t[i] <= to_s; i += 1) {
+    rows.push([a.t[i], ...parts.flatMap(([, of]) => names.map((name) => of.of(name)[i]))].map((v) => v ?? "").join(","));
+  }
+  return `${rows.join("\n")}\n`;
+}
+// Words one after the other in lines of this width: [words, hue, left, line].
+function inLines(pen, words, width, edge, gap) {
+  let left = edge, line = 0;
+  return words.map(([said, hue]) => {
+    const wide = pen.measureText(said).width;
+    if (left > edge && left + wide > width - edge) { left = edge; line += 1; }
+    const placed = [said, hue, left, line];
+    left += wide + gap;
+    return placed;
+  });
+}
+function pictureOf({ b, difference }, from_s, to_s) {
+  const times = [from_s, to_s].map((t) => clockAt(t)).filter((words) => words), of = `${!b ? "" : difference ? ", B − A" : ""}${times.length ? `, ${times.join(" to ")}` : ""}`, scale = window.devicePixelRatio || 1, line = 20 * scale;
+  const sheet = document.createElement("canvas"), pen = sheet.getContext("2d"), css = getComputedStyle(document.documentElement);
+  const font = `${13 * scale}px system-ui, sans-serif`, shown = charts.filter((chart) => !chart.figure.hidden && chart.plot);
+  pen.font = font;
+  const parts = shown.map((chart) => {
+    const { canvas } = chart.plot.ctx, signals = chart.signals.filter((signal) => shownSignals.has(signal[0]));
+    const words = inLines(pen, [[`${chart.title} [${chart.unit}]${of}`, "--ink"], ...signals.flatMap(([, , label, hue]) => [...(difference ? [] : [[label, hue]]), ...(b ? [[`${label}, ${difference ? "B − A" : "B"}`, `${hue}-b`]] : [])])], canvas.width, 6 * scale, 12 * scale);
+    return { canvas, words, above: (words.at(-1)[3] + 1) * line + 4 * scale };
+  });
+  sheet.width = Math.max(...parts.map((part) => part.canvas.width)); sheet.height = parts.reduce((sum, part) => sum + part.above + part.canvas.height, 0);
+  pen.fillStyle = css.getPropertyValue("--card"); pen.fillRect(0, 0, sheet.width, sheet.height);
+  pen.font = font; // a canvas that is sized begins anew
+  let top = 0;
+  for (const { canvas, words, above } of parts) {
+    for (const [said, hue, left, row] of words) { pen.fillStyle = css.getPropertyValue(hue); pen.fillText(said, left, top + row * line + 16 * scale); }
+    pen.drawImage(canvas, 0, top + above);
+    top += above + canvas.height;
+  }
+  return new Promise((done) => sheet.toBlob(done, "image/png"));
+}
 function showPicker() {
   document.querySelector(".plots").append(...charts.map((chart) => chart.figure).filter((figure) => !figure.isConnected));
   $("signals").replaceChildren(...charts.map((chart) => {
@@ -94,15 +155,15 @@ function showPicker() {
 showPicker();
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { charts.forEach((chart) => { if (chart.plot) chart.build(); }); preview(); });
 
-// What the gateway has kept: with it the plots begin, and a hole that a lost connection left is filled.
+// Rows that the gateway has kept, of those instants that `within` takes once they are here; with what was estimated then.
+async function rowsKept(last_s, hz, within) {
+  const kept = await call("GET", `${base()}/history?last_s=${last_s}&hz=${hz}`), part = new Columns(), names = Object.keys(kept.columns), estimated = estimatesAt(kept.estimates);
+  kept.time_s.forEach((t, i) => { if (within(t)) part.push(t, { ...Object.fromEntries(names.map((name) => [name, kept.columns[name][i]])), ...estimated(t) }); });
+  return part;
+}
+// With them the plots begin, and a hole that a lost connection left is filled.
 async function loadHistory(from_s, to_s) {
-  const of = thruster, last_s = from_s === undefined ? 600 : Math.min(600, Math.ceil(state.time_s - from_s) + 2);
-  const kept = await call("GET", `${base()}/history?last_s=${last_s}&hz=25`), part = new Columns(), names = Object.keys(kept.columns);
-  if (of !== thruster) return;
-  const until_s = to_s ?? live.t[0] ?? Infinity, estimated = estimatesAt(kept.estimates);
-  kept.time_s.forEach((t, i) => { if (t > (from_s ?? -Infinity) && t < until_s) part.push(t, { ...Object.fromEntries(names.map((name) => [name, kept.columns[name][i]])), ...estimated(t) }); });
-  const place = lowerBound(live.t, until_s);
-  for (const name in part.c) live.of(name);
-  live.t.splice(place, 0, ...part.t);
-  for (const name in live.c) live.c[name].splice(place, 0, ...part.of(name));
+  const of = thruster, last_s = from_s === undefined ? 600 : Math.min(600, Math.ceil(state.time_s - from_s) + 2), until = () => to_s ?? live.t[0] ?? Infinity;
+  const part = await rowsKept(last_s, 25, (t) => of === thruster && t > (from_s ?? -Infinity) && t < until());
+  if (of === thruster) live.insert(lowerBound(live.t, until()), part);
 }

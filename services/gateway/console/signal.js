@@ -14,6 +14,15 @@ const unitOf = (field) => (field.endsWith("_s") ? "s" : field.endsWith("_hz") ? 
 // First values are for a thruster that gives 60 N or 60 rad/s; one that does not begins with three fifths of its range.
 const scale = () => { const bound = limitsOf?.[$("signal-of").value] ?? 60; return bound < 60 ? 0.6 * bound / 60 : 1; };
 const firstOf = (name, first) => (["N", "rad/s"].includes(unitOf(name)) ? Number((first * scale()).toPrecision(3)) : first);
+// What the operator set as the limit stays, whatever is chosen beside it; only a smaller range brings it down. Emptied it is nobody's.
+let limitPut = $("signal-limit").value, limitSet = false;
+function showLimit() {
+  const entry = $("signal-limit"), bound = limitsOf?.[$("signal-of").value];
+  limitSet = entry.value !== "" && (limitSet || entry.value !== limitPut);
+  if (!limitSet) entry.value = firstOf("limit", 60);
+  else if (Number(entry.value) > bound) entry.value = bound;
+  limitPut = entry.value; $("signal-limit-unit").textContent = unitOf("limit");
+}
 let previewPlot = null, previewed = 0, scenario = null; // the chosen file: its name and text
 
 function showFields() {
@@ -24,7 +33,7 @@ function showFields() {
     label.append(`${name.replace(/_(s|hz)$/, "").replaceAll("_", " ")} `, entry, ` ${unitOf(name)}`);
     return label;
   }));
-  $("signal-limit").value = firstOf("limit", 60);
+  showLimit();
   $("signal-file").hidden = kind !== "file"; $("signal-of").disabled = kind === "experiment" || kind === "file";
   preview();
 }
@@ -92,7 +101,7 @@ $("signal-kind").replaceChildren(...Object.entries(KINDS).map(([kind, [words]]) 
 $("signal-kind").value = "staircase";
 $("signal-kind").addEventListener("change", showFields);
 $("signal-of").addEventListener("change", showFields);
-$("signal-limit").addEventListener("input", preview);
+$("signal-limit").addEventListener("input", () => { limitSet = true; preview(); });
 $("signal-file").addEventListener("change", async () => {
   const file = $("signal-file").files[0];
   if (!file) return;
