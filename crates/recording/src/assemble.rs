@@ -1,14 +1,16 @@
 //! From rows of a file to a recording: names, units, time, maps. The same for every format.
 
+mod clock;
+
 use std::cmp::Reverse;
 
 use crate::cell::Cell;
 use crate::columns::{self, nearest};
-use crate::dates::Dates;
 use crate::error::{Place, Problem};
 use crate::log::{Back, longest_is_read};
-use crate::map::{ColumnMap, Mapped, Stamps, Time};
+use crate::map::{ColumnMap, Mapped, Time};
 use crate::recording::{Column, Recording};
+use clock::{Clock, SECONDS};
 
 /// Name of the first column where rows come from a log of messages with a clock of its own.
 pub(crate) const CLOCK: &str = "the log's clock";
@@ -37,49 +39,8 @@ pub(crate) struct Assembler<'m> {
 }
 
 enum TimeColumn {
-    Stamps { index: usize, clock: Clock, drop_stale: bool },
+    Stamps { index: usize, of_day: Option<usize>, clock: Clock, drop_stale: bool },
     Settled { settle_s: f64 },
-}
-
-/// What the stamps are.
-enum Clock {
-    Numbers { to_s: f64 },
-    Dates(Dates),
-}
-
-/// Stamps of our own, and those of a log of messages.
-const SECONDS: Clock = Clock::Numbers { to_s: 1.0 };
-
-impl Clock {
-    fn of(stamps: Stamps) -> Self {
-        match stamps {
-            Stamps::Numbers { to_s } => Clock::Numbers { to_s },
-            Stamps::Dates { order } => Clock::Dates(Dates::new(order)),
-        }
-    }
-
-    /// A stamp, in the file's unit; NaN for an empty cell.
-    fn read(&mut self, place: Place, column: &str, cell: Cell<'_>, comma: bool) -> Result<f64, Problem> {
-        match self {
-            Clock::Numbers { .. } => cell.number(place, column, comma),
-            Clock::Dates(dates) => dates.take(place, column, cell),
-        }
-    }
-
-    fn to_s(&self) -> f64 {
-        match self {
-            Clock::Numbers { to_s } => *to_s,
-            Clock::Dates(_) => 1.0,
-        }
-    }
-
-    /// Two stamps one after the other, as the file has them.
-    fn said(&self, before: f64, now: f64) -> [String; 2] {
-        match self {
-            Clock::Numbers { .. } => [before, now].map(|stamp| stamp.to_string()),
-            Clock::Dates(dates) => dates.newest_two(),
-        }
-    }
 }
 
 /// One column to fill, from one source column.
@@ -116,11 +77,7 @@ impl<'m> Assembler<'m> {
     /// Takes one row; `cell(i)` is the row's cell of source column `i`.
     pub(crate) fn push<'c>(&mut self, place: Place, cell: impl Fn(usize) -> Cell<'c>) -> Result<(), Problem> {
         if let Some((index, wanted, seen)) = &mut self.select {
-            let text = match cell(*index) {
-                Cell::Text(text) => text.to_string(),
-                Cell::Number(x) => x.to_string(),
-                Cell::Empty => String::new(),
-            };
+            let text = cell(*index).text();
             if text != *wanted {
                 if seen.len() < 40 && !seen.contains(&text) {
                     seen.push(text);
@@ -130,9 +87,10 @@ impl<'m> Assembler<'m> {
         }
         let time_s = match &mut self.time {
             TimeColumn::Settled { settle_s } => self.rows as f64 * *settle_s,
-            TimeColumn::Stamps { index, clock, drop_stale } => {
+            TimeColumn::Stamps { index, of_day, clock, drop_stale } => {
                 let column = &self.source[*index];
-                let raw = clock.read(place, column, cell(*index), self.decimal_comma)?;
+                let beside = of_day.map(|of_day| (self.source[of_day].as_str(), cell(of_day)));
+                let raw = clock.read(place, (column, cell(*index)), beside, self.decimal_comma)?;
                 if raw.is_nan() {
                     return Err(Problem::TimeEmpty { place, column: column.clone() });
                 }
@@ -236,8 +194,9 @@ impl<'m> Assembler<'m> {
             recording.losses.push(format!("{rows} row(s) with a stale time stamp skipped"));
         }
         if let TimeColumn::Stamps { clock, .. } = &self.time {
-            if let Clock::Dates(dates) = clock {
+            if let Some(dates) = clock.dates() {
                 recording.notes.push(format!("time_s counts from {}", dates.first()));
+                recording.notes.extend(dates.midnights());
             }
             count_from_the_first(&mut recording);
             note_gaps(&mut recording);
@@ -325,7 +284,7 @@ fn native<'m>(source: &[String], recording: &mut Recording) -> Result<Plan<'m>, 
         recording.columns.push(Column::new(name.as_str(), Vec::new()));
         takes.push(Take { index, how: None, sign_of: None, command: false });
     }
-    Ok((TimeColumn::Stamps { index: time, clock: SECONDS, drop_stale: false }, None, takes))
+    Ok((TimeColumn::Stamps { index: time, of_day: None, clock: SECONDS, drop_stale: false }, None, takes))
 }
 
 /// A foreign log through its map.
@@ -344,14 +303,15 @@ fn mapped<'m>(source: &[String], map: &'m ColumnMap, recording: &mut Recording) 
         Ok(index)
     };
     let time = match &map.time {
-        Time::Column { source, stamps, drop_stale } => {
+        Time::Column { source, time_of_day, stamps, drop_stale } => {
             let (index, clock) = (find(source)?, Clock::of(*stamps));
-            TimeColumn::Stamps { index, clock, drop_stale: *drop_stale }
+            let of_day = time_of_day.as_deref().map(&mut find).transpose()?;
+            TimeColumn::Stamps { index, of_day, clock, drop_stale: *drop_stale }
         }
         Time::Settled { settle_s } => TimeColumn::Settled { settle_s: *settle_s },
         Time::Clock { .. } if source.first().is_some_and(|first| first == CLOCK) => {
             find(CLOCK)?;
-            TimeColumn::Stamps { index: 0, clock: SECONDS, drop_stale: false }
+            TimeColumn::Stamps { index: 0, of_day: None, clock: SECONDS, drop_stale: false }
         }
         Time::Clock { .. } => return Err(Problem::TableWanted { map: map.name.clone() }),
     };

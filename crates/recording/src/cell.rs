@@ -15,6 +15,15 @@ pub(crate) enum Cell<'a> {
 }
 
 impl Cell<'_> {
+    /// As text, empty if it is empty.
+    pub fn text(self) -> String {
+        match self {
+            Cell::Empty => String::new(),
+            Cell::Text(text) => text.to_owned(),
+            Cell::Number(x) => x.to_string(),
+        }
+    }
+
     /// The number in it, NaN if it is empty; place and column stand in errors.
     pub fn number(self, place: Place, column: &str, decimal_comma: bool) -> Result<f64, Problem> {
         let column = || column.to_owned();

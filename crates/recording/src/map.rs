@@ -49,6 +49,8 @@ pub enum Time {
     Column {
         /// Source column.
         source: String,
+        /// The column with the time of day, where the dates have none.
+        time_of_day: Option<String>,
         /// What they are.
         stamps: Stamps,
         /// Rows whose stamp does not come after the one before are skipped, and counted as lost.
@@ -79,6 +81,8 @@ pub enum Stamps {
         /// What a date begins with, if the map says it; else the column must tell.
         order: Option<Order>,
     },
+    /// Times of day without a date, counted from the first.
+    OfDay,
 }
 
 /// Rows of one run among several in a file.
@@ -285,11 +289,12 @@ impl ColumnMap {
     /// Source columns that a table must have.
     pub(crate) fn wanted(&self) -> Vec<&str> {
         let time = match &self.time {
-            Time::Column { source, .. } => Some(source.as_str()),
-            Time::Clock { .. } | Time::Settled { .. } => None,
+            Time::Column { source, time_of_day, .. } => vec![Some(source.as_str()), time_of_day.as_deref()],
+            Time::Clock { .. } | Time::Settled { .. } => Vec::new(),
         };
+        let time = time.into_iter().flatten();
         let columns = self.sources().filter(|(_, optional)| !optional).map(|(source, _)| source);
-        time.into_iter().chain(columns).collect()
+        time.chain(columns).collect()
     }
 
     /// Source columns that are taken as they stand, stamps too, with the unit that they are read in.

@@ -8,13 +8,15 @@ const LINE: Place = Place::Line(7);
 /// Seconds of each stamp, or what is wrong with the first that cannot be read.
 fn read(stated: Option<Order>, stamps: &[&str]) -> Result<Vec<f64>, Problem> {
     let mut dates = Dates::new(stated);
-    stamps.iter().map(|stamp| dates.take(LINE, "Zeit", Cell::Text(stamp))).collect()
+    stamps.iter().map(|stamp| dates.take(LINE, "Zeit", Stamp::Whole(stamp))).collect()
 }
 
 #[test]
 fn what_loggers_write_is_read() {
     for [first, second] in [
         ["2024-05-01 12:00:00.250", "2024-05-01 12:00:01"],
+        ["2024-05-01 12:00:00:250", "2024-05-01 12:00:01:000"],
+        ["01.05.2024 12:00:00:250000", "01.05.2024 12:00:01"],
         ["2024-05-01T12:00:00.25Z", "2024-05-01T12:00:01Z"],
         ["2024-05-01T14:00:00.25+02:00", "2024-05-01T12:00:01 UTC"],
         ["2024-05-01T14:00:00,25+0200", "2024-05-01T08:00:01-04"],
@@ -44,6 +46,8 @@ fn what_is_no_date_is_refused_with_what_is_allowed() {
         "2024-05-01 25:00:00",
         "2024-05-01 12:00:00 h",
         "2024-05-01 12:00:00.",
+        "2024-05-01 12:00:00:25",
+        "2024-05-01 12:00:00:5",
         "05.13.2024 12:00:00",
         "13:00 PM",
     ] {
@@ -82,11 +86,49 @@ fn day_and_month_are_told_apart_or_asked_for() {
 }
 
 #[test]
+fn a_time_of_day_passes_midnight_where_no_date_tells() {
+    let read = |stamps: &[Stamp]| -> Result<Vec<f64>, Problem> {
+        let mut dates = match stamps[0] {
+            Stamp::OfDay(_) => Dates::of_day(),
+            _ => Dates::new(None),
+        };
+        let read: Result<Vec<f64>, Problem> = stamps.iter().map(|s| dates.take(LINE, "Zeit", *s)).collect();
+        assert_eq!(dates.midnights().is_some(), stamps.len() == 3, "{stamps:?}");
+        read
+    };
+    for [first, second] in
+        [["23:59:59.250", "0:00:00.000"], ["23:59:59,25", "00:00"], ["11:59:59:250 PM", "12:00:00:000 am"]]
+    {
+        let later = [Stamp::OfDay(first), Stamp::OfDay(second), Stamp::OfDay("00:00:10")];
+        assert_eq!(read(&later), Ok(vec![0.0, 0.75, 10.75]), "{first}");
+        // Beside a date that stands still it is the same, beside one that goes on nothing is added.
+        let still = [first, second, "00:00:10"].map(|of_day| Stamp::InTwo("30.04.2024", of_day));
+        assert_eq!(read(&still), Ok(vec![0.0, 0.75, 10.75]), "{first}");
+        let dated = [Stamp::InTwo(" 30.04.2024", first), Stamp::InTwo("01.05.2024 ", second)];
+        assert_eq!(read(&dated), Ok(vec![0.0, 0.75]), "{first}");
+    }
+    assert_eq!(
+        read(&[Stamp::OfDay("12:00:01"), Stamp::OfDay("11:00:01")]),
+        Ok(vec![0.0, -3600.0]),
+        "set back"
+    );
+    for text in ["2024-05-01 12:00:00", "2024-05-01", "12", "12:60", "12:00:00:5", "noon"] {
+        assert!(!is_time_of_day(text), "{text}");
+        let error = Dates::of_day().take(LINE, "Zeit", Stamp::OfDay(text)).unwrap_err().to_string();
+        for part in ["line 7, column `Zeit`", text, "allowed: 12:00:00.250"] {
+            assert!(error.contains(part), "{part} in {error}");
+        }
+    }
+    assert!(is_day("2024-05-01") && is_day("31/05/2024") && is_day("31-May-2024"));
+    assert!(!is_day("2024-05-01 12:00") && !is_day("12:00") && !is_day("1.5") && !is_day(""));
+}
+
+#[test]
 fn a_survey_takes_the_nearest_time_and_proposes_the_order_that_the_whole_column_tells() {
     let through = |stamps: &[&str]| {
         let mut dates = Dates::new(None);
         let mut now_s = 0.0;
-        stamps.iter().for_each(|stamp| now_s = dates.nearest_s(stamp));
+        stamps.iter().for_each(|stamp| now_s = dates.nearest_s(Stamp::Whole(stamp)));
         (now_s, dates.proposed())
     };
     let (days_s, asked) = through(&["05/06/2024 10:00", "06/06/2024 10:00"]);

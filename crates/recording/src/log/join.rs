@@ -1,11 +1,13 @@
 //! From a log of messages to a recording: one clock, one grid of rows.
 //!
-//! The rows are the instants of one topic's messages, as a logger with that rate would have written them: a command
-//! stands from its message until the next, a measured value stands in the first row after its message and nowhere
-//! else, so that no sample is made up and none counts twice.
+//! The rows are the instants of one topic's messages, as a logger with that rate would have written them. A message belongs
+//! to the row that it comes nearest to, so that it is at most half a row early or late, and stamps that lie microseconds to
+//! this side or that of a row tell nothing. A command stands from there until the next, a measured value stands in that row
+//! and nowhere else, so that no sample is made up and none counts twice.
 
 use std::collections::BTreeMap;
 
+use super::nearness::{self, Near};
 use super::{Log, said, same_source};
 use crate::assemble::{Assembler, CLOCK};
 use crate::cell::Cell;
@@ -23,23 +25,51 @@ struct Taken<'l> {
     held: bool,
     /// Next message to look at.
     next: usize,
-    now: f64,
+    /// The value of the newest message so far, of what stands until the next.
+    standing: f64,
+    /// Messages so far that are near no row.
+    far: u64,
 }
 
 impl Taken<'_> {
-    /// The value in the row at this instant.
-    fn at(&mut self, time_s: f64) -> f64 {
-        if !self.held {
-            self.now = f64::NAN;
-        }
-        while self.stamps_s.get(self.next).is_some_and(|stamp| *stamp <= time_s) {
-            let value = self.values[self.next];
-            if value.is_finite() {
-                self.now = value;
+    /// The value in a row: of the messages that belong to it the one nearest in time, else what stands.
+    fn at(&mut self, row: &Near) -> f64 {
+        let before = self.until(row.from_s).map_or(self.standing, |(_, value)| value);
+        let mut nearest: Option<(f64, f64)> = None;
+        let mut newest = before;
+        while let Some((stamp_s, value)) = self.next_before(row.to_s) {
+            let off_s = (stamp_s - row.at_s).abs();
+            if nearest.is_none_or(|(least_s, _)| off_s < least_s) {
+                nearest = Some((off_s, value));
             }
-            self.next += 1;
+            newest = value;
         }
-        self.now
+        if self.held {
+            self.standing = newest;
+        }
+        nearest.map_or(if self.held { before } else { f64::NAN }, |(_, value)| value)
+    }
+
+    /// Passes over what comes before this instant; the last of it.
+    fn until(&mut self, end_s: f64) -> Option<(f64, f64)> {
+        let mut last = None;
+        while let Some(message) = self.next_before(end_s) {
+            self.far += u64::from(!self.held);
+            last = Some(message);
+        }
+        last.filter(|_| self.held)
+    }
+
+    /// The next message before this instant that has a value.
+    fn next_before(&mut self, end_s: f64) -> Option<(f64, f64)> {
+        while let Some(stamp_s) = self.stamps_s.get(self.next).copied().filter(|stamp_s| *stamp_s < end_s) {
+            let value = self.values[self.next];
+            self.next += 1;
+            if value.is_finite() {
+                return Some((stamp_s, value));
+            }
+        }
+        None
     }
 }
 
@@ -62,7 +92,8 @@ pub(crate) fn recording(name: &str, log: &Log, map: &ColumnMap) -> Result<Record
                 values: &of.fields[*field].values[range],
                 held: held(map, source),
                 next: 0,
-                now: f64::NAN,
+                standing: f64::NAN,
+                far: 0,
             }
         })
         .collect();
@@ -71,14 +102,20 @@ pub(crate) fn recording(name: &str, log: &Log, map: &ColumnMap) -> Result<Record
     let header = std::iter::once(CLOCK.to_string()).chain(taken.iter().map(|t| t.source.clone())).collect();
     let mut rows = Assembler::new(name, header, Some(map))?;
     let mut row = Vec::with_capacity(taken.len());
-    for (k, time_s) in stamps_s.iter().enumerate() {
+    for (k, near) in nearness::of(stamps_s).enumerate() {
         row.clear();
-        row.extend(taken.iter_mut().map(|one| one.at(*time_s)));
+        row.extend(taken.iter_mut().map(|one| one.at(&near)));
         rows.push(Place::Message(k as u64 + 1), |i| match i.checked_sub(1).map(|i| row[i]) {
-            None => Cell::Number(*time_s),
+            None => Cell::Number(near.at_s),
             Some(value) if value.is_nan() => Cell::Empty,
             Some(value) => Cell::Number(value),
         })?;
+    }
+    let mut far = BTreeMap::new();
+    for one in &mut taken {
+        one.until(f64::INFINITY);
+        let most = far.entry(one.topic).or_insert(0);
+        *most = one.far.max(*most);
     }
     let mut losses = log.losses.clone();
     losses.extend(said::other_stretches(log, grid, stretch));
@@ -87,6 +124,7 @@ pub(crate) fn recording(name: &str, log: &Log, map: &ColumnMap) -> Result<Record
     recording.unused = said::unused(log, &used);
     let mut notes = log.notes.clone();
     notes.extend(said::notes(log, &used, grid, stretch));
+    notes.extend(said::far(log, &far));
     notes.append(&mut recording.notes);
     recording.notes = notes;
     Ok(recording)
@@ -203,12 +241,64 @@ mod tests {
         assert_eq!(r.rows(), 1000);
         let speed = r.column("shaft_speed_rad_s").unwrap();
         assert_eq!(speed.iter().filter(|v| !v.is_nan()).count(), 250);
-        assert!(speed[0].is_nan() && speed[2].is_nan());
-        assert!((speed[5] - 4.0 * std::f64::consts::TAU / 60.0).abs() < 1e-9, "first row after its message");
+        assert!(speed[1].is_nan() && speed[3].is_nan());
+        assert!(
+            (speed[4] - 4.0 * std::f64::consts::TAU / 60.0).abs() < 1e-9,
+            "the row nearest to its message"
+        );
         assert!(r.column("duty_cmd").unwrap().iter().all(|v| !v.is_nan()));
         assert!(r.column("temperature_c").is_none(), "optional, and not in this log");
         assert!(r.notes.iter().any(|n| n.contains("`out` (100.0 Hz)") && n.contains("`esc[0]` (25.0 Hz)")));
         assert!(r.losses.is_empty());
+    }
+
+    /// Commands and speeds at 100 Hz, each a number of its own, the speeds so much later than the commands.
+    fn pair(later_s: f64, skipped: std::ops::Range<u32>, rows_of: Option<&str>) -> Recording {
+        let mut map = ColumnMap::from_toml("m", MAP).unwrap();
+        map.time = Time::Clock { rows_of: rows_of.map(str::to_owned) };
+        let sources: Vec<String> = map.sources().map(|(s, _)| s.to_string()).collect();
+        let mut gather = Gather::new("test", "seconds", Some(&sources));
+        let (out, esc) = (gather.topic("out"), gather.topic("esc[0]"));
+        let (control, rpm) = (gather.field(out, "control[0]", None), gather.field(esc, "rpm", None));
+        for k in 0..500 {
+            let stamp_s = 1.0 + f64::from(k) * 0.01;
+            if !skipped.contains(&k) {
+                gather.message(out, stamp_s);
+                gather.set(out, control, f64::from(k));
+            }
+            gather.message(esc, stamp_s + later_s);
+            gather.set(esc, rpm, f64::from(k));
+        }
+        recording("r", &gather.finish(), &map).unwrap()
+    }
+
+    #[test]
+    fn microseconds_to_this_side_or_that_of_a_row_decide_nothing() {
+        for later_s in [-1e-6, 0.0, 1e-6, -0.004, 0.004] {
+            for rows_of in [None, Some("out"), Some("esc")] {
+                let r = pair(later_s, 0..0, rows_of);
+                let speed = r.column("shaft_speed_rad_s").unwrap();
+                let command = r.column("duty_cmd").unwrap();
+                assert_eq!(r.rows(), 500, "{later_s} {rows_of:?}");
+                for (speed, command) in speed.iter().zip(command) {
+                    let number = speed * 60.0 / std::f64::consts::TAU;
+                    assert!((number - command).abs() < 1e-6, "{later_s}: {number} beside {command}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_measured_in_a_gap_of_the_rows_comes_into_none_of_them() {
+        let r = pair(1e-6, 200..300, None);
+        // The speeds are more: theirs are the rows, and the command stands over its gap.
+        assert_eq!((r.rows(), r.column("duty_cmd").unwrap()[299]), (500, 199.0));
+        let r = pair(1e-3, 200..300, Some("out"));
+        assert_eq!(r.rows(), 400);
+        let speed = r.column("shaft_speed_rad_s").unwrap();
+        assert!((speed[200] * 60.0 / std::f64::consts::TAU - 300.0).abs() < 1e-6, "{}", speed[200]);
+        let said = r.notes.join("; ");
+        assert!(said.contains("100 message(s) of `esc[0]` lie further than half a row"), "{said}");
     }
 
     #[test]

@@ -1,7 +1,10 @@
 //! A log of messages, as vehicles and loggers write it: topics with stamps and fields of their own.
 
 pub(crate) mod join;
-pub(crate) mod propose;
+pub(crate) mod names;
+mod nearness;
+mod propose;
+mod rules;
 mod said;
 mod shipped;
 pub(crate) mod stamps;
@@ -56,6 +59,8 @@ pub(crate) struct Log {
     pub delimiter: u8,
     /// Numbers of a table have a decimal comma.
     pub decimal_comma: bool,
+    /// A table without names: its columns are called by their places.
+    pub nameless: bool,
     /// The stamps of a table, if they are dates.
     pub dates: Option<Dates>,
     /// In the order of their first message.
@@ -194,6 +199,16 @@ impl<'w> Gather<'w> {
     /// Numbers of a table have a decimal comma.
     pub fn decimal_comma(&mut self) {
         self.log.decimal_comma = true;
+    }
+
+    /// A table has no names: its columns are called by their places.
+    pub fn nameless(&mut self) {
+        self.log.nameless = true;
+    }
+
+    /// The message under way has no stamp: it is left out, which the decoder tells.
+    pub fn unstamped(&mut self) {
+        self.skip = true;
     }
 
     /// A unit that the format tells late.

@@ -1,5 +1,7 @@
 //! What is said of how a log of messages became rows: rates, gaps, clocks, and what was left out.
 
+use std::collections::BTreeMap;
+
 use super::{Log, Topic, longest_is_read, steps};
 
 /// A topic that begins and ends so much later than the rows is said to.
@@ -58,7 +60,7 @@ fn rows(log: &Log, used: &[usize], grid: usize, stretch: usize) -> String {
     if !others.is_empty() {
         let names: Vec<String> = others.into_iter().map(|topic| rate(&log.topics[topic], stretch)).collect();
         text += &format!(
-            ", beside them {}: a command stands until its next message, a measured value in the first row after its own",
+            ", beside them {}: a message belongs to the row nearest in time, half a row early or late at most; a command stands there until its next, a measured value in that row alone",
             names.join(", ")
         );
     }
@@ -105,6 +107,17 @@ fn kin(log: &Log, used: &[usize]) -> Option<String> {
         .collect();
     (!others.is_empty())
         .then(|| format!("the log also has {}, which the map does not take", others.join(", ")))
+}
+
+/// Measured values that no row is near to: in gaps of the rows, or before the first and behind the last of them.
+pub(super) fn far(log: &Log, count: &BTreeMap<usize, u64>) -> Vec<String> {
+    let left_out = count.iter().filter(|(_, count)| **count > 0);
+    left_out
+        .map(|(topic, count)| {
+            let name = &log.topics[*topic].name;
+            format!("{count} message(s) of `{name}` lie further than half a row from every row, as in a gap of the rows, and are left out")
+        })
+        .collect()
 }
 
 /// What a reader should know of how the log became rows.

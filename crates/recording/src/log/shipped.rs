@@ -2,7 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use super::propose::{ASKED, DRIVE, words};
+use super::names::words;
+use super::rules::{ASKED, DRIVE};
 use super::survey::{Incomplete, Lack};
 use super::{Field, Log, Topic, same_source};
 use crate::map::{ColumnMap, Time};

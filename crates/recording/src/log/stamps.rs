@@ -2,28 +2,22 @@
 
 use std::fmt::Write;
 
-use super::Log;
-use super::propose::{unit_in, unit_of, words};
+use super::names::{unit_in, unit_of, words};
+use super::rules::{PULSES, has};
+use super::{Field, Log};
 use crate::dates;
 
 /// Whether a table's column looks like its stamps.
 pub(crate) fn is_time(name: &str) -> bool {
     let names = words(name);
-    const TIME: &[&str] = &[
-        "time",
-        "timestamp",
-        "stamp",
-        "t",
-        "ms",
-        "us",
-        "millis",
-        "micros",
-        "zeit",
-        "zeitstempel",
-        "messzeit",
-    ];
+    const TIME: &[&str] = &["time", "timestamp", "stamp", "t", "ms", "us", "millis", "micros"];
     names.first().is_some_and(|first| TIME.contains(&first.as_str()))
         || unit_in(name).is_some_and(|u| u.si == "s") && names.iter().any(|n| TIME.contains(&n.as_str()))
+}
+
+/// Whether nothing but the unit in its name speaks for a column of stamps; a pulse for a speed controller has one too.
+pub(crate) fn is_time_by_unit(name: &str) -> bool {
+    unit_in(name).is_some_and(|unit| unit.si == "s") && !has(&words(name), PULSES)
 }
 
 /// Factor to seconds of a table's stamps, if their name says it.
@@ -39,15 +33,24 @@ pub(crate) fn time_factor(name: &str) -> Option<f64> {
 /// What stands below `[time]` in a map for this table.
 pub(super) fn proposed(log: &Log) -> String {
     let topic = &log.topics[0];
-    let dated = |unit: &Option<String>| unit.as_deref() == Some(dates::UNIT);
-    let stamps = topic.fields.iter().find(|field| dated(&field.unit));
-    let Some(stamps) = stamps.or_else(|| topic.fields.iter().find(|field| is_time(&field.name))) else {
+    let of_unit = |unit: &str| topic.fields.iter().find(|field| field.unit.as_deref() == Some(unit));
+    let (date, of_day) = (of_unit(dates::UNIT), of_unit(dates::OF_DAY));
+    let named = || topic.fields.iter().find(|field| is_time(&field.name) && field.samples > 0);
+    let by_unit = || topic.fields.iter().find(|field| is_stamp(field));
+    let Some(stamps) = date.or(of_day).or_else(named).or_else(by_unit) else {
         return "# source = \"…\"   no column looks like a time stamp; settle_s = 2.0 instead for settled points\n".into();
     };
     let mut out = format!("source = {:?}\n", stamps.name);
     match (&log.dates, unit_of(stamps).filter(|unit| unit.si == "s")) {
+        (Some(_), _) if date.is_none() => {
+            let _ = writeln!(out, "unit = {:?}", dates::OF_DAY);
+        }
         (Some(dates), _) => {
-            let _ = write!(out, "unit = {:?}\n{}", dates::UNIT, dates.proposed());
+            let _ = writeln!(out, "unit = {:?}", dates::UNIT);
+            if let Some(of_day) = of_day {
+                let _ = writeln!(out, "time_of_day = {:?}", of_day.name);
+            }
+            out += &dates.proposed();
         }
         (None, Some(unit)) => {
             let _ = writeln!(out, "unit = {:?}", unit.symbol);
@@ -62,6 +65,11 @@ pub(super) fn proposed(log: &Log) -> String {
     out
 }
 
+fn is_stamp(field: &Field) -> bool {
+    let pulse = has(&words(&field.name), PULSES);
+    !pulse && field.samples > 0 && unit_of(field).is_some_and(|unit| unit.si == "s")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -70,8 +78,13 @@ mod tests {
     fn a_column_of_stamps_is_known_by_its_name() {
         assert!(is_time("ms_today") && is_time("t_s") && is_time("Time") && !is_time("temp"));
         assert!(
-            is_time("Zeit") && is_time("Zeit [s]") && is_time("Time (ms)") && is_time("Elapsed Time (s)")
+            is_time("Zeit")
+                && is_time("Tiempo (s)")
+                && is_time("Zeit [s]")
+                && is_time("Time (ms)")
+                && is_time("Elapsed Time (s)")
         );
+        assert!(is_time_by_unit("elapsed (s)") && !is_time_by_unit("ESC signal (µs)"));
         assert_eq!(time_factor("ms_today"), Some(1e-3));
         assert_eq!(time_factor("Time"), None);
     }

@@ -4,7 +4,8 @@ use std::io::{BufReader, Read};
 
 use serde::Serialize;
 
-use super::propose::{self, propose};
+use super::names;
+use super::propose::propose;
 use super::{Field, Log, Topic, steps};
 use crate::error::RecordingError;
 use crate::formats;
@@ -184,7 +185,7 @@ fn topic_survey(topic: &Topic, stretch: usize, column: impl Fn(usize) -> Option<
 }
 
 fn field_survey(topic: &Topic, field: &Field, column: Option<String>) -> FieldSurvey {
-    let (unit, unit_from) = match (&field.unit, propose::unit_in(&field.name)) {
+    let (unit, unit_from) = match (&field.unit, names::unit_in(&field.name)) {
         (Some(unit), _) => (Some(unit.clone()), Some("format")),
         (None, Some(unit)) => (Some(unit.symbol.to_string()), Some("name")),
         (None, None) => (None, None),

@@ -1,6 +1,9 @@
 //! `[columns.NAME]` of a column map: one of our columns and how it is made.
 
+use std::fmt;
+
 use serde::Deserialize;
+use serde::de::{Deserializer, Error, Visitor};
 
 use super::ask::Given;
 use super::read::Wrong;
@@ -17,7 +20,7 @@ pub(super) struct RawColumn {
     optional: bool,
     sign: Option<f64>,
     scale: Option<f64>,
-    divide_by: Option<String>,
+    divide_by: Option<Divisor>,
     offset: Option<f64>,
     #[serde(default)]
     table: Vec<[f64; 2]>,
@@ -25,12 +28,47 @@ pub(super) struct RawColumn {
     sign_zero: Option<f64>,
 }
 
+/// As the file has it: a number, or a text with one or with the name of one.
+struct Divisor(String);
+
+impl<'de> Deserialize<'de> for Divisor {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        struct NumberOrText;
+
+        impl Visitor<'_> for NumberOrText {
+            type Value = Divisor;
+
+            fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+                f.write_str("a number that is not 0, or the name of one asked for, as \"{pole_pairs}\"")
+            }
+
+            fn visit_str<E: Error>(self, text: &str) -> Result<Divisor, E> {
+                Ok(Divisor(text.into()))
+            }
+
+            fn visit_i64<E: Error>(self, number: i64) -> Result<Divisor, E> {
+                Ok(Divisor(number.to_string()))
+            }
+
+            fn visit_u64<E: Error>(self, number: u64) -> Result<Divisor, E> {
+                Ok(Divisor(number.to_string()))
+            }
+
+            fn visit_f64<E: Error>(self, number: f64) -> Result<Divisor, E> {
+                Ok(Divisor(number.to_string()))
+            }
+        }
+
+        from.deserialize_any(NumberOrText)
+    }
+}
+
 impl RawColumn {
     pub fn check(self, map: &str, name: String, given: &Given, wrong: &mut Wrong) -> Option<Mapped> {
         let at = At { map, column: &name };
         let unit = wrong.take(at.unit(self.unit.as_deref()));
         let sign = wrong.take(at.sign(self.sign));
-        let scale = wrong.take(at.scale(self.scale, self.divide_by.as_deref(), given));
+        let scale = wrong.take(at.scale(self.scale, self.divide_by.as_ref().map(|by| by.0.as_str()), given));
         let offset = wrong.take(at.finite("offset", self.offset, 0.0));
         let table = wrong.take(at.table(self.table));
         let sign_of = wrong.take(at.sign_of(self.sign_of.as_deref(), self.sign_zero, given));

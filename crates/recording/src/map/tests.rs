@@ -91,6 +91,22 @@ fn values_go_through_table_scale_offset_sign_and_unit() {
 }
 
 #[test]
+fn a_divisor_is_a_number_or_a_text_with_one() {
+    let text =
+        |by: &str| format!("{HEAD}[columns.thrust_n]\nsource = \"f\"\nunit = \"N\"\ndivide_by = {by}\n");
+    for by in ["358.25", "\"358.25\"", "-358.25", "\" 358.25 \""] {
+        let map = ColumnMap::from_toml("m", &text(by)).unwrap();
+        assert_eq!(map.columns[0].scale.abs(), 1.0 / 358.25, "{by}");
+    }
+    assert_eq!(ColumnMap::from_toml("m", &text("7")).unwrap().columns[0].scale, 1.0 / 7.0);
+    for by in ["0", "0.0", "\"0\"", "nan", "inf", "\"{poles}\"", "\"x\"", "true", "[7]"] {
+        let error = message(&text(by));
+        assert!(error.contains("columns.thrust_n.divide_by") || by.contains("poles"), "{by}: {error}");
+        assert!(error.contains("hint:"), "{by}: {error}");
+    }
+}
+
+#[test]
 fn every_shipped_map_reads() {
     for name in ColumnMap::shipped() {
         let map = ColumnMap::example(name).expect("it reads, with its own examples");

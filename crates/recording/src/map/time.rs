@@ -13,6 +13,7 @@ use crate::units;
 pub(super) struct RawTime {
     source: Option<String>,
     unit: Option<String>,
+    time_of_day: Option<String>,
     order: Option<String>,
     stale_rows: Option<String>,
     settle_s: Option<f64>,
@@ -34,9 +35,22 @@ impl RawTime {
         }
         match (self.source, self.settle_s) {
             (Some(source), None) => {
-                let stamps = stamps(map, self.unit.as_deref(), self.order.as_deref(), wrong);
+                let unit = self.unit.as_deref();
+                let stamps = stamps(map, unit, self.order.as_deref(), wrong);
+                if self.time_of_day.is_some() && unit != Some(dates::UNIT) {
+                    wrong.say(fail(
+                        map,
+                        "`time.time_of_day` needs unit = \"date\"",
+                        "it is the column with the time of day that belongs to the dates in `source`; a time of day without a date is a `source` with unit = \"time of day\"",
+                    ));
+                }
                 let drop_stale = wrong.take(drop_stale(map, self.stale_rows.as_deref()));
-                Some(Time::Column { source, stamps: stamps?, drop_stale: drop_stale? })
+                Some(Time::Column {
+                    source,
+                    time_of_day: self.time_of_day,
+                    stamps: stamps?,
+                    drop_stale: drop_stale?,
+                })
             }
             (None, Some(settle_s)) => wrong.take(settled(map, settle_s)),
             (found, _) => {
@@ -60,7 +74,7 @@ impl RawTime {
                 "the stamps that the log of messages has; a table names its column of stamps in `source`",
             ));
         }
-        let of_a_table = [&self.source, &self.unit, &self.order, &self.stale_rows];
+        let of_a_table = [&self.source, &self.unit, &self.time_of_day, &self.order, &self.stale_rows];
         if of_a_table.iter().any(|key| key.is_some()) || self.settle_s.is_some() {
             return Err(fail(
                 map,
@@ -81,6 +95,9 @@ fn stamps(map: &str, unit: Option<&str>, order: Option<&str>, wrong: &mut Wrong)
     if order.is_some() {
         wrong.say(fail(map, "`time.order` needs unit = \"date\"", "it says what a date begins with"));
     }
+    if unit == Some(dates::OF_DAY) {
+        return Some(Stamps::OfDay);
+    }
     wrong.take(to_s(map, unit)).map(|to_s| Stamps::Numbers { to_s })
 }
 
@@ -97,13 +114,16 @@ fn to_s(map: &str, unit: Option<&str>) -> Result<f64, MapError> {
         return Err(fail(
             map,
             "`time.unit` is missing",
-            "write unit = \"s\", \"ms\", \"us\" or \"ns\", or \"date\" for dates with their time of day; it is never guessed",
+            "write unit = \"s\", \"ms\", \"us\" or \"ns\", \"date\" for dates with their time of day, or \"time of day\" for one without a date; it is never guessed",
         ));
     };
     let unit = units::find(symbol).filter(|unit| unit.si == "s").ok_or_else(|| {
         let allowed = units::siblings("s");
-        let words =
-            format!("`time.unit` = \"{symbol}\" is outside what is allowed: {allowed}, \"{}\"", dates::UNIT);
+        let words = format!(
+            "`time.unit` = \"{symbol}\" is outside what is allowed: {allowed}, \"{}\", \"{}\"",
+            dates::UNIT,
+            dates::OF_DAY
+        );
         fail(map, words, "write the unit of the stamps")
     })?;
     Ok(unit.factor)

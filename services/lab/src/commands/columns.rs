@@ -18,7 +18,7 @@ Example: kort columns flight.ulg
 ///
 /// Of every kind of message: how many, at which rate, from when to when, with what gaps; of every field: its unit, where
 /// the log or its name says one, and its range. A shipped map that fits is named; where none does, a map is proposed
-/// from names and units, for a person to check.
+/// from names and units, for a person to check; for a table without names, the frame of one.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLE)]
 pub struct Args {
@@ -175,7 +175,7 @@ fn proposal(found: &Survey) -> String {
     }
     match &found.proposal.map {
         Some(map) => {
-            out += "a map from the names in it, to be checked (-o MAP writes it):\n\n";
+            out += "a map from what it says of its columns, to be checked and filled in where a line has a # (-o MAP writes it):\n\n";
             for line in map.lines() {
                 let _ = writeln!(out, "  {line}");
             }

@@ -1,7 +1,9 @@
 //! CSV as RFC 4180 has it, header row first.
 
 mod encoding;
+mod ends;
 mod opening;
+mod stamps;
 mod table;
 mod units;
 
@@ -10,11 +12,12 @@ use std::io::{self, Read, Write};
 use csv::{ByteRecord, ErrorKind, ReaderBuilder};
 
 use crate::assemble::Assembler;
-use crate::cell::Cell;
+use crate::cell::{Cell, shown};
 use crate::error::{Place, Problem};
 use crate::map::ColumnMap;
 use crate::recording::Recording;
 use encoding::Texts;
+use ends::Ends;
 use opening::Opening;
 
 pub(super) use table::log;
@@ -34,7 +37,16 @@ pub(super) fn decode(name: &str, input: impl Read, map: Option<&ColumnMap>) -> R
     }
     let mut texts = Texts::default();
     texts.take(&mut record, lines.header())?;
-    let mut header: Vec<String> = record.iter().map(|cell| text(cell).trim().to_owned()).collect();
+    let (mut ends, nameless) = Ends::of(&mut record, delimiter);
+    if nameless && map.is_none() {
+        return Err(Problem::NoNames { place: Place::Line(lines.header()), found: shown(&said(&record)) });
+    }
+    let mut header: Vec<String> = if nameless {
+        notes.push(ends::said(lines.header()));
+        (1..=record.len()).map(ends::by_place).collect()
+    } else {
+        record.iter().map(|cell| text(cell).trim().to_owned()).collect()
+    };
     if map.is_some() {
         // Others end a row with the sign between cells: a column that a map cannot mean.
         for (place, name) in header.iter_mut().enumerate().filter(|(_, name)| name.is_empty()) {
@@ -44,9 +56,10 @@ pub(super) fn decode(name: &str, input: impl Read, map: Option<&ColumnMap>) -> R
     let width = header.len() as u64;
     let mut rows = Assembler::new(name, header.clone(), map)?;
     let (mut losses, mut empty) = (Vec::new(), 0_u64);
-    let mut next = read(&mut reader, &mut record);
+    let mut next = if nameless { Ok(true) } else { read(&mut reader, &mut record) };
     let line = lines.at(&record);
     if matches!(next, Ok(true))
+        && !nameless
         && texts.take(&mut record, line).is_ok()
         && let Some(below) = units::below(&header, &record)
         // Names of our own say the unit themselves: another below them is a contradiction, not a second header.
@@ -75,6 +88,7 @@ pub(super) fn decode(name: &str, input: impl Read, map: Option<&ColumnMap>) -> R
             continue;
         }
         let line = lines.at(&record);
+        ends.cut(&mut record);
         let found = record.len() as u64;
         if found != width {
             let place = Place::Line(line);
@@ -98,6 +112,7 @@ pub(super) fn decode(name: &str, input: impl Read, map: Option<&ColumnMap>) -> R
     let mut recording = rows.finish(losses)?;
     notes.extend(texts.note());
     notes.extend(empty_rows(empty));
+    notes.extend(ends.note());
     recording.notes.extend(notes);
     Ok(recording)
 }
@@ -137,6 +152,11 @@ impl Lines {
 /// A cell that [`Texts`] has taken.
 fn text(cell: &[u8]) -> &str {
     std::str::from_utf8(cell).unwrap_or_default()
+}
+
+/// A row as it is shown.
+fn said(row: &ByteRecord) -> String {
+    row.iter().map(|cell| text(cell).trim()).collect::<Vec<_>>().join(", ")
 }
 
 /// Spreadsheets write a line of delimiters where they have an empty one.

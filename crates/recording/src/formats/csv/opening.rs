@@ -7,7 +7,7 @@ use encoding_rs_io::DecodeReaderBytesBuilder;
 
 use super::encoding::Texts;
 use super::{Lines, units};
-use crate::dates::is_date;
+use crate::dates::{is_date, is_day, is_time_of_day};
 use crate::decimal::with_comma;
 use crate::error::Problem;
 
@@ -236,14 +236,18 @@ fn text(cell: &[u8]) -> &str {
     std::str::from_utf8(cell).unwrap_or_default().trim()
 }
 
-fn filled(row: &ByteRecord) -> usize {
+pub(super) fn filled(row: &ByteRecord) -> usize {
     row.iter().filter(|cell| !cell.trim_ascii().is_empty()).count()
 }
 
-/// Dates are numbers too: no name is one.
-fn numbers(row: &ByteRecord) -> usize {
-    let number = |text: &str| text.parse::<f64>().is_ok() || with_comma(text).is_some() || is_date(text);
-    row.iter().filter(|cell| number(text(cell))).count()
+/// Whether it is a number: a date, a day and a time of day are too, for no name is one.
+pub(super) fn is_number(text: &str) -> bool {
+    let stamp = || is_date(text) || is_day(text) || is_time_of_day(text);
+    text.parse::<f64>().is_ok() || with_comma(text).is_some() || stamp()
+}
+
+pub(super) fn numbers(row: &ByteRecord) -> usize {
+    row.iter().filter(|cell| is_number(text(cell))).count()
 }
 
 /// More than a word with its value, as `Rate;100` in lines about the measurement.

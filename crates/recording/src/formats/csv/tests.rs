@@ -1,6 +1,8 @@
 //! Tables of others: units below the names, decimal commas. What is proposed for them reads them to the same numbers, and no
 //! table of another kind is taken for one.
 
+mod names;
+
 use proptest::prelude::*;
 
 use crate::map::ColumnMap;

@@ -3,12 +3,12 @@
 use csv::ByteRecord;
 
 use crate::decimal::with_comma;
-use crate::log::propose::symbol;
+use crate::log::names::symbol;
 use crate::log::stamps::is_time;
 use crate::units::{self, Unit};
 
 /// What stands where a column has no unit.
-const NONE: [&str; 4] = ["", "-", "--", "1"];
+const NONE: [&str; 5] = ["", "-", "--", "1", "#"];
 
 /// The units below these names, one a column, none where there is none; `None` for a row of anything else: a number in it, or
 /// words that are no units for the greater part, or below the stamps.
@@ -69,9 +69,11 @@ pub(super) fn differ<'a>(
     read.filter_map(other).collect()
 }
 
-/// Without brackets around it.
+/// Without brackets around it, and without the mark of a comment before the first of the row.
 fn bare(cell: &str) -> &str {
     let cell = cell.trim();
+    let marked = cell.strip_prefix(['%', '#']).map(str::trim_start);
+    let cell = marked.filter(|rest| rest.starts_with(['[', '('])).unwrap_or(cell);
     let within = [('[', ']'), ('(', ')')]
         .into_iter()
         .find_map(|(open, close)| cell.strip_prefix(open)?.strip_suffix(close));
@@ -89,6 +91,7 @@ mod tests {
         let wanted = [Some("s"), Some("1/min"), Some("N"), None].map(|unit| unit.map(str::to_owned));
         assert_eq!(of(&["s", "1/min", "N", ""]), Some(wanted.to_vec()));
         assert_eq!(of(&["[s]", " [1/min] ", "(N)", "-"]), Some(wanted.to_vec()));
+        assert_eq!(of(&["%[s]", "[1/min]", "[N]", "[#]"]), Some(wanted.to_vec()));
         assert!(of(&["ms", "mV/V", "N"]).is_some(), "one that is not known, and one cell less");
         for other in [
             &["0", "1", "2", "x"][..],

@@ -1,0 +1,219 @@
+//! Which of our columns a field of others may be: by the words in its name, by its unit.
+
+use super::names::{says, unit_of, words};
+use super::{Field, Topic};
+use crate::columns;
+use crate::units;
+
+/// One of our columns, and words in a field's name that speak for it, most telling first, and against it.
+pub(super) struct Rule {
+    pub column: &'static str,
+    words: &'static [&'static str],
+    without: &'static [&'static str],
+}
+
+pub(super) const ASKED: &[&str] =
+    &["cmd", "command", "ref", "reference", "set", "setpoint", "target", "desired", "goal"];
+pub(super) const SUPPLY: &[&str] = &["supply", "bat", "batt", "battery", "in", "input", "bus", "dc"];
+
+pub(super) const RULES: &[Rule] = &[
+    Rule {
+        column: "shaft_speed_rad_s",
+        words: &["erpm", "rpm", "omega", "rotorspeed", "velocity", "speed"],
+        without: &["air", "ground", "wind", "wheel", "fan", "gps", "gnss"],
+    },
+    Rule {
+        column: "current_a",
+        words: &["current", "curr", "iq", "q axis", "amps", "motorstrom"],
+        without: SUPPLY,
+    },
+    Rule {
+        column: "supply_v",
+        words: &["voltage", "volt", "volts", "vbus", "vbat", "vcc"],
+        without: &["axis", "cell", "motor", "phase"],
+    },
+    Rule {
+        column: "supply_current_a",
+        words: &["current", "curr", "amps"],
+        without: &["axis", "motor", "phase"],
+    },
+    Rule {
+        column: "duty_cmd",
+        words: &["duty", "throttle", "pwm", "control", "output", "out"],
+        without: &[],
+    },
+    Rule { column: "thrust_n", words: &["thrust", "force", "loadcell"], without: &[] },
+    Rule { column: "torque_n_m", words: &["torque"], without: &[] },
+    Rule { column: "shaft_angle_rad", words: &["angle", "position", "encoder"], without: &["gps", "gnss"] },
+    Rule { column: "temperature_c", words: &["temperature", "temp"], without: &["air", "baro"] },
+    Rule { column: "power_w", words: &["power"], without: &["mechanical", "mech"] },
+    Rule { column: "depth_m", words: &["depth"], without: &[] },
+    Rule { column: "flow_m_s", words: &["flow"], without: &["optical"] },
+];
+
+/// Words of a field that is about a signal and not the signal.
+const ABOUT: &[&str] = &[
+    "valid",
+    "enabled",
+    "flag",
+    "timestamp",
+    "stamp",
+    "seq",
+    "count",
+    "counter",
+    "error",
+    "errorcount",
+    "failsafe",
+    "alarm",
+    "inconsistency",
+    "innovation",
+    "test",
+    "ratio",
+    "ratios",
+    "delta",
+    "offset",
+    "scale",
+    "limit",
+    "constant",
+    "efficiency",
+    "fault",
+    "id",
+];
+/// Words of what belongs to a drive: in a log of a whole vehicle a field without a unit must have one of them.
+pub(super) const DRIVE: &[&str] = &[
+    "esc",
+    "motor",
+    "motors",
+    "thruster",
+    "thrusters",
+    "actuator",
+    "rotor",
+    "propeller",
+    "servo",
+    "rcou",
+    "drive",
+    "vesc",
+    "odrive",
+    "moteus",
+    "shaft",
+    "battery",
+    "bat",
+];
+
+/// Commands: the words of the measured value, and one of [`ASKED`].
+pub(super) const COMMANDS: &[(&str, &str)] = &[
+    ("shaft_speed_rad_s", "speed_cmd_rad_s"),
+    ("current_a", "current_cmd_a"),
+    ("supply_v", "voltage_cmd_v"),
+    ("thrust_n", "thrust_cmd_n"),
+    ("duty_cmd", "duty_cmd"),
+];
+
+/// Words of a pulse that tells a speed controller what to do.
+pub(super) const PULSES: &[&str] = &["esc", "throttle", "pwm", "thruster", "pulse", "signal"];
+/// Words of turns that are not those of the shaft.
+const ELECTRICAL: &[&str] = &["erpm", "electrical", "elec"];
+/// Words of the motor's own current.
+const OF_MOTOR: &[&str] = &["motor", "motorstrom", "phase", "iq", "q axis", "winding", "coil"];
+
+/// Units that tell what a field of a table is, where no word of its name does. Degrees may be those of a vehicle.
+const TELLING: &[(&str, &[&str])] = &[
+    ("shaft_speed_rad_s", &["rpm", "rad/s", "rev/s"]),
+    ("current_a", &["A", "mA"]),
+    ("supply_v", &["V", "mV"]),
+    ("duty_cmd", &["%"]),
+    ("thrust_n", &["N", "kN", "kgf", "gf", "lbf"]),
+    ("torque_n_m", &["N m", "mN m", "kgf cm"]),
+    ("shaft_angle_rad", &["rad", "rev"]),
+    ("temperature_c", &["C"]),
+    ("power_w", &["W", "kW"]),
+];
+
+pub(super) fn has(names: &[String], list: &[&str]) -> bool {
+    list.iter().any(|phrase| says(names, phrase))
+}
+
+/// A pulse of milliseconds for a speed controller.
+pub(super) fn is_pulse(field: &Field) -> bool {
+    unit_of(field).is_some_and(|unit| matches!(unit.symbol, "us" | "ms")) && has(&words(&field.name), PULSES)
+}
+
+/// A speed of electrical turns.
+pub(super) fn is_electrical(column: &str, field: &Field) -> bool {
+    column == "shaft_speed_rad_s" && has(&words(&field.name), ELECTRICAL)
+}
+
+/// Whether the name says whose current it is.
+pub(super) fn is_of_motor(field: &Field) -> bool {
+    has(&words(&field.name), OF_MOTOR)
+}
+
+/// Whether the name, or its topic's, says that it belongs to the supply.
+pub(super) fn is_of_supply(topic: &Topic, field: &Field) -> bool {
+    has(&words(&field.name), SUPPLY) || has(&words(&topic.name), SUPPLY)
+}
+
+/// Whether a field is what was asked for, and not what was measured.
+pub(super) fn is_asked(topic: &Topic, field: &Field) -> bool {
+    let own = words(&field.name);
+    // moteus' control_velocity is what its trajectory asks for.
+    let control = own.len() > 1 && own[0] == "control";
+    control || has(&own, ASKED) || has(&words(&topic.name), ASKED)
+}
+
+/// Whether a field may be a signal of a drive at all. A value that never changes is a channel that nobody uses, if it is not
+/// the steady supply of a table, or what was asked for all the while.
+fn possible(rule: &Rule, topic: &Topic, field: &Field, table: bool) -> bool {
+    let names = [words(&topic.name), words(&field.name)].concat();
+    let steady = table && (matches!(rule.column, "supply_v" | "duty_cmd") || is_asked(topic, field));
+    field.range.is_some_and(|(low, high)| low < high || steady && low != 0.0)
+        && !has(&names, ABOUT)
+        && (table || unit_of(field).is_some() || has(&names, DRIVE))
+}
+
+/// Whether nothing but its unit tells what a field is.
+pub(super) fn by_unit(column: &str, field: &Field) -> bool {
+    let names = words(&field.name);
+    let known = RULES.iter().any(|rule| has(&names, rule.words));
+    let tells = |symbol: &str| TELLING.iter().any(|(of, units)| *of == column && units.contains(&symbol));
+    !known && unit_of(field).is_some_and(|unit| tells(unit.symbol))
+}
+
+/// How well a field suits a rule: lower is better.
+pub(super) type Fit = (bool, bool, bool, usize, bool, bool);
+
+/// How well a field suits a rule, if it does.
+pub(super) fn fit(rule: &Rule, topic: &Topic, field: &Field, table: bool) -> Option<Fit> {
+    if !possible(rule, topic, field, table) {
+        return None;
+    }
+    let names = words(&field.name);
+    let beside = words(&topic.name);
+    if has(&names, rule.without) || rule.column == "current_a" && has(&beside, SUPPLY) {
+        return None;
+    }
+    let unit = unit_of(field);
+    let pulse = rule.column == "duty_cmd" && is_pulse(field);
+    // A share of something is a command only where the name says so.
+    let unit_tells =
+        || table && by_unit(rule.column, field) && (rule.column != "duty_cmd" || is_asked(topic, field));
+    let place = match rule.words.iter().position(|phrase| says(&names, phrase)) {
+        Some(place) => Some(place),
+        None if pulse => Some(rule.words.len()),
+        None => None,
+    };
+    let by_unit = place.is_none();
+    let place = place.or_else(|| unit_tells().then_some(0))?;
+    let si = columns::find(rule.column)
+        .map_or_else(|| units::of_column(rule.column).map_or("1", |u| u.si), |k| k.unit);
+    if unit.is_some_and(|unit| unit.si != si) && !pulse {
+        return None;
+    }
+    let supply = matches!(rule.column, "supply_v" | "supply_current_a");
+    let elsewhere = supply && !is_of_supply(topic, field);
+    if rule.column == "supply_current_a" && elsewhere {
+        return None;
+    }
+    let steady = field.range.is_none_or(|(low, high)| low == high);
+    Some((by_unit, steady, unit.is_none(), place, is_electrical(rule.column, field), elsewhere))
+}
