@@ -15,7 +15,7 @@ const DIRECTION: &[(&str, &[&str])] = &[
     ("crates/truth", &[]),
     ("crates/proof", &["kort-truth", "kort-recording"]),
     ("crates/emulators", &["kort-thruster", "kort-proto"]),
-    ("proto", &[]),
+    ("proto", &["kort-complaints"]),
     ("crates/recording", &["kort-complaints", "kort-proto"]),
     ("crates/control", &["kort-thruster"]),
     ("crates/identify", &["kort-thruster"]),

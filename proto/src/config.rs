@@ -1,21 +1,31 @@
 //! `kort.toml`: one deployment. Every process reads the same file and takes its part; a section
 //! that only one process understands is kept as a table and read by that process.
 
+mod read;
+
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
 
 use serde::Deserialize;
-use serde::de::DeserializeOwned;
 use thiserror::Error;
 use toml::Table;
 
-use crate::names::is_thruster_id;
+use read::hinted;
+pub use read::is_told_by;
 
 /// Where the deployment is looked for unless `--config` says otherwise.
 pub const DEFAULT_PATH: &str = "config/kort.toml";
 
+/// The law that `kort explain --for RIG` names for a rig.
+pub const DEFAULT_LAW: &str = "default";
+
 /// The deployment and the rig it names, built in: a moved program still starts.
 const BUILT_IN: &str = include_str!("../../config/kort.toml");
+
+/// What to do where no rig is named.
+const NO_RIG: &str =
+    "a rig description relative to this file, for example \"thrusters/whitcomb-yoerger-1999.toml\"";
 
 /// Rig descriptions built in, by the path that a deployment names them with.
 const BUILT_IN_RIGS: &[(&str, &str)] = &[(
@@ -24,7 +34,7 @@ const BUILT_IN_RIGS: &[(&str, &str)] = &[(
 )];
 
 /// Why a configuration cannot be used; the message names file, key, value and what is allowed.
-#[derive(Debug, Error)]
+#[derive(Clone, Debug, PartialEq, Error)]
 #[error("{file}: {message}")]
 pub struct ConfigError {
     /// The file, or "built-in configuration".
@@ -40,6 +50,9 @@ pub struct Config {
     /// The file it came from; `None` for the built-in one.
     #[serde(skip)]
     pub file: Option<PathBuf>,
+    /// Where all that is wrong is asked for: what is wrong with the sections that services read.
+    #[serde(skip)]
+    noted: Option<Arc<Mutex<Vec<ConfigError>>>>,
     /// Shared memory.
     #[serde(default)]
     pub transport: Transport,
@@ -47,6 +60,7 @@ pub struct Config {
     #[serde(default)]
     pub gateway: Table,
     /// Thrusters by id.
+    #[serde(default)]
     pub thrusters: BTreeMap<String, Thruster>,
 }
 
@@ -62,9 +76,11 @@ pub struct Transport {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Thruster {
-    /// Rig description, relative to the file.
+    /// Rig description, relative to the file. Without it, and without a drive, the rest is read and told all the same.
+    #[serde(default)]
     pub rig: PathBuf,
     /// Which drive: `simulated`, or the kind of a real one.
+    #[serde(default)]
     pub amplifier: String,
     /// The real drive's wire and settings, read by the servo.
     #[serde(default)]
@@ -120,8 +136,8 @@ pub struct ControllerLoop {
     /// Law, observer, estimator and their options: a file of `config/controllers`, relative to
     /// this file; empty takes the defaults of the law.
     pub file: PathBuf,
-    /// Law that runs at start; empty takes the one of the file.
-    pub law: String,
+    /// Law that runs at start, or [`DEFAULT_LAW`]; left out: the one of the file, without a file the default too.
+    pub law: Option<String>,
     /// Time in which a setpoint may go from zero to the largest, s, 0 to 60; left out: what suits the law.
     pub setpoint_rise_s: Option<f64>,
 }
@@ -133,9 +149,16 @@ impl Default for ControllerLoop {
             priority: 70,
             cores: Vec::new(),
             file: PathBuf::new(),
-            law: String::new(),
+            law: None,
             setpoint_rise_s: None,
         }
+    }
+}
+
+impl ControllerLoop {
+    /// Does the rig's own default run: is it asked for, or nothing else stated?
+    pub fn takes_default(&self) -> bool {
+        self.law.as_deref().map_or(self.file == Path::new(""), |law| law == DEFAULT_LAW)
     }
 }
 
@@ -168,12 +191,20 @@ impl Config {
     /// # Errors
     /// [`ConfigError`] if it cannot be read, holds an unknown key or a value that is not allowed.
     pub fn load(path: Option<&Path>) -> Result<Self, ConfigError> {
-        sound(Self::load_with_all(path))
+        sound(Self::load_any(path))
     }
 
     /// As [`Self::load`], with everything that is wrong, and what can be read all the same: loops that are not allowed are the
-    /// usual ones there.
+    /// usual ones there, and sections that services read are read without what is wrong with them, which [`Self::noted`] tells.
     pub fn load_with_all(path: Option<&Path>) -> (Option<Self>, Vec<ConfigError>) {
+        let (mut config, wrong) = Self::load_any(path);
+        if let Some(config) = &mut config {
+            config.noted = Some(Arc::default());
+        }
+        (config, wrong)
+    }
+
+    fn load_any(path: Option<&Path>) -> (Option<Self>, Vec<ConfigError>) {
         let default = Path::new(DEFAULT_PATH);
         let path = path.or_else(|| is_there(default).then_some(default));
         let Some(path) = path else {
@@ -198,75 +229,6 @@ impl Config {
         sound(Self::read(text, file))
     }
 
-    fn read(text: &str, file: Option<&Path>) -> (Option<Self>, Vec<ConfigError>) {
-        let name = file.map_or_else(|| "built-in configuration".into(), |f| f.display().to_string());
-        let fail = |message: String| ConfigError { file: name.clone(), message: hinted(message) };
-        let mut config: Self = match toml::from_str(text) {
-            Ok(config) => config,
-            Err(e) => return (None, vec![fail(with_hint(&e.to_string()))]),
-        };
-        config.file = file.map(Path::to_path_buf);
-        let mut wrong = Vec::new();
-        if config.thrusters.is_empty() {
-            wrong.push(fail("`thrusters` is empty\nhint: add a section [thrusters.t1]".into()));
-        }
-        for (id, t) in &mut config.thrusters {
-            if !is_thruster_id(id) {
-                wrong.push(fail(format!(
-                    "`thrusters.{id}`: an id has 1 to 16 lower-case letters, digits, `_` or `-`\nhint: t1, port, bow-2"
-                )));
-            }
-            let mut check = |key: &str, value: f64, low: f64, high: f64, hint: &str| {
-                if !(low..=high).contains(&value) {
-                    wrong.push(fail(format!(
-                        "`thrusters.{id}.{key}` = {value} is outside {low} to {high}\nhint: {hint}"
-                    )));
-                }
-            };
-            check("servo.rate_hz", t.servo.rate_hz, 100.0, 5000.0, "1000 suits most drives");
-            check("servo.priority", t.servo.priority.into(), 0.0, 90.0, "80; 0 leaves the scheduler alone");
-            check("controller.priority", t.controller.priority.into(), 0.0, 90.0, "70, below the servo's");
-            check(
-                "controller.rate_hz",
-                t.controller.rate_hz,
-                10.0,
-                t.servo.rate_hz,
-                "at most the servo's rate",
-            );
-            for (key, cores) in [("servo.cores", &t.servo.cores), ("controller.cores", &t.controller.cores)] {
-                for core in cores {
-                    check(
-                        key,
-                        *core as f64,
-                        0.0,
-                        1023.0,
-                        "cores are counted from 0; leave it out for all of them",
-                    );
-                }
-            }
-            if let Some(rise_s) = t.controller.setpoint_rise_s {
-                check("controller.setpoint_rise_s", rise_s, 0.0, 60.0, "leave it out for what suits the law");
-            }
-            let ratio = t.servo.rate_hz / t.controller.rate_hz;
-            if (ratio - ratio.round()).abs() > 1e-6 {
-                wrong.push(fail(format!(
-                    "`thrusters.{id}.controller.rate_hz` = {} does not divide servo.rate_hz = {}\nhint: {} does",
-                    t.controller.rate_hz,
-                    t.servo.rate_hz,
-                    t.servo.rate_hz / ratio.ceil()
-                )));
-            }
-            // Who looks at the rest must be able to count with these.
-            let (servo, controller) = (t.servo.rate_hz, t.controller.rate_hz);
-            if !(100.0..=5000.0).contains(&servo) || !(10.0..=servo).contains(&controller) {
-                (t.servo.rate_hz, t.controller.rate_hz) =
-                    (ServoLoop::default().rate_hz, ControllerLoop::default().rate_hz);
-            }
-            t.controller.setpoint_rise_s = t.controller.setpoint_rise_s.filter(|s| (0.0..=60.0).contains(s));
-        }
-        (Some(config), wrong)
-    }
-
     /// The thruster of an id.
     ///
     /// # Errors
@@ -275,16 +237,6 @@ impl Config {
         self.thrusters.get(id).ok_or_else(|| {
             let known: Vec<_> = self.thrusters.keys().map(String::as_str).collect();
             self.error(format!("there is no thruster `{id}`\nhint: known are {}", known.join(", ")))
-        })
-    }
-
-    /// Reads a section that one process owns.
-    ///
-    /// # Errors
-    /// [`ConfigError`] names the section, the unknown key and the nearest known one.
-    pub fn section<T: DeserializeOwned>(&self, name: &str, table: &Table) -> Result<T, ConfigError> {
-        table.clone().try_into().map_err(|e: toml::de::Error| {
-            self.error(with_hint(&format!("section [{name}]: {}", e.to_string().trim_end())))
         })
     }
 
@@ -307,6 +259,9 @@ impl Config {
         path: &Path,
         built_in: &[(&str, &'static str)],
     ) -> Result<(String, String), ConfigError> {
+        if path == Path::new("") {
+            return Err(self.error(format!("`{key}` is missing\nhint: {NO_RIG}")));
+        }
         let folder = self.file.as_deref().and_then(Path::parent).unwrap_or(Path::new("config"));
         let full = folder.join(path);
         match std::fs::read_to_string(&full) {
@@ -345,26 +300,6 @@ fn sound((config, wrong): (Option<Config>, Vec<ConfigError>)) -> Result<Config, 
     match wrong.into_iter().next() {
         Some(error) => Err(error),
         None => config.ok_or_else(nothing),
-    }
-}
-
-/// A message that says no way out points at the file that explains every key.
-fn hinted(message: String) -> String {
-    if message.contains("hint:") {
-        return message;
-    }
-    format!("{}\nhint: {DEFAULT_PATH} of the repository explains every key", message.trim_end())
-}
-
-/// Adds the nearest known key to serde's "unknown field `x`, expected one of `a`, `b`".
-fn with_hint(message: &str) -> String {
-    let message = message.trim_end();
-    let Some(at) = message.find("unknown field") else { return message.to_owned() };
-    let mut names = message[at..].split('`').skip(1).step_by(2);
-    let Some(wrong) = names.next() else { return message.to_owned() };
-    match names.max_by(|a, b| strsim::jaro_winkler(a, wrong).total_cmp(&strsim::jaro_winkler(b, wrong))) {
-        Some(near) => format!("{message}\nhint: did you mean `{near}`?"),
-        None => format!("{message}\nhint: this section has no keys"),
     }
 }
 

@@ -58,6 +58,9 @@ pub struct Event {
     /// When it came about, RFC 3339, where that was long before it was told.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub since: Option<String>,
+    /// How often it happened since then, where it was repeated and is told once.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub times: Option<u64>,
     /// What the thruster did just before a stop that nobody asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub before: Option<Before>,
@@ -98,6 +101,7 @@ impl Event {
             detail: detail.into(),
             fault: None,
             since: None,
+            times: None,
             before: None,
         }
     }

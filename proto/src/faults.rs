@@ -48,6 +48,10 @@ pub enum Fault {
     SensorLost = 18,
     /// The shaft sensor counts against the way the motor turns.
     SensorReversed = 19,
+    /// The measured thrust contradicts torque and speed of the shaft.
+    SensorImplausible = 20,
+    /// The shaft is far too slow for the torque that it gets.
+    ShaftSlow = 21,
     /// No word from the gateway within its time-out while armed.
     GatewayLost = 33,
     /// No telemetry from the servo within its time-out while armed.
@@ -62,7 +66,7 @@ pub enum Fault {
 
 impl Fault {
     /// Every fault, in the order of codes.
-    pub const ALL: [Self; 24] = [
+    pub const ALL: [Self; 26] = [
         Self::OverCurrent,
         Self::OverSpeed,
         Self::ThermalOverload,
@@ -82,6 +86,8 @@ impl Fault {
         Self::DriveUnguarded,
         Self::SensorLost,
         Self::SensorReversed,
+        Self::SensorImplausible,
+        Self::ShaftSlow,
         Self::GatewayLost,
         Self::ServoLost,
         Self::ControlNotFinite,
@@ -121,6 +127,8 @@ impl Fault {
             Self::DriveUnguarded => "drive_unguarded",
             Self::SensorLost => "sensor_lost",
             Self::SensorReversed => "sensor_reversed",
+            Self::SensorImplausible => "sensor_implausible",
+            Self::ShaftSlow => "shaft_slow",
             Self::GatewayLost => "gateway_lost",
             Self::ServoLost => "servo_lost",
             Self::ControlNotFinite => "control_not_finite",
@@ -174,6 +182,12 @@ impl Fault {
             }
             Self::SensorReversed => {
                 "the shaft sensor counts against the way the motor turns: check its phases and its sign"
+            }
+            Self::SensorImplausible => {
+                "the measured thrust contradicts the shaft: check the cell's sign, its unit, and whether it moves at all"
+            }
+            Self::ShaftSlow => {
+                "the shaft is far too slow for its torque: blocked or fouled, or its speed is told in a wrong unit (pole pairs)"
             }
             Self::GatewayLost => "the gateway stopped while armed: take the lease and arm again",
             Self::ServoLost => "the servo stopped sending telemetry: see its log",

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 use kort_proto::complaint::Complaint;
-use kort_proto::config::{Config, DEFAULT_PATH, is_there};
+use kort_proto::config::{Config, DEFAULT_PATH, is_there, is_told_by};
 use serde::Serialize;
 
 use crate::{DONE, USAGE};
@@ -22,7 +22,7 @@ pub struct Check {
 }
 
 /// Something that is wrong.
-#[derive(Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 struct Problem {
     file: String,
     #[serde(flatten)]
@@ -56,6 +56,13 @@ struct Found {
 }
 
 impl Found {
+    /// Takes over what is wrong, once.
+    fn problem(&mut self, found: Problem) {
+        if !self.problems.contains(&found) {
+            self.problems.push(found);
+        }
+    }
+
     /// Takes over what is left out of a rig, once.
     fn unused(&mut self, file: &str, effects: impl IntoIterator<Item = (&'static str, &'static str)>) {
         for (effect, why) in effects {
@@ -147,12 +154,20 @@ fn described(_: &toml::Table, _: &str, _: &Path) -> Result<Vec<(&'static str, &'
 fn deployment(file: Option<&Path>, into: &mut Found) {
     let name = file.map_or_else(|| "built-in configuration".to_owned(), |file| file.display().to_string());
     let (config, wrong) = Config::load_with_all(file);
-    let of_services = config.iter().flat_map(services);
-    for words in wrong.iter().map(ToString::to_string).chain(of_services) {
-        let found = problem(&name, &words);
-        if !into.problems.contains(&found) {
-            into.problems.push(found);
-        }
+    let of_services: Vec<String> = config.iter().flat_map(services).collect();
+    let noted = config.iter().flat_map(Config::noted);
+    for words in wrong.into_iter().chain(noted).map(|error| error.to_string()) {
+        into.problem(problem(&name, &words));
+    }
+    // What could not be read is not told again as missing.
+    let read: Vec<String> = into.problems.iter().filter_map(|read| read.said.key.clone()).collect();
+    let unread = |said: &Complaint| {
+        let nothing = said.message.contains("is missing") || said.found.as_deref() == Some("\"\"");
+        let told = |key: &String| read.iter().any(|read| is_told_by(read, key));
+        nothing && said.key.as_ref().is_some_and(told)
+    };
+    for found in of_services.iter().map(|words| problem(&name, words)).filter(|found| !unread(&found.said)) {
+        into.problem(found);
     }
     let absent = config.iter().flat_map(kort_proto::cores::absent);
     into.warnings.extend(absent.map(|words| problem(&name, &words.to_string())));

@@ -15,6 +15,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM};
+
 use kort_proto::config::Config;
 use kort_proto::events::{Event, EventKind, EventLog};
 use kort_proto::transport::{Deployment, Owner, Restarts, Watched};
@@ -36,10 +38,12 @@ const STOOD_STILL: Duration = Duration::from_millis(500);
 /// How things stand is written down this often while a drive is armed: a service that is killed as a whole tells its
 /// successor by that when it was stopped, and at what thrust.
 const NOTE_EVERY: Duration = Duration::from_millis(100);
+/// Signals that end the service, thrust at zero first, whichever it is: one that just killed it would leave shared memory behind.
+const END_SIGNALS: [i32; 4] = [SIGTERM, SIGINT, SIGHUP, SIGQUIT];
 /// How long a child may take to end.
 const STOP_WITHIN: Duration = Duration::from_secs(2);
 
-/// Runs the deployment until SIGINT, SIGTERM or SIGHUP.
+/// Runs the deployment until SIGINT, SIGTERM, SIGHUP or SIGQUIT.
 ///
 /// # Errors
 /// [`UpError`] if it cannot start, or a child does not stay up.
@@ -54,7 +58,7 @@ pub fn run(config: &Config, deployment: &Deployment) -> Result<(), UpError> {
         kort_controller::check(config, id)?;
     }
     let stop = Arc::new(AtomicBool::new(false));
-    for signal in [signal_hook::consts::SIGTERM, signal_hook::consts::SIGINT, signal_hook::consts::SIGHUP] {
+    for signal in END_SIGNALS {
         signal_hook::flag::register(signal, Arc::clone(&stop))
             .map_err(system("signals cannot be watched"))?;
     }

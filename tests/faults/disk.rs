@@ -122,6 +122,11 @@ pub fn full(table: &mut Table) {
         stack.state()?["faults"].as_array()?.iter().find(|fault| fault["name"] == "recording_failed").cloned()
     });
     assert!(shown["code"] == 49 && shown["since"].is_string(), "{shown}");
+    let cause = shown["cause"].as_str().expect("a cause");
+    assert!(
+        cause.contains(info["name"].as_str().unwrap()) && cause.contains(info["cause"].as_str().unwrap()),
+        "{shown}"
+    );
     // What the disk took is readable.
     let kept = kort_recording::Recording::read(&file, None).expect("it reads");
     assert!(kept.rows() > 500, "{} rows", kept.rows());

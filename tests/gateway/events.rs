@@ -43,3 +43,26 @@ fn a_client_that_asks_on_from_the_last_it_knows_misses_none() {
         assert!(newest >= last, "without a place to begin the newest are told");
     });
 }
+
+/// Whoever stops again and again, with nothing armed, leaves the log to what matters: repeats are one event with a count.
+/// The stop that had something to stop is an event of its own.
+#[test]
+fn stops_without_end_are_told_once_and_counted() {
+    common::in_real_time(|| {
+        let mut stack = Stack::start_at(Site::new());
+        stack.thrust(40.0, 60_000);
+        for _ in 0..400 {
+            assert_eq!(send(stack.site.port, "POST", "/v1/stop", &[], b"").status, 200);
+        }
+        let (told, events) = common::wait("all of them", || {
+            let events = stack.get("/v1/events")?.as_array()?.clone();
+            let stops: Vec<_> = events.iter().filter(|event| event["kind"] == "stopped").cloned().collect();
+            let counted: u64 = stops.iter().map(|stop| stop["times"].as_u64().unwrap_or(1)).sum();
+            (counted == 400).then_some((stops, events))
+        });
+        assert!(told.len() < 20, "{told:?}");
+        let armed = |stop: &serde_json::Value| stop["detail"].as_str().unwrap().contains("was armed: t1");
+        assert!(armed(&told[0]) && !told[1..].iter().any(armed), "{told:?}");
+        assert!(events.iter().any(|event| event["kind"] == "armed"), "{events:?}");
+    });
+}

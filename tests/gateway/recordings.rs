@@ -239,3 +239,18 @@ fn a_recording_that_a_full_disk_refuses_does_not_keep_its_name() {
         assert_eq!(send(port, "DELETE", "/v1/recordings/dive", &[], b"").status, 200);
     });
 }
+
+/// A folder that was removed meanwhile is made anew.
+#[test]
+fn a_removed_folder_is_made_again_by_the_next_recording() {
+    common::in_real_time(|| {
+        let stack = Stack::start_at(Site::new());
+        let folder = stack.site.folder.path().join("recordings");
+        std::fs::remove_dir_all(&folder).unwrap();
+        let begun = send(stack.site.port, "POST", "/v1/recordings", &[JSON], br#"{"name": "again"}"#);
+        assert_eq!(begun.status, 201, "{}", begun.text());
+        let done = send(stack.site.port, "DELETE", "/v1/recordings/again", &[], b"");
+        assert_eq!((done.status, &done.json()["state"]), (200, &json!("complete")));
+        assert!(folder.join("again.mcap").is_file());
+    });
+}

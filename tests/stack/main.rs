@@ -7,6 +7,7 @@ mod inherited;
 mod lone;
 mod refusals;
 mod shown;
+mod stated;
 mod strangers;
 mod system;
 
@@ -37,6 +38,13 @@ fn now_ns() -> u64 {
 
 #[test]
 fn starts_thrusts_and_goes_to_zero_before_it_ends() {
+    // A terminal sends another signal for Ctrl-\\ than for its end; the service ends alike, and leaves no shared memory.
+    for signal in ["TERM", "QUIT"] {
+        ends_at_zero(signal);
+    }
+}
+
+fn ends_at_zero(signal: &str) {
     common::in_real_time(|| {
         let mut stack = Stack::start();
         let state = stack.state().unwrap();
@@ -44,7 +52,7 @@ fn starts_thrusts_and_goes_to_zero_before_it_ends() {
         stack.thrust(80.0, LEASE_MS);
         let servo = stack.process_of("servo");
         let mut watch = stack.watch();
-        kill(stack.supervisor.id(), "TERM");
+        kill(stack.supervisor.id(), signal);
         let zero = watch.until("zero", at_zero);
         assert_eq!(zero.faults, 0, "an ordered stop is no fault");
         assert!(zero.signals.thrust_n.abs() < 10.0, "the drive went off at {} N", zero.signals.thrust_n);

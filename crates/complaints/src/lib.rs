@@ -5,6 +5,9 @@ use std::collections::BTreeMap;
 use serde::de::DeserializeOwned;
 use toml::Value;
 
+/// How like two words are of which one may be the other misspelt, by Jaro and Winkler.
+const NEAR: f64 = 0.75;
+
 /// Reads a `T`, or says all that no `T` can take: each as [`complaints`] has it, or the line where this is no TOML.
 ///
 /// # Errors
@@ -20,15 +23,23 @@ pub fn from_toml_with_all<T: DeserializeOwned>(text: &str) -> Result<T, Vec<Stri
 /// All that a `T` cannot take in this tree: the place (`segments[1].value`), what stands there, what may. What was told is taken
 /// out of the tree and the rest read again, so a key that is told as wrong, or as unknown for one that is much like it, is not
 /// told as missing too. Of one list of numbers the first is told.
-pub fn complaints<T: DeserializeOwned>(mut tree: Value) -> Vec<String> {
+pub fn complaints<T: DeserializeOwned>(tree: Value) -> Vec<String> {
+    read_with_all::<T>(tree).1
+}
+
+/// The `T` of what is left once all that is wrong is taken out, as [`complaints`] tells it; none where a key that it needs is
+/// missing or wrong.
+pub fn read_with_all<T: DeserializeOwned>(mut tree: Value) -> (Option<T>, Vec<String>) {
     let mut said = Vec::new();
     let mut left = Left::default();
+    let mut whole = true;
     while let Some(Complaint { path, found, words }) = complaint::<T>(&tree) {
         let place = left.place(&path);
         let missing = missing(&words);
         if !missing.is_some_and(|key| left.told(&place, key)) {
             said.push(told(&place, found.as_ref(), &words));
         }
+        whole &= missing.is_none();
         if missing.is_some_and(|key| filled::<T>(&mut tree, &path, key)) {
             continue;
         }
@@ -37,7 +48,14 @@ pub fn complaints<T: DeserializeOwned>(mut tree: Value) -> Vec<String> {
             break;
         }
     }
-    said
+    let read = if whole { tree.try_into().ok() } else { None };
+    (read, said)
+}
+
+/// The name that a word is a near spelling of; none where it is like no other.
+pub fn near<'a>(word: &str, names: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let like = names.into_iter().map(|name| (strsim::jaro_winkler(name, word), name));
+    like.filter(|(like, _)| *like > NEAR).max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, name)| name)
 }
 
 /// The key that these words miss.
@@ -96,9 +114,9 @@ impl Left {
 
     /// Whether a table lacks this key since it was taken out, or misspelt it.
     fn told(&self, table: &str, key: &str) -> bool {
-        self.out.iter().any(|(of, out, unknown)| {
-            of == table && (out == key || *unknown && strsim::jaro_winkler(out, key) > 0.75)
-        })
+        self.out
+            .iter()
+            .any(|(of, out, unknown)| of == table && (out == key || *unknown && near(out, [key]).is_some()))
     }
 
     /// Takes out the key at a path, or the entry of a list of tables; false for the whole tree.
@@ -165,10 +183,10 @@ fn told(place: &str, found: Option<&Value>, words: &str) -> String {
         Some(Value::Table(_) | Value::Array(_)) | None => String::new(),
         Some(value) => format!(" = {value}"),
     };
-    let words = words
-        .replace("expected f64", "expected a number")
-        .replace("expected u64", "expected a whole number")
-        .replace("expected u32", "expected a whole number");
+    let mut words = words.replace("expected f64", "expected a number");
+    for whole in ["u8", "u32", "u64", "usize", "i32", "i64"] {
+        words = words.replace(&format!("expected {whole}"), "expected a whole number");
+    }
     if place.is_empty() { words } else { format!("`{place}`{value}: {words}") }
 }
 

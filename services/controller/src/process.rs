@@ -5,8 +5,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use kort_control::{ControllerConfig, LawKind, ModelError};
-use kort_proto::config::{Config, ConfigError, Thruster};
+use kort_control::{ControllerConfig, LawKind, ModelError, advise};
+use kort_proto::config::{Config, ConfigError, DEFAULT_LAW, Thruster};
 use kort_proto::messages::{Answered, Reply, RequestKind, Timing};
 use kort_proto::revision;
 use kort_proto::transport::{ControllerPorts, Deployment, TransportError, keep_on, monotonic_ns, realtime};
@@ -95,7 +95,8 @@ pub fn problems(config: &Config, id: &str) -> Vec<ControllerError> {
             None
         }
     };
-    let law = law(config, id, thruster).map_err(|errors| wrong.extend(errors)).ok();
+    let of_rig = rig.as_ref().map(|(file, rig)| (file.as_str(), rig));
+    let law = law(config, id, thruster, of_rig).map_err(|errors| wrong.extend(errors)).ok();
     if let (Some((file, rig)), Some(law)) = (rig, law) {
         let tick = Tick::new(&rig, &law, thruster.controller_period_ns(), 0);
         wrong.extend(tick.err().map(|error| ControllerError::Model { file, error }));
@@ -111,7 +112,7 @@ pub fn run(config: &Config, deployment: &Deployment, id: &str, latched: u64) -> 
     let thruster = config.thruster(id)?;
     let (file, text) = config.rig_text(id, thruster)?;
     let rig = Rig::from_toml(&text).map_err(|error| ControllerError::Rig { file: file.clone(), error })?;
-    let law = match law(config, id, thruster) {
+    let law = match law(config, id, thruster, Some((&file, &rig))) {
         Ok(law) => law,
         // There is at least one.
         Err(wrong) => return wrong.into_iter().next().map_or(Ok(()), Err),
@@ -166,22 +167,34 @@ pub fn run(config: &Config, deployment: &Deployment, id: &str, latched: u64) -> 
     Ok(())
 }
 
-/// Law, observer, estimator and options as the deployment says, or everything that is wrong with them.
-fn law(config: &Config, id: &str, thruster: &Thruster) -> Result<ControllerConfig, Vec<ControllerError>> {
+/// Law, observer, estimator and options as the deployment says, or everything that is wrong with them; where it takes the
+/// default, the one of `kort explain --for` for this rig.
+fn law(
+    config: &Config,
+    id: &str,
+    thruster: &Thruster,
+    rig: Option<(&str, &Rig)>,
+) -> Result<ControllerConfig, Vec<ControllerError>> {
     let keys = &thruster.controller;
-    let mut law = ControllerConfig::default();
+    let period_s = thruster.controller_period_ns() as f64 * 1e-9;
+    let advised = rig.filter(|_| keys.takes_default()).map(|(file, rig)| {
+        let of_rig = |error| vec![ControllerError::Model { file: file.to_owned(), error }];
+        advise(rig, period_s).map(|advice| advice.config).map_err(of_rig)
+    });
+    let advised = advised.transpose()?;
+    let mut law = advised.clone().unwrap_or_default();
     if keys.file != Path::new("") {
         let key = format!("thrusters.{id}.controller.file");
         let (file, text) = config.text_of(&key, &keys.file, &[]).map_err(|error| vec![error.into()])?;
         let of_file = |error| ControllerError::Law { file: file.clone(), error };
         law = ControllerConfig::from_toml_with_all(&text)
             .map_err(|wrong| wrong.into_iter().map(of_file).collect::<Vec<_>>())?;
+        law.law = advised.map_or(law.law, |advised| advised.law);
     }
-    if !keys.law.is_empty() {
-        law.law = LawKind::from_name(&keys.law).ok_or_else(|| {
+    if let Some(name) = keys.law.as_ref().filter(|name| *name != DEFAULT_LAW) {
+        law.law = LawKind::from_name(name).ok_or_else(|| {
             let error = config.error(format!(
-                "`thrusters.{id}.controller.law` = \"{}\" is no control law\nhint: known are {}",
-                keys.law,
+                "`thrusters.{id}.controller.law` = \"{name}\" is no control law\nhint: known are {}, {DEFAULT_LAW} (what `kort explain --for RIG` names)",
                 LawKind::ALL.map(LawKind::name).join(", ")
             ));
             vec![error.into()]

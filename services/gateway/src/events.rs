@@ -1,17 +1,20 @@
 //! The event log as the gateway keeps it: a thread of its own writes, and reads what the supervisor wrote too.
 
+mod pace;
+
 use std::collections::{BTreeMap, VecDeque};
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use kort_proto::events::{Event, EventKind, EventLog, Mark, Standing};
 use kort_proto::faults::Fault;
 
 use crate::record::Recorder;
 use crate::thruster::lock;
+use pace::Pace;
 
 /// Events kept at hand; the files hold more.
 const AT_HAND: usize = 5000;
@@ -26,6 +29,7 @@ pub struct Events {
     outbox: SyncSender<Event>,
     waiting: AtomicU64,
     known: Mutex<Known>,
+    pace: Mutex<Pace>,
     /// The files, read by one at a time.
     files: Mutex<EventLog>,
     recorder: Arc<Recorder>,
@@ -52,6 +56,7 @@ impl Events {
             outbox,
             waiting,
             known: Mutex::default(),
+            pace: Mutex::default(),
             files: Mutex::new(log.clone()),
             recorder,
         });
@@ -77,6 +82,7 @@ impl Events {
 
     /// Waits a moment for what was noted to be written: the process is about to end.
     pub fn settle(&self) {
+        self.tell_held(true);
         for _ in 0..50 {
             if self.waiting.load(Ordering::Relaxed) == 0 {
                 return;
@@ -85,9 +91,23 @@ impl Events {
         }
     }
 
-    /// An event of now.
+    /// An event of now; repeats of it are told together, with their count.
     pub fn tell(&self, kind: EventKind, thruster: Option<&str>, who: &str, detail: impl Into<String>) {
-        self.note(Event::now(kind, thruster, who, detail));
+        let event = Event::now(kind, thruster, who, detail);
+        // Told later it would clear what came meanwhile.
+        let now = match kind {
+            EventKind::FaultsCleared => Some(event),
+            _ => lock(&self.pace).take(event, Instant::now()),
+        };
+        if let Some(event) = now {
+            self.note(event);
+        }
+    }
+
+    /// Tells the repeats that were held back, those that are due or all.
+    fn tell_held(&self, all: bool) {
+        let due = lock(&self.pace).due(Instant::now(), all);
+        due.into_iter().for_each(|event| self.note(event));
     }
 
     /// The newest events, at most so many, oldest first.
@@ -165,6 +185,7 @@ fn keep(log: &EventLog, mut mark: Mark, inbox: &Receiver<Event>, events: &Events
             }
             events.waiting.fetch_sub(1, Ordering::Relaxed);
         }
+        events.tell_held(false);
         let end = log.end();
         if end != mark {
             events.learn(log.read_after(mark));

@@ -94,6 +94,14 @@ impl Gate {
         if let Some(identity) = self.tokens.remembered(&token) {
             return Ok(identity);
         }
+        let wrong = || {
+            Problem::new(Kind::TokenRequired, "the token is not known, or was revoked")
+                .hint("`kort token new NAME --role viewer|pilot|admin` makes another")
+        };
+        // Whoever floods with wrong ones, from however many addresses, takes nobody's turn at argon2.
+        if !self.tokens.is_likely(&token) {
+            return Err(wrong());
+        }
         // However many wait with something else, from wherever: a stop does not stand behind them.
         let queue = if stops { &self.stops } else { &self.others };
         let lane = queue.lanes.of(peer);
@@ -106,10 +114,7 @@ impl Gate {
         let theirs = Arc::clone(app);
         let found =
             tokio::task::spawn_blocking(move || theirs.gate().tokens.verify(&token)).await.ok().flatten();
-        found.ok_or_else(|| {
-            Problem::new(Kind::TokenRequired, "the token is not known, or was revoked")
-                .hint("`kort token new NAME --role viewer|pilot|admin` makes another")
-        })
+        found.ok_or_else(wrong)
     }
 }
 

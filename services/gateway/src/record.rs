@@ -167,15 +167,13 @@ impl Recorder {
         };
         let failed = |error: &io::Error| self.failed(&name, error);
         let shared = Arc::new(Mutex::new(info.clone()));
-        let job = Job::begin(
-            &self.folder,
-            subject,
-            self.limits,
-            Arc::clone(&shared),
-            now,
-            together.map(|set| set.first_ns),
-        )
-        .map_err(|error| failed(&error))?;
+        // It may have been removed since the gateway started.
+        let job = fs::create_dir_all(&self.folder)
+            .and_then(|()| {
+                let first_ns = together.map(|set| set.first_ns);
+                Job::begin(&self.folder, subject, self.limits, Arc::clone(&shared), now, first_ns)
+            })
+            .map_err(|error| failed(&error))?;
         let (items, inbox) = sync_channel(QUEUE_ROWS);
         let theirs = Arc::clone(self);
         let thread = std::thread::Builder::new()

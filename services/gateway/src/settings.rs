@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use kort_control::model::ControlModel;
-use kort_control::{ControllerConfig, LawKind};
+use kort_control::{ControllerConfig, LawKind, advise};
 use kort_proto::config::{Config, ConfigError, Thruster};
 use kort_thruster::rig::{AmplifierKind, Rig};
 use serde::de::Error as _;
@@ -337,7 +337,8 @@ pub fn thrusters_with_all(config: &Config) -> (Vec<Deployed>, Vec<ConfigError>) 
                 None
             }
         };
-        let controller = controller(config, id, thruster).map_err(|errors| wrong.extend(errors)).ok();
+        let of_rig = rig.as_ref().map(|(.., rig)| rig);
+        let controller = controller(config, id, thruster, of_rig).map_err(|errors| wrong.extend(errors)).ok();
         let ((file, text, rig), controller) = (rig?, controller?);
         let heartbeat = Duration::from_nanos(thruster.controller_period_ns());
         let speed_limit_rad_s = thruster
@@ -363,10 +364,19 @@ pub fn thrusters_with_all(config: &Config) -> (Vec<Deployed>, Vec<ConfigError>) 
     (read, wrong)
 }
 
-/// The file of law, observer and estimator; the deployment's law goes before its own.
-fn controller(config: &Config, id: &str, thruster: &Thruster) -> Result<ControllerConfig, Vec<ConfigError>> {
+/// The file of law, observer and estimator; the deployment's law goes before its own, and where neither is stated the rig's.
+fn controller(
+    config: &Config,
+    id: &str,
+    thruster: &Thruster,
+    rig: Option<&Rig>,
+) -> Result<ControllerConfig, Vec<ConfigError>> {
     let keys = &thruster.controller;
-    let mut stated = ControllerConfig::default();
+    let period_s = thruster.controller_period_ns() as f64 * 1e-9;
+    // The controller's process refuses a rig that has no default in its own words.
+    let advised = rig.filter(|_| keys.takes_default()).and_then(|rig| advise(rig, period_s).ok());
+    let advised = advised.map(|advice| advice.config);
+    let mut stated = advised.clone().unwrap_or_default();
     if keys.file != Path::new("") {
         let key = format!("thrusters.{id}.controller.file");
         let (file, text) = config.text_of(&key, &keys.file, &[]).map_err(|error| vec![error])?;
@@ -374,8 +384,9 @@ fn controller(config: &Config, id: &str, thruster: &Thruster) -> Result<Controll
         stated = ControllerConfig::from_toml_with_all(&text)
             .map_err(|wrong| wrong.iter().map(|error| words(error.to_string())).collect::<Vec<_>>())?;
     }
-    // The controller's process refuses another law in its own words.
-    stated.law = LawKind::from_name(&keys.law).unwrap_or(stated.law);
+    // And another law too.
+    let named = keys.law.as_deref().and_then(LawKind::from_name);
+    stated.law = named.or(advised.map(|advised| advised.law)).unwrap_or(stated.law);
     Ok(stated)
 }
 

@@ -78,6 +78,21 @@ struct Book {
 struct Entry {
     role: Role,
     hash: String,
+    /// The beginning of the whole token's SHA-256: tells a wrong token from this one without argon2. Of the secret's 256
+    /// random bits it leaves whoever reads the file 192 to guess, each against argon2. A token of before has none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    check: Option<String>,
+}
+
+/// Bytes of the digest that `check` holds.
+const CHECK: usize = 8;
+
+fn digest(token: &str) -> [u8; 32] {
+    Sha256::digest(token.as_bytes()).into()
+}
+
+fn check(token: &str) -> String {
+    digest(token).iter().take(CHECK).map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// What to do where somebody else could have written the file.
@@ -143,11 +158,12 @@ pub fn make(file: &Path, name: &str, role: Role) -> Result<String, TokenError> {
         |what: String| fail(what, "see that the random source and memory of this machine are usable");
     let salt = SaltString::encode_b64(&rand::random::<[u8; 16]>()).map_err(|e| unable(e.to_string()))?;
     let hash = argon2().hash_password(secret.as_bytes(), &salt).map_err(|e| unable(e.to_string()))?;
-    book.tokens.insert(name.to_owned(), Entry { role, hash: hash.to_string() });
+    let token = format!("{name}.{secret}");
+    book.tokens.insert(name.to_owned(), Entry { role, hash: hash.to_string(), check: Some(check(&token)) });
     write(file, &book).map_err(|error| {
         fail(error.to_string(), "gateway.tokens in kort.toml names the file; its folder must be writable")
     })?;
-    Ok(format!("{name}.{secret}"))
+    Ok(token)
 }
 
 /// Whole or not at all, and for this user's eyes only.
@@ -211,7 +227,7 @@ impl Tokens {
     /// Whose token is this, if it was accepted before? Fast, and in the same time whatever is shown.
     pub fn remembered(&self, token: &str) -> Option<Identity> {
         self.refresh();
-        let digest: [u8; 32] = Sha256::digest(token.as_bytes()).into();
+        let digest = digest(token);
         let known = lock(&self.known);
         let mut found = None;
         for (accepted, identity) in &known.accepted {
@@ -220,6 +236,24 @@ impl Tokens {
             }
         }
         found
+    }
+
+    /// Could this be one of the tokens? False costs no argon2, and takes the same time whatever the name: a flood of wrong
+    /// tokens keeps nobody waiting. As long as one in the file has no check every token could be, for else time would tell
+    /// which names there are.
+    pub fn is_likely(&self, token: &str) -> bool {
+        let shown = check(token);
+        let known = lock(&self.known);
+        let tokens = &known.book.tokens;
+        let name = token.split_once('.').map_or("", |(name, _)| name);
+        // Of every token, so that where it stands tells nothing either.
+        tokens.iter().fold(false, |likely, (of, entry)| {
+            let alike = entry
+                .check
+                .as_ref()
+                .is_none_or(|check| bool::from(check.as_bytes().ct_eq(shown.as_bytes())) & (of == name));
+            likely | alike
+        })
     }
 
     /// Whose token is this? Takes tens of milliseconds, the same for a name that is not known.
@@ -232,9 +266,9 @@ impl Tokens {
         let hash = entry.as_ref().map_or(NOBODY, |entry| entry.hash.as_str());
         let matches = PasswordHash::new(hash)
             .is_ok_and(|hash| argon2().verify_password(secret.as_bytes(), &hash).is_ok());
-        let Entry { role, hash } = entry.filter(|_| matches)?;
+        let Entry { role, hash, .. } = entry.filter(|_| matches)?;
         let identity = Identity { name: name.to_owned(), role, hash: Some(hash.into()) };
-        let digest: [u8; 32] = Sha256::digest(token.as_bytes()).into();
+        let digest = digest(token);
         let mut known = lock(&self.known);
         // The file may have changed meanwhile.
         if !known.book.holds(&identity) {
@@ -283,13 +317,21 @@ mod tests {
         {
             assert_eq!(tokens.verify(wrong), None, "{wrong}");
             assert_eq!(tokens.remembered(wrong), None, "{wrong}");
+            assert!(!tokens.is_likely(wrong), "{wrong} costs argon2");
         }
+        assert!(tokens.is_likely(&token));
         assert!(make(&file, "bridge", Role::Admin).unwrap_err().to_string().contains("already"));
         assert!(make(&file, "a b", Role::Admin).unwrap_err().to_string().contains("hint:"));
         // What others may write is believed no more, the moment they may.
         fs::set_permissions(&file, fs::Permissions::from_mode(0o666)).unwrap();
         assert!(Tokens::open(&file).unwrap_err().to_string().contains("mode 666"));
         fs::set_permissions(&file, fs::Permissions::from_mode(0o600)).unwrap();
+        // One that a version before made has no check: it is known all the same, and every token could be it.
+        let without: Vec<_> = kept.lines().filter(|line| !line.starts_with("check")).collect();
+        fs::write(&file, without.join("\n")).unwrap();
+        assert_eq!(tokens.remembered(&token), None);
+        assert!(tokens.is_likely("nobody.abc"));
+        assert_eq!(tokens.verify(&token).map(|bridge| bridge.name), Some("bridge".into()));
         fs::write(&file, "").unwrap();
         assert_eq!(tokens.remembered(&token), None, "revoked without a restart");
         assert!(!tokens.stands(&bridge), "and whoever is in by it is out");

@@ -227,6 +227,8 @@ pub struct FaultView {
     pub name: &'static str,
     /// What to do, in a line; `GET /v1/faults/{code}` tells it all.
     pub help: &'static str,
+    /// Which recording ended and why, where it is `recording_failed`; else null: name and help say it.
+    pub cause: Option<String>,
     /// When it was latched, RFC 3339; null if the event log does not say.
     pub since: Option<String>,
     /// What the thruster did just before; null if that is not known.

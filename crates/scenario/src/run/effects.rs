@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use kort_thruster::effects::{self, Descriptor, Scale};
+use kort_thruster::place::near;
 
 use crate::{Scenario, ScenarioError};
 
@@ -47,28 +48,40 @@ pub fn used_effect(
             ScenarioError::Unknown { key, found, hint: nearest(name, &names) }
         })
         .collect();
-    let mut used = Vec::with_capacity(specs.len());
+    let (mut used, mut missing) = (Vec::with_capacity(specs.len()), Vec::new());
     for spec in &specs {
         let key = format!("{given}.{}", spec.name);
-        let range = format!("{} to {} {}", spec.low, spec.high, spec.unit);
-        let meant = |name: &&String| strsim::jaro_winkler(name, spec.name) > 0.75;
+        let unit = if spec.unit == "1" { String::new() } else { format!(" {}", spec.unit) };
+        let range = format!("{} to {}{unit}", spec.low, spec.high);
+        let meant = |name: &&String| near(name, [spec.name]).is_some();
         match values.get(spec.name) {
             None if unknown.iter().any(meant) => {}
-            None => {
-                let hint = format!("{range}, for example {}", spec.start);
-                wrong.push(ScenarioError::Missing { key, hint });
-            }
+            None => missing.push((key, format!("{range}, for example {}", spec.start), spec.name)),
             Some(v) if *v >= spec.low && *v <= spec.high => used.push(*v),
             Some(v) => wrong.push(ScenarioError::Value { key, found: v.to_string(), allowed: range }),
         }
+    }
+    // Those of one effect at once, as of a rig's.
+    let hint = match missing.as_slice() {
+        [] => None,
+        [(_, hint, _)] => Some(hint.clone()),
+        several => Some(
+            several.iter().map(|(_, hint, name)| format!("{name}: {hint}")).collect::<Vec<_>>().join("; "),
+        ),
+    };
+    if let Some(hint) = hint {
+        let keys: Vec<_> = missing.into_iter().map(|(key, ..)| key).collect();
+        wrong.push(ScenarioError::Missing { key: keys.join("`, `"), hint });
     }
     if wrong.is_empty() { Ok((descriptor, used)) } else { Err(wrong) }
 }
 
 /// The name that was meant, perhaps, and all there are.
 fn nearest(wanted: &str, names: &[&str]) -> String {
-    let best = names
-        .iter()
-        .max_by(|a, b| strsim::jaro_winkler(wanted, a).total_cmp(&strsim::jaro_winkler(wanted, b)));
-    best.map_or("it has none".to_string(), |n| format!("did you mean `{n}`? known are {}", names.join(", ")))
+    let known = format!("known are {}", names.join(", "));
+    match near(wanted, names.iter().copied()) {
+        Some(near) => format!("did you mean `{near}`? {known}"),
+        None if names.is_empty() => "it has none".to_owned(),
+        None => known,
+    }
 }

@@ -107,7 +107,10 @@ fn errors_name_the_key() {
         ..scenario(hold.clone())
     };
     assert!(error(&one("coulomb_frictoin", &[])).contains("did you mean `coulomb_friction`"));
-    assert!(error(&one("rotational_flow", &[])).contains("effects[0].parameters.swirl_yield` is missing"));
+    assert!(
+        error(&one("rotational_flow", &[])).contains("`effects[0].parameters.swirl_yield`, `"),
+        "all of them"
+    );
     assert!(error(&one("rotational_flow", &[("swirl_yield", 99.0)])).contains("0 to 3"));
     assert!(error(&one("rotational_flow", &[("yield", 0.1)])).contains("swirl_yield"));
     let duty = Scenario { command: Command::DutyCmd, ..scenario(hold.clone()) };

@@ -113,7 +113,6 @@ fn read_one(at: &str, entry: &toml::Table, wrong: &mut Vec<RigError>) -> Option<
     let (any, stated) = (specs.iter().any(strength), stated.iter().any(|k| !specs[*k].shape));
     if !missing.is_empty() {
         let keys: Vec<_> = missing.iter().map(|s| format!("{at}.{}", s.name)).collect();
-        let unit = |spec: &Spec| if spec.unit == "1" { String::new() } else { format!(" [{}]", spec.unit) };
         let add: Vec<_> = missing.iter().map(|s| format!("{} = …{}", s.name, unit(s))).collect();
         wrong.push(RigError::Missing {
             key: keys.join("`, `"),
@@ -148,6 +147,11 @@ fn named(at: &str, entry: &toml::Table) -> Result<&'static Descriptor, RigError>
     Ok(descriptor)
 }
 
+/// A parameter's unit in brackets; a number has none.
+fn unit(spec: &Spec) -> String {
+    if spec.unit == "1" { String::new() } else { format!(" [{}]", spec.unit) }
+}
+
 /// A value whose sign the effect allows; how large it may be depends on the rig.
 fn in_range(key: &str, quantity: Quantity, spec: &Spec, wrong: &mut Vec<RigError>) -> Option<Quantity> {
     let value = quantity.value;
@@ -161,7 +165,7 @@ fn in_range(key: &str, quantity: Quantity, spec: &Spec, wrong: &mut Vec<RigError
     if fits && value.is_finite() {
         return Some(quantity);
     }
-    let allowed = format!("{allowed} [{}]", spec.unit);
+    let allowed = format!("{allowed}{}", unit(spec));
     wrong.push(value_error(key, value, &allowed, "`kort explain` tells its equation"));
     None
 }

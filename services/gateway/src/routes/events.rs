@@ -57,16 +57,18 @@ struct EventView {
     fault: Option<u32>,
     /// When it came about, RFC 3339, where that was long before it was told.
     since: Option<String>,
+    /// How often it happened since then, where the same was repeated and is told once; else null.
+    times: Option<u64>,
     /// What the thruster did just before a stop that nobody asked for.
     before: Option<BeforeView>,
 }
 
 impl From<Event> for EventView {
     fn from(event: Event) -> EventView {
-        let Event { id, time, kind, thruster, who, detail, fault, since, before, .. } = event;
+        let Event { id, time, kind, thruster, who, detail, fault, since, times, before, .. } = event;
         let before =
             before.map(|b| BeforeView { thrust_n: b.thrust_n, shaft_speed_rad_s: b.shaft_speed_rad_s });
-        EventView { id, time, kind, thruster, who, detail, fault, since, before }
+        EventView { id, time, kind, thruster, who, detail, fault, since, times, before }
     }
 }
 

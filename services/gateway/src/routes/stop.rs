@@ -1,6 +1,7 @@
 //! Stopping everything.
 
 use std::sync::Arc;
+use std::time::Instant;
 
 use axum::extract::{Extension, State};
 use kort_proto::events::EventKind;
@@ -45,6 +46,9 @@ pub async fn stop_all(app: &Arc<App>, who: &str) -> Result<Vec<String>, Problem>
 
 async fn stop_and_tell(app: Arc<App>, who: String) -> Result<Vec<String>, Problem> {
     let why = format!("{who} stopped every thruster");
+    let now = Instant::now();
+    let armed = app.thrusters().iter().filter(|thruster| thruster.heard().armed(now));
+    let armed: Vec<&str> = armed.map(|thruster| thruster.id.as_str()).collect();
     let asked: Vec<_> = app
         .thrusters()
         .iter()
@@ -60,10 +64,13 @@ async fn stop_and_tell(app: Arc<App>, who: String) -> Result<Vec<String>, Proble
             _ => silent.push(id),
         }
     }
-    let confirmed = match stopped.as_slice() {
+    let named = |words: &str, ids: &[&str]| match ids {
         [] => String::new(),
-        ids => format!("; confirmed: {}", ids.join(", ")),
+        ids => format!("; {words}: {}", ids.join(", ")),
     };
+    let confirmed = named("confirmed", &stopped.iter().map(String::as_str).collect::<Vec<_>>());
+    // One that had something to stop is another event than those around it that had not.
+    let confirmed = confirmed + &named("was armed", &armed);
     if silent.is_empty() {
         app.events().tell(EventKind::Stopped, None, &who, why + &confirmed);
         return Ok(stopped);

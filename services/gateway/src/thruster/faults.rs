@@ -2,7 +2,7 @@
 
 use std::time::{Instant, SystemTime};
 
-use kort_proto::events::Before;
+use kort_proto::events::{Before, EventKind};
 use kort_proto::faults::Fault;
 
 use super::Thruster;
@@ -34,6 +34,10 @@ impl Thruster {
             code: fault.code(),
             name: fault.name(),
             help: fault.help(),
+            cause: came
+                .as_ref()
+                .filter(|event| event.kind == EventKind::RecordingEnded)
+                .map(|event| event.detail.clone()),
             since: told.or(last_word.as_ref().map(|(time, _)| time.clone())),
             before: before.or(last_word.map(|(_, before)| before)).map(|before| BeforeView {
                 thrust_n: before.thrust_n,

@@ -37,6 +37,9 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     check_writable(&args.output)?;
     let map = files::read_columns(args.columns.as_deref())?;
     let recording = files::read_recording(&args.recording, map.as_ref())?;
+    if !recording.unused.is_empty() {
+        eprintln!("columns not used: {}", recording.unused.join(", "));
+    }
     recording.save(&args.output).map_err(Failure::failed)?;
     let names: Vec<&str> = recording.columns.iter().map(|column| column.name.as_str()).collect();
     print(&format!("{}: {} rows of {}\n", args.output.display(), recording.rows(), names.join(", ")));

@@ -5,14 +5,17 @@ mod advice;
 mod controllers;
 
 use std::fmt::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 use kort_control::About;
 use kort_control::known::uses::{self, Use};
 use kort_thruster::effects::{self, ALL, Descriptor, Scale};
+use kort_thruster::parameters::Parameters;
 use serde::Serialize;
 
 use crate::failure::{Failure, Outcome, print, print_json};
+use crate::files;
 
 const EXAMPLE: &str = "\
 Example: kort explain rotational_flow
@@ -111,6 +114,30 @@ fn find(id: &str) -> Result<&'static Descriptor, Failure> {
     })
 }
 
+/// The rig whose sizes stand for those of every other in ranges.
+const STAND: &str = "whitcomb-yoerger-1999";
+
+/// Its scale, at the full current of its drive.
+fn stand() -> &'static Scale {
+    static OF_STAND: OnceLock<Scale> = OnceLock::new();
+    OF_STAND.get_or_init(|| {
+        let Ok(rig) = files::read_rig(Path::new(STAND)) else { return Scale::ANY };
+        let parameters = Parameters::stated(&rig);
+        kort_scenario::scale(&rig, &parameters, rig.amplifier.current_limit_a, 1e-3, 60.0)
+    })
+}
+
+/// A number with as many digits as a range needs.
+fn digits(value: f64) -> String {
+    let decimals = if value == 0.0 || !value.is_finite() {
+        0
+    } else {
+        (2 - value.abs().log10().floor() as i32).clamp(0, 12)
+    };
+    let text = format!("{value:.*}", decimals as usize);
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
 #[derive(Serialize)]
 struct Document {
     schema: &'static str,
@@ -146,6 +173,11 @@ struct Entry {
 struct Parameter {
     name: &'static str,
     unit: &'static str,
+    /// Smallest and largest value that a scenario, a fit or a diagnosis takes it from; null where there is none.
+    low: f64,
+    high: f64,
+    /// The rig of which the range is, where it goes by the rig's size.
+    range_of: Option<&'static str>,
     /// "strength": the effect vanishes when all strengths are zero; "shape": where, how fast.
     role: &'static str,
 }
@@ -170,7 +202,15 @@ impl Entry {
             reference: effect.reference,
             parameters: (effect.parameters)(&Scale::ANY)
                 .into_iter()
-                .map(|s| Parameter { name: s.name, unit: s.unit, role: role(s.shape) })
+                .zip((effect.parameters)(stand()))
+                .map(|(any, s)| Parameter {
+                    name: s.name,
+                    unit: s.unit,
+                    low: s.low,
+                    high: s.high,
+                    range_of: ((any.low, any.high) != (s.low, s.high)).then_some(STAND),
+                    role: role(s.shape),
+                })
                 .collect(),
         }
     }
@@ -184,6 +224,16 @@ impl Entry {
         self.parameters.iter().map(one).collect::<Vec<_>>().join(", ")
     }
 
+    /// The same with the range that each may have.
+    fn parameter_ranges(&self) -> String {
+        let one = |p: &Parameter| {
+            let unit = if p.unit == "1" { String::new() } else { format!(" {}", p.unit) };
+            let of = p.range_of.map_or_else(String::new, |rig| format!(" on the rig {rig}"));
+            format!("{} ({}): {} to {}{unit}{of}", p.name, p.role, digits(p.low), digits(p.high))
+        };
+        self.parameters.iter().map(one).collect::<Vec<_>>().join("; ")
+    }
+
     /// Headings and texts, in the order of reading.
     fn sections(&self) -> [(&'static str, String); 8] {
         [
@@ -192,13 +242,15 @@ impl Entry {
             ("What it looks like", self.signature.into()),
             ("Confused with", self.confused_with.join(", ")),
             ("Separated by", self.separated_by.into()),
-            ("Parameters", self.parameter_list()),
+            (PARAMETERS, self.parameter_list()),
             (USED_FOR, format!("{}.", self.usage)),
             ("Reference", self.reference.into()),
         ]
     }
 }
 
+/// Heading of an effect's parameters.
+const PARAMETERS: &str = "Parameters";
 /// Heading of what laws and observers do with an effect.
 const USED_FOR: &str = "Known in a rig, used for";
 
@@ -219,6 +271,7 @@ fn table(effects: &[&Descriptor]) -> String {
 fn in_full(entry: &Entry) -> String {
     let mut text = format!("{} ({} path)\n", entry.effect, entry.path);
     for (heading, body) in entry.sections() {
+        let body = if heading == PARAMETERS { entry.parameter_ranges() } else { body };
         let options = textwrap::Options::new(WIDTH).initial_indent("  ").subsequent_indent("  ");
         let _ = write!(text, "\n{heading}\n{}\n", textwrap::fill(&body, options));
     }
@@ -278,6 +331,20 @@ mod tests {
         }
         assert!(find("xyz").map(|d| d.id).unwrap_err().to_string().contains("lists the catalogue"));
         assert_eq!(find("Rotational-Flow").unwrap().id, "rotational_flow");
+    }
+
+    #[test]
+    fn an_effect_is_told_with_the_ranges_of_its_parameters() {
+        for effect in ALL.iter() {
+            let entry = Entry::of(effect);
+            for parameter in &entry.parameters {
+                assert!(parameter.low <= parameter.high, "{}.{}", entry.effect, parameter.name);
+            }
+        }
+        let text = in_full(&Entry::of(find("rotational_flow").unwrap()));
+        assert!(text.contains("swirl_yield (strength): 0 to 3"), "{text}");
+        let text = in_full(&Entry::of(find("coulomb_friction").unwrap()));
+        assert!(text.contains(STAND) && text.contains("N m on the rig"), "{text}");
     }
 
     #[test]
