@@ -77,7 +77,7 @@ pub fn deployment(text: &str) -> Result<(), String> {
     for (id, thruster) in &config.thrusters {
         kort_servo::settings::Settings::new(&config, id, thruster, &rig).map_err(|e| fail(e.to_string()))?;
         kort_servo::drives::choose(&config, id, thruster, &rig).map_err(|e| fail(e.to_string()))?;
-        kort_servo::sensors::choose(&config, id, thruster).map_err(|e| fail(e.to_string()))?;
+        kort_servo::sensors::choose(&config, id, thruster, &rig).map_err(|e| fail(e.to_string()))?;
     }
     Ok(())
 }

@@ -6,6 +6,7 @@ mod cia402;
 #[path = "../common/mod.rs"]
 mod common;
 mod iio;
+mod lies;
 mod link;
 mod mavlink;
 mod moteus;

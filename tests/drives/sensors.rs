@@ -20,8 +20,9 @@ fn servo(instrument: &str) -> Bench {
     Bench::start_at(site)
 }
 
+/// With so little torque that no thrust contradicts it.
 fn drive(bench: &mut Bench, ticks: usize) -> Vec<Telemetry> {
-    bench.send(ticks, |ports, _| ports.command.send(Command { drive: 2.0, ..Command::default() }).unwrap())
+    bench.send(ticks, |ports, _| ports.command.send(Command { drive: 0.8, ..Command::default() }).unwrap())
 }
 
 /// Readings of the thrust in the rows.

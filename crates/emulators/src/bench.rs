@@ -34,6 +34,9 @@ pub trait Device: Send {
 
     /// What is true at its motor.
     fn truth(&self) -> Truth;
+
+    /// What is done to its sensor from now on, where it has one that can be lied about.
+    fn mislead(&mut self, _mischief: Mischief) {}
 }
 
 /// What is true at the motor.
@@ -71,6 +74,48 @@ pub enum Mischief {
     Split,
     /// Noise between the answers; nothing is lost.
     Noisy,
+    /// Its sensor shows the other sign; the wire is sound.
+    Reversed,
+    /// Its sensor counts in a unit that is so many times larger (kilogram-force for newton, too many pole pairs): it shows that
+    /// part of what is true.
+    Scaled(u8),
+    /// The other way round: it shows so many times what is true.
+    Multiplied(u8),
+    /// Its sensor shows the same from now on.
+    Frozen,
+}
+
+/// What a sensor makes of what is true.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Lie {
+    mischief: Mischief,
+    held: f64,
+}
+
+impl Lie {
+    /// The lie that this mischief is, from now on; truth for one of the wire.
+    pub(crate) fn tell(&mut self, mischief: Mischief) {
+        self.mischief = mischief;
+    }
+
+    /// What is shown of what is true.
+    pub(crate) fn shown(&mut self, truth: f64) -> f64 {
+        let shown = truth * self.factor();
+        if self.mischief != Mischief::Frozen {
+            self.held = shown;
+        }
+        self.held
+    }
+
+    /// Shown over true.
+    pub(crate) fn factor(&self) -> f64 {
+        match self.mischief {
+            Mischief::Reversed => -1.0,
+            Mischief::Scaled(times) => 1.0 / f64::from(times),
+            Mischief::Multiplied(times) => f64::from(times),
+            _ => 1.0,
+        }
+    }
 }
 
 #[derive(Default)]
@@ -188,6 +233,12 @@ impl Bench {
         self.lock().truth
     }
 
+    /// The same for another device that measures there, whatever it is called by.
+    pub fn watched(&self) -> impl Fn() -> Truth + Send + use<> {
+        let shared = Arc::clone(&self.shared);
+        move || lock(&shared).truth
+    }
+
     /// When the power stage was asked for something last.
     pub fn driven(&self) -> Option<Instant> {
         self.lock().driven
@@ -241,6 +292,7 @@ impl<D: Device> Serving<D> {
             if let Some(code) = report {
                 self.device.report(code);
             }
+            self.device.mislead(mischief);
             far.plug(mischief != Mischief::Unplugged);
             let bytes = far.read();
             let mut said = self.device.hear(now_s, &bytes);
@@ -264,7 +316,12 @@ impl<D: Device> Serving<D> {
             }
             Mischief::Stale => frame.clone_from(&self.last),
             Mischief::Noisy => far.write(&[self.dice() | 0x80, self.dice() | 0x80]),
-            Mischief::None | Mischief::Split => self.last.clone_from(&frame),
+            Mischief::None
+            | Mischief::Split
+            | Mischief::Reversed
+            | Mischief::Scaled(_)
+            | Mischief::Multiplied(_)
+            | Mischief::Frozen => self.last.clone_from(&frame),
         }
         if mischief == Mischief::Split {
             let mut rest = frame.as_slice();

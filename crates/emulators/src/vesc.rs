@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use kort_thruster::rig::{AmplifierKind, Rig};
 
-use crate::bench::{Device, Truth};
+use crate::bench::{Device, Lie, Mischief, Truth};
 use crate::stand::Stand;
 
 /// Period of the thread that looks at the time-out, s.
@@ -76,6 +76,8 @@ pub struct Vesc {
     last_steps: f64,
     iq_sum: f64,
     iq_count: u32,
+    /// What its encoder makes of the shaft.
+    lie: Lie,
 }
 
 impl Vesc {
@@ -96,6 +98,7 @@ impl Vesc {
             last_steps: 0.0,
             iq_sum: 0.0,
             iq_count: 0,
+            lie: Lie::default(),
             make,
         };
         vesc.settings = vesc.stored();
@@ -184,7 +187,8 @@ impl Vesc {
             if self.iq_count == 0 { self.stand.current_a() } else { self.iq_sum / f64::from(self.iq_count) };
         (self.iq_sum, self.iq_count) = (0.0, 0);
         let sign = if self.make.reversed_encoder { -1.0 } else { 1.0 };
-        let erpm = sign * self.stand.shaft_speed_rad_s() * 60.0 / TAU * self.make.pole_pairs;
+        let erpm =
+            sign * self.lie.factor() * self.stand.shaft_speed_rad_s() * 60.0 / TAU * self.make.pole_pairs;
         for bit in (0..32).filter(|bit| mask & (1 << bit) != 0) {
             match bit {
                 0 => out.extend(312i16.to_be_bytes()),
@@ -237,8 +241,9 @@ impl Device for Vesc {
         self.iq_sum += self.stand.current_a();
         self.iq_count += 1;
         let steps = (self.stand.shaft_angle_rad() / TAU * 6.0 * self.make.pole_pairs).floor();
-        let moved = (steps - self.last_steps) as i32;
-        self.last_steps = steps;
+        let moved = ((steps - self.last_steps) * self.lie.factor()).round() as i32;
+        // What is less than a step of a slower count is kept.
+        self.last_steps += (f64::from(moved) / self.lie.factor()).round();
         self.tacho += moved;
         self.tacho_abs += moved.abs();
         Vec::new()
@@ -258,6 +263,10 @@ impl Device for Vesc {
 
     fn truth(&self) -> Truth {
         self.stand.truth(self.command())
+    }
+
+    fn mislead(&mut self, mischief: Mischief) {
+        self.lie.tell(mischief);
     }
 }
 

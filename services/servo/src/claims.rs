@@ -45,9 +45,11 @@ impl Claim {
     }
 }
 
-/// Where a path leads: `/dev/serial/by-id/…` and `/dev/ttyACM0` are one device. What is not there is what it is called.
+/// Where a path leads: `/dev/serial/by-id/…` and `/dev/ttyACM0` are one device. What is not there is what it is called in the
+/// folder that is; two names of one device that is not plugged in yet are told when its port is opened, by its lock.
 pub fn real(path: &Path) -> PathBuf {
-    path.canonicalize().unwrap_or_else(|_| path.to_owned())
+    let in_folder = || Some(path.parent()?.canonicalize().ok()?.join(path.file_name()?));
+    path.canonicalize().ok().or_else(in_folder).unwrap_or_else(|| path.to_owned())
 }
 
 /// A claim, and whose it is.

@@ -13,6 +13,7 @@ use kort_thruster::parameters::{Parameter, Parameters};
 use kort_thruster::rig::{Load, Rig};
 
 use crate::settings::Limits;
+use crate::water::Water;
 
 /// How long back-EMF or told speed may point the other way, s: longer than any drive and shaft take to turn round.
 const OPPOSED_S: f64 = 0.5;
@@ -26,9 +27,6 @@ const STOPS: f64 = 3.0;
 /// Fall of the shaft speed by which a shaft is turning round.
 const FALLING: f64 = 0.9;
 
-/// Share of its own slipstream at full drive, standing still, at which water can flow to a thruster: at the whole of it
-/// the thruster would push no more, and nothing that it drives goes so fast.
-const INFLOW_SHARE: f64 = 0.7;
 /// Share of the power of a stream that a free disc can take (Betz), and how much more a duct can make of it.
 const BETZ: f64 = 16.0 / 27.0;
 const DUCTED: f64 = 2.0;
@@ -52,9 +50,9 @@ pub struct Shaft {
 }
 
 impl Shaft {
-    /// Of a rig whose largest current and shaft speed are these. Water gives what a stream of `inflow_m_s` carries, or
-    /// one of the thruster's own slipstream; a dry shaft's load only what was put into it.
-    pub fn of(rig: &Rig, current_a: f64, speed_rad_s: f64, inflow_m_s: Option<f64>) -> Self {
+    /// Of a rig with this largest current, in this water. Water gives what its stream carries; a dry shaft's load only what
+    /// was put into it.
+    pub fn of(rig: &Rig, current_a: f64, water: &Water) -> Self {
         let p = Parameters::stated(rig);
         let inertia_kg_m2 = p.get(Parameter::InertiaKgM2);
         let lag_s = STOPS * rig.sensors.speed_filter_time_constant_s.unwrap_or(0.0);
@@ -62,13 +60,7 @@ impl Shaft {
             let torque_n_m = p.get(Parameter::TorqueConstantNmA) * current_a;
             return Self { lag_s, ..Self::dry(&rig.load, inertia_kg_m2, torque_n_m) };
         }
-        let flux = p.get(Parameter::DensityKgM3) * p.area_m2();
-        let (thrust, torque) = p.bollard_coefficients();
-        let fastest = (p.get(Parameter::TorqueConstantNmA) * current_a / torque).sqrt().min(speed_rad_s);
-        // T = rho A v^2 / 2 with the slipstream v far behind the disc.
-        let slipstream = fastest * (2.0 * thrust / flux).sqrt();
-        let inflow = inflow_m_s.unwrap_or(INFLOW_SHARE * slipstream);
-        let water_w = DUCTED * BETZ * 0.5 * flux * inflow.powi(3);
+        let water_w = DUCTED * BETZ * 0.5 * water.flux_kg_m * water.inflow_m_s.powi(3);
         let water_w = if water_w.is_finite() { water_w } else { f64::INFINITY };
         Self { inertia_kg_m2, water_w, stored_j: 0.0, lag_s }
     }

@@ -22,6 +22,7 @@ pub mod settings;
 mod still;
 pub mod sysfs;
 pub mod tick;
+pub mod water;
 
 #[cfg(feature = "process")]
 pub use process::{Inherited, ServoError, check, problems, run};

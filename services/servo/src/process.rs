@@ -96,7 +96,7 @@ fn of_one(config: &Config, id: &str, taken: &mut Vec<Taken>) -> Vec<ServoError> 
     let settings = settings.err().filter(|_| wrong.is_empty());
     wrong.extend(settings);
     let drive = drives::choose(config, id, thruster, &rig);
-    let sensors = sensors::choose(config, id, thruster);
+    let sensors = sensors::choose(config, id, thruster, &rig);
     takes(id, drive.as_ref().ok(), sensors.as_deref().unwrap_or_default(), taken);
     wrong.extend(drive.err());
     wrong.extend(sensors.err());
@@ -131,7 +131,7 @@ fn read(config: &Config, id: &str) -> Result<(Settings, drives::Chosen, Vec<sens
     let rig = Rig::from_toml(&text).map_err(|error| ServoError::Rig { file, error })?;
     let settings = Settings::new(config, id, thruster, &rig)?;
     let (drive, sensors) =
-        (drives::choose(config, id, thruster, &rig)?, sensors::choose(config, id, thruster)?);
+        (drives::choose(config, id, thruster, &rig)?, sensors::choose(config, id, thruster, &rig)?);
     takes_its_own(config, id, &drive, &sensors)?;
     Ok((settings, drive, sensors))
 }

@@ -7,6 +7,7 @@ use serde::Deserialize;
 
 use crate::direction::Shaft;
 use crate::drives::kind_of;
+use crate::water::Water;
 
 /// Ticks without a needed reading that trip where every tick has one.
 const MISSING_TICKS: u32 = 3;
@@ -71,6 +72,8 @@ pub struct Limits {
     pub winding: (f64, f64),
     /// What the shaft sensor's direction is held against.
     pub shaft: Shaft,
+    /// What torque, speed and thrust are held against.
+    pub water: Water,
 }
 
 impl Limits {
@@ -81,6 +84,7 @@ impl Limits {
         // Fastest honest change in one tick: full torque reversed on the bare inertia, tenfold,
         // and some counts of the encoder.
         let fastest = 2.0 * kt * current_a / rig.motor.inertia_kg_m2.value * period_s;
+        let water = Water::of(rig, current_a, speed_rad_s, None);
         let count = rig.sensors.encoder_counts_per_rev.map_or(0.0, |n| std::f64::consts::TAU / n / period_s);
         Self {
             kind: kind_of(rig),
@@ -98,7 +102,8 @@ impl Limits {
             frozen_s: 0.5,
             spike_rad_s: 10.0 * fastest + 4.0 * count,
             winding: (rig.motor.winding_resistance_ohm.map_or(f64::NAN, |r| r.value), kt),
-            shaft: Shaft::of(rig, current_a, speed_rad_s, None),
+            shaft: Shaft::of(rig, current_a, &water),
+            water,
         }
     }
 }
@@ -261,6 +266,7 @@ impl Settings {
         };
         let period_s = thruster.servo_period_ns() as f64 * 1e-9;
         let usual = Limits::usual(rig, drive_max, current_a, speed_rad_s, period_s);
+        let water = Water::of(rig, current_a, speed_rad_s, checks.inflow_m_s);
         let limits = Limits {
             trip_current_a: keys.trip_current_a.unwrap_or(usual.trip_current_a),
             continuous_current_a: keys.continuous_current_a.unwrap_or(usual.continuous_current_a),
@@ -274,7 +280,8 @@ impl Settings {
             temperature_c: keys.temperature_c.unwrap_or(usual.temperature_c),
             frozen_s: checks.frozen_s.unwrap_or(usual.frozen_s),
             spike_rad_s: checks.spike_rad_s.unwrap_or(usual.spike_rad_s),
-            shaft: Shaft::of(rig, current_a, speed_rad_s, checks.inflow_m_s),
+            shaft: Shaft::of(rig, current_a, &water),
+            water,
             ..usual
         };
         if limits.trip_current_a < current_a {
@@ -306,5 +313,28 @@ impl Settings {
         // Some ticks more, so that a device that falls silent is told by its own fault.
         self.limits.missing_ticks = ticks.saturating_add(MISSING_TICKS);
         self
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::guard::Guard;
+    use kort_proto::faults::Fault;
+    use kort_proto::signals::Signals;
+
+    /// Old values of a turning shaft are told where no `limits.speed_rad_s` is stated too.
+    #[test]
+    fn a_stale_angle_is_told_without_a_speed_limit() {
+        const RIG: &str = include_str!("../../../config/thrusters/whitcomb-yoerger-1999.toml");
+        let config = Config::parse("[thrusters.t1]\nrig = \"r\"\namplifier = \"vesc\"\n", None).unwrap();
+        let rig = Rig::from_toml(RIG).unwrap();
+        let limits = Settings::new(&config, "t1", config.thruster("t1").unwrap(), &rig).unwrap().limits;
+        assert_eq!(limits.speed_rad_s, f64::INFINITY);
+        let mut guard = Guard::new(limits, 1e-3);
+        let stale =
+            Signals { current_a: 0.6, shaft_speed_rad_s: 20.0, shaft_angle_rad: 3.0, ..Signals::UNKNOWN };
+        let seen = (0..1500).fold(0, |seen, _| seen | guard.inspect(&stale, 0.6, 1));
+        assert_eq!(seen, Fault::SensorFrozen.bit());
     }
 }

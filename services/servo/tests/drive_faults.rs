@@ -282,7 +282,7 @@ fn a_slow_instrument_does_not_cost_the_drive_its_first_ticks() {
     config.thrusters.get_mut("t1").unwrap().sensors.insert("meter".into(), cell);
     let thruster = config.thruster("t1").unwrap();
     let drive = drives::choose(&config, "t1", thruster, &rig()).unwrap();
-    let sensors = sensors::choose(&config, "t1", thruster).unwrap();
+    let sensors = sensors::choose(&config, "t1", thruster, &rig()).unwrap();
     // A drive that waited would have asked anew every 0.25 s, and be confirmed for the last fifth of that.
     let speaks = std::thread::spawn(move || {
         std::thread::sleep(Duration::from_millis(630));

@@ -1,127 +1,18 @@
 //! A shaft sensor that counts the wrong way round trips on every shipped rig and on dry ones, and an honest one does not:
 //! not on hard reversals, not on a propeller that a stream turns, not with an inertia far from the stated one.
 
-use std::path::PathBuf;
+mod common;
 
-use kort_proto::config::Config;
+use common::{LOADS, Trial, dry, stands};
 use kort_proto::faults::Fault;
 use kort_proto::signals::Signals;
-use kort_scenario::Measuring;
-use kort_servo::guard::Guard;
-use kort_servo::settings::{Limits, Settings};
-use kort_thruster::models::ModelName;
-use kort_thruster::parameters::{Parameter, Parameters};
-use kort_thruster::plant::{Plant, Tick};
-use kort_thruster::rig::{AmplifierKind, Rig};
 
-const PERIOD_S: f64 = 2e-3;
-
-/// A rig on the stand, behind the servo's guard.
-struct Stand {
-    name: String,
-    rig: Rig,
-    limits: Limits,
-    /// The thruster's own slipstream at full drive, m/s.
-    slipstream_m_s: f64,
-}
-
-/// A motor of 0.01 kg m^2 without a propeller on a current drive, with what hangs on it.
-fn dry(load: &str) -> Stand {
-    let text = format!(
-        "[rig]\nname = \"dry\"\nclass = \"bench\"\n[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = 0.01\n\
-         torque_constant_nm_a = 0.5\nviscous_friction_nm_s = 0.02\n[amplifier]\nkind = \"current\"\ncurrent_limit_a = 8.0\n\
-         time_constant_s = 0.002\n[sensors]\nspeed_filter_time_constant_s = 0.01\n[load]\n{load}\n"
-    );
-    let file = tempfile::NamedTempFile::new().expect("a file");
-    std::fs::write(file.path(), text).expect("written");
-    stand(&file.path().to_owned())
-}
-
-/// What hangs on dry shafts.
-const LOADS: [&str; 4] = [
-    "kind = \"none\"",
-    "kind = \"fan\"\nfan_coefficient_nm_s2 = 0.0002",
-    "kind = \"pendulum\"\nmass_kg = 1.0\nlength_m = 0.2",
-    "kind = \"two_mass\"\ninertia_kg_m2 = 0.02\nstiffness_nm_rad = 20.0\ndamping_nm_s = 0.02",
-];
-
-/// Every shipped rig.
-fn stands() -> Vec<Stand> {
-    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../config/thrusters");
-    let mut files: Vec<PathBuf> =
-        std::fs::read_dir(folder).expect("the rigs").map(|entry| entry.expect("a rig").path()).collect();
-    files.sort();
-    files.iter().map(stand).collect()
-}
-
-fn stand(file: &PathBuf) -> Stand {
-    let rig = Rig::from_toml(&std::fs::read_to_string(file).expect("a rig")).expect("a rig");
-    // What the rig does not say is the deployment's to say.
-    let limits = match rig.amplifier.kind {
-        AmplifierKind::Speed => "limits = { speed_rad_s = 157.0 }",
-        _ if rig.amplifier.current_limit_a.is_infinite() => "limits = { current_a = 24.0 }",
-        _ => "",
-    };
-    let text = format!(
-        "[thrusters.t1]\nrig = \"{}\"\namplifier = \"simulated\"\nservo = {{ rate_hz = 500 }}\ncontroller = {{ rate_hz = 50 }}\n{limits}\n",
-        file.display()
-    );
-    let config = Config::parse(&text, None).expect("a deployment");
-    let thruster = config.thruster("t1").expect("t1");
-    let limits = Settings::new(&config, "t1", thruster, &rig).expect("settings").limits;
-    let p = Parameters::stated(&rig);
-    let scale = kort_scenario::scale(&rig, &p, limits.drive_max, PERIOD_S, 60.0);
-    let flux = p.get(Parameter::DensityKgM3) * p.area_m2();
-    let slipstream_m_s = if rig.propeller.is_some() { (2.0 * scale.thrust_n / flux).sqrt() } else { 0.0 };
-    Stand { name: rig.name.clone(), rig, limits, slipstream_m_s }
-}
-
-/// What is done to a stand.
-struct Trial<'a> {
-    /// Wish for the drive as a share of the largest, by time in s.
-    wish: &'a dyn Fn(f64) -> f64,
-    /// Inflow as a share of the slipstream.
-    inflow: f64,
-    /// True inertia as a multiple of the stated one.
-    inertia: f64,
-    /// From when on the sensor counts the other way, s.
-    reversed_s: f64,
-    until_s: f64,
-}
-
-impl Stand {
-    /// When the guard says that the sensor is reversed, s.
-    fn trips_at(&self, trial: &Trial) -> Option<f64> {
-        let mut p = Parameters::stated(&self.rig);
-        p.set(Parameter::InertiaKgM2, p.get(Parameter::InertiaKgM2) * trial.inertia);
-        let scale = kort_scenario::scale(&self.rig, &p, self.limits.drive_max, PERIOD_S, 60.0);
-        let mut plant =
-            Plant::new(ModelName::Model2, &self.rig, &p, &[], PERIOD_S).with_encoder_quantised(true);
-        let mut measuring = Measuring::new(&self.rig.sensors, scale, 1.0, 7);
-        let mut guard = Guard::new(self.limits, PERIOD_S);
-        let inflow = trial.inflow * self.slipstream_m_s;
-        let mut drive = 0.0;
-        for n in 0..(trial.until_s / PERIOD_S) as u64 {
-            let time_s = n as f64 * PERIOD_S;
-            plant.step(&Tick { time_s, command: drive, ambient_m_s: (inflow, inflow), ..Tick::default() });
-            let read = measuring.read(time_s, &plant.sensed());
-            let sign = if time_s >= trial.reversed_s { -1.0 } else { 1.0 };
-            let measured = Signals {
-                current_a: if self.rig.amplifier.kind == AmplifierKind::Speed {
-                    f64::NAN
-                } else {
-                    read.current_a
-                },
-                shaft_speed_rad_s: sign * read.shaft_speed_rad_s,
-                shaft_angle_rad: sign * read.shaft_angle_rad,
-                ..Signals::UNKNOWN
-            };
-            if guard.inspect(&measured, drive, 1) & Fault::SensorReversed.bit() != 0 {
-                return Some(time_s);
-            }
-            drive = guard.limit((trial.wish)(time_s) * self.limits.drive_max, drive).0;
-        }
-        None
+/// From then on the sensor counts the other way.
+fn reversed(from_s: f64) -> impl Fn(f64, Signals) -> Signals {
+    move |time_s, read| {
+        let sign = if time_s >= from_s { -1.0 } else { 1.0 };
+        let (speed, angle) = (sign * read.shaft_speed_rad_s, sign * read.shaft_angle_rad);
+        Signals { shaft_speed_rad_s: speed, shaft_angle_rad: angle, ..read }
     }
 }
 
@@ -139,7 +30,9 @@ fn an_honest_sensor_trips_nothing() {
                             wish: &reversals,
                             inflow,
                             inertia,
-                            reversed_s: f64::INFINITY,
+                            shown: &|_, s| s,
+                            fault: Fault::SensorReversed,
+                            density: 1.0,
                             until_s: 6.0,
                         };
                         let tripped = stand.trips_at(&trial);
@@ -152,8 +45,15 @@ fn an_honest_sensor_trips_nothing() {
                 }
                 // A stream turns the propeller, and the motor brakes or drives it at every level.
                 let staircase = |t: f64| ((t / 1.5).floor() - 10.0).clamp(-10.0, 10.0) / 10.0;
-                let trial =
-                    Trial { wish: &staircase, inflow, inertia, reversed_s: f64::INFINITY, until_s: 31.5 };
+                let trial = Trial {
+                    wish: &staircase,
+                    inflow,
+                    inertia,
+                    shown: &|_, s| s,
+                    fault: Fault::SensorReversed,
+                    density: 1.0,
+                    until_s: 31.5,
+                };
                 let tripped = stand.trips_at(&trial);
                 assert_eq!(tripped, None, "{}: staircase, inflow {inflow}, inertia {inertia}", stand.name);
             }
@@ -168,7 +68,15 @@ fn a_reversed_sensor_on_a_dry_shaft_trips_at_a_thirtieth_of_full_drive_too() {
         let stand = dry(load);
         let swings = load.contains("pendulum");
         for level in [1.0, -1.0, 1.0 / 30.0] {
-            let trial = Trial { wish: &|_| level, inflow: 0.0, inertia: 1.0, reversed_s: 3.0, until_s: 12.0 };
+            let trial = Trial {
+                wish: &|_| level,
+                inflow: 0.0,
+                inertia: 1.0,
+                shown: &reversed(3.0),
+                fault: Fault::SensorReversed,
+                density: 1.0,
+                until_s: 12.0,
+            };
             let tripped = stand.trips_at(&trial);
             println!("{load}, level {level}: {tripped:?}");
             // A weight that the motor only lifts a little does not turn round: it hangs still, and shows nothing.
@@ -188,8 +96,15 @@ fn a_reversed_sensor_trips() {
                 // From the start, as wired wrongly, and under way.
                 for reversed_s in [0.0, 3.0] {
                     let inertia = 1.0;
-                    let trial =
-                        Trial { wish: &|_| level, inflow, inertia, reversed_s, until_s: reversed_s + 6.0 };
+                    let trial = Trial {
+                        wish: &|_| level,
+                        inflow,
+                        inertia,
+                        shown: &reversed(reversed_s),
+                        fault: Fault::SensorReversed,
+                        density: 1.0,
+                        until_s: reversed_s + 6.0,
+                    };
                     let tripped = stand.trips_at(&trial);
                     println!(
                         "{}: level {level}, inflow {inflow}, reversed at {reversed_s} s: {tripped:?}",

@@ -6,16 +6,19 @@
 //! `Kp = a1 w / p`, `Ki = a1 w`, `w = bandwidth_ratio x p`, kept under a fifth of what the sensor's
 //! filter and the drive allow.
 //!
+//! What the sensor may move is bounded: the blades' torque for a thrust is nearly the same in any inflow, so the torque stays
+//! within a factor of two of feedforward, and what a change of the setpoint asks for is added until the water follows.
+//!
 //! Assumes: a calibrated force sensor without structural resonance inside the bandwidth.
 //! Needs measured: thrust. Without it the integral fades and the law becomes `static_map`.
 //!
-//! Fails: sensor bias and gain are thrust errors one to one; near standstill the plant is slow and
+//! Fails: sensor bias and gain are thrust errors one to one, up to that factor; near standstill the plant is slow and
 //! so is the loop; ventilation makes it race, as it asks for thrust that is not to be had.
 
 use serde::{Deserialize, Serialize};
 
 use super::{Demand, LawInput};
-use crate::limits::{Integrator, LimitSet};
+use crate::limits::{Integrator, Limit, LimitSet};
 use crate::model::ControlModel;
 
 /// Options of the PI loop.
@@ -35,6 +38,13 @@ impl Default for ThrustPiOptions {
 /// Time in which the integral fades without its sensor, s.
 const FADE_S: f64 = 1.0;
 
+/// Torque over feedforward, either way, that a thrust can need: a duct or a hull takes up to 0.3 of it, and lift and drag are known
+/// to 0.3, 1 / 0.7^2. Beyond that not the thruster is off but the sensor: dead, frozen, in a wrong unit or reversed.
+const BAND: f64 = 2.0;
+/// The same about zero, as a share of the largest torque: friction that no model has, and the drag of blades that a stream
+/// turns.
+const FLOOR: f64 = 0.05;
+
 /// A running PI loop.
 #[derive(Clone, Copy, Debug)]
 pub struct ThrustPi {
@@ -42,6 +52,8 @@ pub struct ThrustPi {
     ceiling_rad_s: f64,
     slow_per_rad: f64,
     integral: Integrator,
+    /// Feedforward as the water has followed it, N m.
+    followed_n_m: f64,
     asked_n_m: f64,
     tracking_time_s: f64,
 }
@@ -55,6 +67,7 @@ impl ThrustPi {
             ceiling_rad_s: 0.2 / lags,
             slow_per_rad: model.poles_per_rad().0,
             integral: Integrator::default(),
+            followed_n_m: 0.0,
             asked_n_m: 0.0,
             tracking_time_s: 0.1,
         }
@@ -69,18 +82,31 @@ impl ThrustPi {
         let scale = speed.abs().max(0.5 * target.abs()).max(0.05 * model.speed_max_rad_s);
         let pole = self.slow_per_rad * scale;
         let bandwidth = (self.ratio * pole).min(self.ceiling_rad_s);
-        let mut torque = a1 * input.thrust_n + model.friction_n_m(speed);
-        if let Some(thrust) = input.measured.thrust_n {
-            let error = input.thrust_n - thrust;
-            let authority = 0.5 * model.torque_constant_nm_a * model.current_limit_a;
-            self.integral.step(a1 * bandwidth * error, authority, input.dt_s);
-            torque += a1 * bandwidth / pole * error;
-        } else {
-            self.integral.fade(FADE_S, input.dt_s);
-        }
+        let forward = a1 * input.thrust_n + model.friction_n_m(speed);
+        self.followed_n_m += (forward - self.followed_n_m) * (pole * input.dt_s).min(1.0);
         self.tracking_time_s = 1.0 / bandwidth;
-        self.asked_n_m = torque + self.integral.state;
-        Demand { torque_n_m: self.asked_n_m, speed_rad_s: target, limits: LimitSet::default() }
+        let mut limits = LimitSet::default();
+        let Some(thrust) = input.measured.thrust_n else {
+            self.integral.fade(FADE_S, input.dt_s);
+            self.asked_n_m = forward + self.integral.state;
+            return Demand { torque_n_m: self.asked_n_m, speed_rad_s: target, limits };
+        };
+        let error = input.thrust_n - thrust;
+        let changes = self.ratio.max(1.0) * (forward - self.followed_n_m).abs();
+        let floor = FLOOR * model.torque_constant_nm_a * model.current_limit_a;
+        let more = ((BAND - 1.0) * forward.abs()).max(floor) + changes;
+        let less = ((1.0 - 1.0 / BAND) * forward.abs()).max(floor) + changes;
+        // Away from zero and towards it.
+        let (low, high) = if forward < 0.0 { (-more, less) } else { (-less, more) };
+        self.integral.step(a1 * bandwidth * error, more, input.dt_s);
+        let wanted = a1 * bandwidth / pole * error + self.integral.state;
+        let given = wanted.clamp(low, high);
+        if given != wanted {
+            limits.set(Limit::Trim);
+        }
+        // The integral follows what the band left, as it follows every other limit.
+        self.asked_n_m = forward + wanted;
+        Demand { torque_n_m: forward + given, speed_rad_s: target, limits }
     }
 
     /// Back-calculation.

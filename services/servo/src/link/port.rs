@@ -9,7 +9,7 @@ use std::net::{SocketAddr, UdpSocket};
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
 use std::path::Path;
 
-use rustix::fs::{Mode, OFlags, open};
+use rustix::fs::{FlockOperation, Mode, OFlags, flock, open};
 use rustix::io::Errno;
 use rustix::termios::{
     ControlModes, OptionalActions, QueueSelector, ioctl_tiocexcl, tcflush, tcgetattr, tcsetattr,
@@ -51,10 +51,17 @@ impl Port {
     }
 
     /// Opens a device as 8N1 without flow control, at `baud` (an USB device takes any), for this process alone. Errors: no such device,
-    /// no permission, busy, not a terminal, a rate it does not know.
+    /// no permission, busy, locked by another one of ours, not a terminal, a rate it does not know.
     fn open_serial(path: &Path, baud: u32) -> io::Result<Self> {
         let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
         let descriptor = open(path, flags, Mode::empty())?;
+        // Exclusive by the terminal does not hold for root, nor for who has it open already; a lock does, against all that take one.
+        if flock(&descriptor, FlockOperation::NonBlockingLockExclusive) == Err(Errno::WOULDBLOCK) {
+            return Err(io::Error::new(
+                io::ErrorKind::ResourceBusy,
+                "another thruster, instrument or program has it locked: one device a port",
+            ));
+        }
         ioctl_tiocexcl(&descriptor)?;
         let mut settings = tcgetattr(&descriptor)?;
         settings.make_raw();
@@ -172,6 +179,25 @@ mod tests {
         far.send(&out[..RECORD]).unwrap();
         let n = port.read(&mut bytes).unwrap();
         assert_eq!(Frames::new(Carrier::Socket).take(&bytes[..n]), said[..1]);
+    }
+
+    /// A port by two names, as two thrusters may have it that started before it was plugged in: the second one is told so,
+    /// root too, and has it once the first one lets go.
+    #[test]
+    fn a_serial_port_is_locked_against_a_second_opening() {
+        use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+        let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
+        grantpt(&master).unwrap();
+        unlockpt(&master).unwrap();
+        let name = ptsname(&master, Vec::new()).unwrap().into_string().unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let link = folder.path().join("by-id");
+        std::os::unix::fs::symlink(&name, &link).unwrap();
+        let first = Port::open_serial(Path::new(&name), 115_200).unwrap();
+        let words = Port::open_serial(&link, 115_200).err().unwrap().to_string();
+        assert!(words.contains("locked: one device a port") || words.contains("busy"), "{words}");
+        drop(first);
+        Port::open_serial(&link, 115_200).unwrap();
     }
 
     /// Where the kernel has no CAN, or no interface of this name, the way out is an error.

@@ -177,6 +177,18 @@ fn a_device_of_two_names_is_one() {
     assert!(words.contains(&both), "{words}");
 }
 
+/// Not plugged in, it is known by the folder that is there.
+#[test]
+fn a_device_that_is_not_there_yet_is_one_by_its_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    let inner = folder.path().join("inner");
+    std::fs::create_dir(&inner).unwrap();
+    let [first, second] = [folder.path().join("late"), inner.join("../late")];
+    let vesc = |port: &std::path::Path| drive("vesc", &format!("pole_pairs = 7, port = {port:?}"));
+    let words = wrong(&[vesc(&first), vesc(&second)]);
+    assert!(words.contains(&format!("is `thrusters.t1.drive.port` = {first:?} too")), "{words}");
+}
+
 #[test]
 fn drive_and_instrument_on_one_port_are_refused_by_name() {
     let vesc = drive("vesc", "pole_pairs = 7, port = \"/dev/p\"");

@@ -49,7 +49,8 @@ impl Reader {
         for (channel, open) in self.iio.channels.iter().zip(&self.open) {
             let value = open.read()?;
             if let Some(signal) = SIGNALS.get(channel.place) {
-                (signal.set)(&mut signals, channel.si(value));
+                let si = channel.si(value);
+                (signal.set)(&mut signals, si.map_err(|words| beyond(&channel.from, &words))?);
             }
         }
         Ok(signals)
@@ -64,6 +65,11 @@ impl Reader {
     pub fn rate_hz(&self) -> f64 {
         self.iio.rate_hz
     }
+}
+
+/// Why a channel's number is none.
+fn beyond(channel: &str, words: &str) -> String {
+    format!("`{channel}` {words}\nhint: its `scale`, or a broken wire?")
 }
 
 #[cfg(test)]
@@ -90,6 +96,7 @@ mod tests {
             place: place(signal).unwrap(),
             scale: *scale,
             offset: 0.0,
+            most: f64::INFINITY,
         });
         Reader::new(Iio { path: folder.to_owned(), rate_hz: 100.0, channels: channels.collect() })
     }

@@ -2,6 +2,7 @@
 //! One kind, one file; [`Devices`](crate::devices::Devices) merges what they show by the signal table.
 
 pub mod iio;
+mod plausible;
 #[cfg(feature = "process")]
 mod polled;
 pub mod serial_line;
@@ -12,6 +13,7 @@ use kort_proto::signals::SIGNALS;
 
 use crate::devices::{At, Shown};
 
+pub use plausible::Plausible;
 pub use settings::{Chosen, Kind, choose};
 
 /// Something that measures.
@@ -45,12 +47,22 @@ pub struct Channel<F> {
     pub scale: f64,
     /// Value at the source's zero, SI.
     pub offset: f64,
+    /// Largest magnitude that can be, SI.
+    pub most: f64,
 }
 
 impl<F> Channel<F> {
     /// A number of the source in SI.
-    pub fn si(&self, value: f64) -> f64 {
-        value * self.scale + self.offset
+    ///
+    /// # Errors
+    /// No thruster or water can be so, in words.
+    pub fn si(&self, value: f64) -> Result<f64, String> {
+        let si = value * self.scale + self.offset;
+        if si.abs() <= self.most {
+            return Ok(si);
+        }
+        let (name, unit) = SIGNALS.get(self.place).map_or(("", ""), |signal| (signal.name, signal.unit));
+        Err(format!("gives {name} = {si:.4e} {unit}, beyond the {:.4e} that can be: no reading", self.most))
     }
 }
 

@@ -100,7 +100,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("in_temp_input"), "20000\n").unwrap();
         let place = place("temperature_c").unwrap();
-        let channels = vec![Channel { from: "in_temp".to_owned(), place, scale: 1e-3, offset: 0.0 }];
+        let channels =
+            vec![Channel { from: "in_temp".to_owned(), place, scale: 1e-3, offset: 0.0, most: 1e3 }];
         let iio = Iio { path: folder.path().to_owned(), rate_hz: 0.5, channels };
         let mut polled = Polled::start("bath".into(), Reader::new(iio)).unwrap();
         let (mut readings, began) = (0, Instant::now());

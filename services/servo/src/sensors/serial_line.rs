@@ -1,8 +1,9 @@
 //! An instrument that prints lines of numbers on a serial port: a force cell's amplifier, a flow meter, a thermometer.
 //!
-//! A line is taken apart at commas, semicolons and white space, or by a regular expression whose groups are the columns
+//! A line is taken apart at its separators ([`columns`]), or by a regular expression whose groups are the columns
 //! (crate `regex`, whose matching time is bounded; own parsing would be a worse language of the same kind). Each column's unit
-//! must be given; a line in which any wanted column is no number is no reading. Instruments that speak only when asked are sent `ask`.
+//! must be given; a line in which any wanted column is no number, or one that cannot be, is no reading. Instruments that
+//! speak only when asked are sent `ask`.
 
 use std::path::PathBuf;
 
@@ -48,29 +49,76 @@ impl Listening {
 
     /// The reading in a line, or which column is none.
     fn read(&self, line: &str) -> Result<Signals, String> {
-        let number = |text: Option<&str>| text.and_then(|text| text.trim().parse::<f64>().ok());
         let groups = match &self.instrument.pattern {
             Some(pattern) => Some(pattern.captures(line).ok_or("does not match `pattern`")?),
             None => None,
         };
-        let fields: Vec<&str> = line
-            .split(|c: char| c == ',' || c == ';' || c.is_whitespace())
-            .filter(|field| !field.is_empty())
-            .collect();
+        let fields = if groups.is_none() { columns(line)? } else { Vec::new() };
         let mut signals = Signals::UNKNOWN;
         for channel in &self.instrument.channels {
             let text = match &groups {
                 Some(groups) => groups.get(channel.from).map(|group| group.as_str()),
-                None => channel.from.checked_sub(1).and_then(|at| fields.get(at)).copied(),
+                None => channel.from.checked_sub(1).and_then(|at| fields.get(at)).map(String::as_str),
             };
-            let value = number(text).filter(|value| value.is_finite());
+            let value = text.and_then(number);
             let value = value.ok_or_else(|| format!("has no number in column {}", channel.from))?;
             if let Some(signal) = SIGNALS.get(channel.place) {
-                (signal.set)(&mut signals, channel.si(value));
+                let si = channel.si(value);
+                (signal.set)(
+                    &mut signals,
+                    si.map_err(|words| format!("in column {} {words}", channel.from))?,
+                );
             }
         }
         Ok(signals)
     }
+}
+
+/// The number in a text that is nothing else: its decimal sign is a point, or a single comma.
+fn number(text: &str) -> Option<f64> {
+    let text = text.trim();
+    let plain = if is_with_comma(text) { text.replace(',', ".") } else { text.to_owned() };
+    plain.parse::<f64>().ok().filter(|value| value.is_finite())
+}
+
+/// One comma and no point: it may be the decimal sign.
+fn is_with_comma(text: &str) -> bool {
+    let between_digits = |(left, right): (&str, &str)| {
+        left.ends_with(|c: char| c.is_ascii_digit()) && right.starts_with(|c: char| c.is_ascii_digit())
+    };
+    !text.contains('.') && text.matches(',').count() == 1 && text.split_once(',').is_some_and(between_digits)
+}
+
+/// The columns of a line. Semicolon, tab and blank separate, and so does a comma beside one of them. A comma within what is left is
+/// a decimal one where something else separates numbers; where only commas stand they separate.
+///
+/// # Errors
+/// A comma that may be either, in words.
+fn columns(line: &str) -> Result<Vec<String>, &'static str> {
+    const EITHER: &str = "has commas that may be decimal signs or separate: give `pattern`";
+    let separates = |c: char| c == ';' || c.is_whitespace();
+    let parts: Vec<&str> = line.split(separates).filter(|part| !part.is_empty()).collect();
+    let bare = |part: &&str| part.trim_matches(',').to_owned();
+    let fields = || parts.iter().map(bare).filter(|part| !part.is_empty());
+    let with_comma: Vec<String> = fields().filter(|field| field.contains(',')).collect();
+    if with_comma.is_empty() {
+        return Ok(fields().collect());
+    }
+    let at_commas = || {
+        Ok(line.split(|c| c == ',' || separates(c)).filter(|f| !f.is_empty()).map(str::to_owned).collect())
+    };
+    if parts.len() == 1 {
+        return at_commas();
+    }
+    let decimal = with_comma.iter().filter(|field| is_with_comma(field)).count();
+    let stands_beside = parts.iter().any(|part| part.starts_with(',') || part.ends_with(','));
+    let strong = line.trim().contains([';', '\t']);
+    let numbers = fields().filter(|field| number(field).is_some()).count();
+    if decimal == with_comma.len() && !stands_beside && (strong || numbers > 1) {
+        return Ok(fields().map(|field| field.replace(',', ".")).collect());
+    }
+    // With a point, or a second comma, it is none of a number's.
+    if decimal == 0 && !strong { at_commas() } else { Err(EITHER) }
 }
 
 impl Protocol for Listening {
@@ -129,7 +177,13 @@ mod tests {
             pattern: pattern.map(|p| Regex::new(p).unwrap()),
             ask: String::new(),
             rate_hz: 10.0,
-            channels: vec![Channel { from, place: place("thrust_n").unwrap(), scale: -9.80665, offset: 0.5 }],
+            channels: vec![Channel {
+                from,
+                place: place("thrust_n").unwrap(),
+                scale: -9.80665,
+                offset: 0.5,
+                most: 1000.0,
+            }],
         })
     }
 
@@ -152,6 +206,42 @@ mod tests {
         let pattern = r"F=([-+.\d]+) kg";
         assert_eq!(thrusts(&mut force(Some(pattern), 1), &[b"t=1 F=2.5 kg\n"]), [expected]);
         assert!(thrusts(&mut force(None, 2), &[b"12.0\n12.0,err\n,,\n12,nan\n12,inf\n"]).is_empty());
+    }
+
+    /// Where something else separates a comma is decimal; where only commas stand they separate; else it is asked for.
+    #[test]
+    fn a_comma_is_decimal_or_separates_and_is_never_guessed() {
+        let of = |line: &str| columns(line).map(|columns| columns.join("|"));
+        for (line, read) in [
+            ("12,3; 4,2\r", "12.3|4.2"),
+            ("12,3\t4,2\tkgf", "12.3|4.2|kgf"),
+            ("12,3 4,2 kgf", "12.3|4.2|kgf"),
+            ("-0,5;7;x", "-0.5|7|x"),
+            ("12,3", "12|3"),
+            ("12.0,2.5", "12.0|2.5"),
+            ("12.3, 0.42 kgf", "12.3|0.42|kgf"),
+            ("12, 4; x", "12|4|x"),
+            ("12:00:01,12.3,4.2 N", "12:00:01|12.3|4.2|N"),
+            (",,", ""),
+        ] {
+            assert_eq!(of(line), Ok(read.to_owned()), "{line}");
+        }
+        for line in ["12,3 kgf", "12,3, 4,2", "1,234.5; 3", "12,3; 4.2,5"] {
+            assert!(of(line).is_err_and(|words| words.contains("`pattern`")), "{line}: {:?}", of(line));
+        }
+        let expected = -4.2 * 9.80665 + 0.5;
+        assert_eq!(thrusts(&mut force(None, 2), &[b"12,3; 4,2\r\n"]), [expected]);
+        assert_eq!(thrusts(&mut force(Some(r"F=([-+,\d]+)"), 1), &[b"F=4,2 kg\n"]), [expected], "one number");
+    }
+
+    #[test]
+    fn a_number_that_cannot_be_is_no_reading_and_said() {
+        let mut force = force(None, 1);
+        assert!(thrusts(&mut force, &[b"1e300\n-9e9\n"]).is_empty());
+        let mut words = Vec::new();
+        force.hear(b"102.1\n", &mut |heard| words.push(heard));
+        let [Heard::Unguarded(words)] = words.as_slice() else { panic!("{words:?}") };
+        assert!(words.contains("thrust_n = -1.0008e3 N, beyond the 1.0000e3"), "{words}");
     }
 
     #[test]

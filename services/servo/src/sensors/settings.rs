@@ -5,13 +5,14 @@ use std::path::PathBuf;
 
 use kort_proto::config::{Config, ConfigError, Thruster};
 use kort_proto::signals::{Kind as SignalKind, SIGNALS};
+use kort_thruster::rig::Rig;
 use regex::Regex;
 use serde::Deserialize;
 
 use super::iio::Iio;
 use super::serial_line::SerialLine;
 use super::units::to_si;
-use super::{Channel, place};
+use super::{Channel, Plausible, place};
 use crate::claims::Claim;
 use crate::drives::DEVICE;
 
@@ -89,12 +90,14 @@ pub struct Chosen {
 ///
 /// # Errors
 /// [`ConfigError`] names section, key, value and what is allowed.
-pub fn choose(config: &Config, id: &str, thruster: &Thruster) -> Result<Vec<Chosen>, ConfigError> {
+pub fn choose(config: &Config, id: &str, thruster: &Thruster, rig: &Rig) -> Result<Vec<Chosen>, ConfigError> {
+    let plausible = Plausible::of(rig);
     let mut chosen: Vec<Chosen> = Vec::new();
     for (name, table) in &thruster.sensors {
         let section = format!("thrusters.{id}.sensors.{name}");
         let keys: Keys = config.section(&section, table)?;
-        let one = read(name, &keys).map_err(|words| config.error(format!("`{section}.{words}")))?;
+        let one =
+            read(name, &keys, &plausible).map_err(|words| config.error(format!("`{section}.{words}")))?;
         for other in &chosen {
             if let Some(signal) =
                 one.gives.iter().find(|p| other.gives.contains(p)).and_then(|p| SIGNALS.get(*p))
@@ -111,7 +114,7 @@ pub fn choose(config: &Config, id: &str, thruster: &Thruster) -> Result<Vec<Chos
 }
 
 /// One section; an error begins with its key, behind the section's name.
-fn read(name: &str, keys: &Keys) -> Result<Chosen, String> {
+fn read(name: &str, keys: &Keys, plausible: &Plausible) -> Result<Chosen, String> {
     let within = |key: &str, value: f64, low: f64, high: f64, hint: &str| {
         if (low..=high).contains(&value) {
             return Ok(());
@@ -133,8 +136,8 @@ fn read(name: &str, keys: &Keys) -> Result<Chosen, String> {
         })?);
     }
     let kind = match keys.kind.as_str() {
-        "serial_line" => Kind::SerialLine(serial_line(keys)?),
-        "iio" => Kind::Iio(iio(keys)?),
+        "serial_line" => Kind::SerialLine(serial_line(keys, plausible)?),
+        "iio" => Kind::Iio(iio(keys, plausible)?),
         other => {
             return Err(format!(
                 "kind` = \"{other}\" is no source\nhint: known are \"{}\"",
@@ -154,7 +157,7 @@ fn not_read<T>(key: &str, given: Option<&T>, kind: &str) -> Result<(), String> {
     }
 }
 
-fn serial_line(keys: &Keys) -> Result<SerialLine, String> {
+fn serial_line(keys: &Keys, plausible: &Plausible) -> Result<SerialLine, String> {
     not_read("path", keys.path.as_ref(), "serial_line")?;
     let port = keys.port.clone();
     let port =
@@ -183,13 +186,13 @@ fn serial_line(keys: &Keys) -> Result<SerialLine, String> {
         let unit = given.unit.as_deref().ok_or_else(|| {
             format!("{key}.unit` is missing; a unit is never guessed\nhint: unit = \"kgf\", as the instrument prints it")
         })?;
-        channels.push(channel(signal, &key, from, unit, given)?);
+        channels.push(channel(signal, &key, from, unit, given, plausible)?);
     }
     let ask = keys.ask.clone().unwrap_or_default();
     Ok(SerialLine { port, baud, pattern, ask, rate_hz: keys.rate_hz, channels })
 }
 
-fn iio(keys: &Keys) -> Result<Iio, String> {
+fn iio(keys: &Keys, plausible: &Plausible) -> Result<Iio, String> {
     not_read("port", keys.port.as_ref(), "iio")?;
     not_read("baud", keys.baud.as_ref(), "iio")?;
     not_read("pattern", keys.pattern.as_ref(), "iio")?;
@@ -217,7 +220,7 @@ fn iio(keys: &Keys) -> Result<Iio, String> {
             ));
         }
         let si = place(signal).and_then(|p| SIGNALS.get(p)).map_or("", |s| s.unit);
-        channels.push(channel(signal, &key, from, given.unit.as_deref().unwrap_or(si), given)?);
+        channels.push(channel(signal, &key, from, given.unit.as_deref().unwrap_or(si), given, plausible)?);
     }
     Ok(Iio { path, rate_hz: keys.rate_hz, channels })
 }
@@ -228,6 +231,7 @@ fn channel<F>(
     from: F,
     unit: &str,
     given: &SignalKeys,
+    plausible: &Plausible,
 ) -> Result<Channel<F>, String> {
     let (place, si) = place(signal)
         .and_then(|p| SIGNALS.get(p).map(|s| (p, s.unit)))
@@ -245,7 +249,8 @@ fn channel<F>(
             given.offset
         ));
     }
-    Ok(Channel { from, place, scale: factor * scale, offset: zero + given.offset })
+    let most = plausible.most(signal);
+    Ok(Channel { from, place, scale: factor * scale, offset: zero + given.offset, most })
 }
 
 impl Chosen {
@@ -293,73 +298,4 @@ impl Chosen {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn chosen(sensor: &str) -> Result<Vec<Chosen>, String> {
-        let text = format!(
-            "[thrusters.t1]\nrig = \"r\"\namplifier = \"simulated\"\n[thrusters.t1.sensors.own]\n{sensor}\n"
-        );
-        let config = Config::parse(&text, None).unwrap();
-        choose(&config, "t1", config.thruster("t1").unwrap()).map_err(|e| e.to_string())
-    }
-
-    #[test]
-    fn a_source_is_read_with_what_it_leaves_out() {
-        let line = "kind = \"serial_line\"\nport = \"/dev/ttyUSB0\"\nsignals = { thrust_n = { column = 2, unit = \"kgf\", scale = -1.0 } }";
-        let Kind::SerialLine(line) = &chosen(line).unwrap()[0].kind else { panic!("no serial line") };
-        assert_eq!((line.baud, line.ask.as_str(), line.channels[0].from), (BAUD, "", 2));
-        assert!((line.channels[0].scale + 9.806_65).abs() < 1e-12);
-    }
-
-    /// What a source of this kind would not read, and what it cannot do without, is refused by name with a way out.
-    #[test]
-    fn each_bad_key_is_named_with_a_hint() {
-        let line = "kind = \"serial_line\"\nport = \"/dev/p\"\n";
-        let iio = "kind = \"iio\"\npath = \"p\"\n";
-        let column = "signals = { thrust_n = { column = 1, unit = \"N\" } }";
-        let channel = "signals = { thrust_n = { channel = \"in_voltage0\", scale = 1.0 } }";
-        for (sensor, key) in [
-            (format!("kind = \"can\"\n{column}"), "kind"),
-            (format!("kind = \"serial_line\"\n{column}"), "port"),
-            (format!("{line}baud = 5\n{column}"), "baud"),
-            (format!("{line}pattern = \"(\"\n{column}"), "pattern"),
-            (format!("{line}path = \"/sys\"\n{column}"), "path"),
-            (format!("{line}{channel}"), "signals.thrust_n.channel"),
-            (format!("{line}signals = {{ thrust_n = {{ column = 1 }} }}"), "signals.thrust_n.unit"),
-            (
-                format!("{line}signals = {{ thrust_n = {{ column = 0, unit = \"N\" }} }}"),
-                "signals.thrust_n.column",
-            ),
-            (
-                format!("{line}signals = {{ thrust_n = {{ column = 1, unit = \"rpm\" }} }}"),
-                "signals.thrust_n.unit",
-            ),
-            (
-                format!("{line}signals = {{ thrust_n = {{ column = 1, unit = \"N\", scale = 0.0 }} }}"),
-                "signals.thrust_n.scale",
-            ),
-            (format!("{line}signals = {{ wind = {{ column = 1, unit = \"N\" }} }}"), "signals.wind"),
-            (format!("{line}signals = {{}}"), "signals"),
-            (format!("{line}rate_hz = 0\n{column}"), "rate_hz"),
-            (format!("{line}reading_life_ms = 1\n{column}"), "reading_life_ms"),
-            (format!("kind = \"iio\"\n{channel}"), "path"),
-            (format!("{iio}port = \"p\"\n{channel}"), "port"),
-            (format!("{iio}baud = 9600\n{channel}"), "baud"),
-            (format!("{iio}ask = \"R\"\n{channel}"), "ask"),
-            (format!("{iio}{column}"), "signals.thrust_n.column"),
-            (
-                format!("{iio}signals = {{ thrust_n = {{ channel = \"in_voltage0\" }} }}"),
-                "signals.thrust_n.scale",
-            ),
-            (
-                format!("{iio}signals = {{ thrust_n = {{ channel = \"../x\", scale = 1.0 }} }}"),
-                "signals.thrust_n.channel",
-            ),
-        ] {
-            let words = chosen(&sensor).unwrap_err();
-            let key = format!("`thrusters.t1.sensors.own.{key}`");
-            assert!(words.contains(&key) && words.contains("\nhint: "), "{sensor}\n{words}");
-        }
-    }
-}
+mod tests;

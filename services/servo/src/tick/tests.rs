@@ -28,6 +28,7 @@ fn settings() -> Settings {
             spike_rad_s: 1e9,
             winding: (f64::NAN, 1.2),
             shaft: crate::guard::tests::limits().shaft,
+            water: crate::water::Water::UNKNOWN,
         },
     }
 }

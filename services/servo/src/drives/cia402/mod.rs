@@ -40,6 +40,7 @@ use kort_thruster::rig::Rig;
 pub use protocol::Protocol;
 
 use super::forms::{DEVICE_OR_INTERFACE, NUMBER_OF_CANOPEN};
+use super::wired::LIFE_MS;
 use super::{Own, Wired, current_or_speed};
 use crate::claims::Claim;
 use crate::link::Medium;
@@ -68,6 +69,7 @@ const OWN: Own = Own {
     keys: &["address", "bitrate", "units_per_turn", "speed_units"],
     port: DEVICE_OR_INTERFACE,
     identity: NUMBER_OF_CANOPEN,
+    reading_life_ms: LIFE_MS,
 };
 
 /// A CiA 402 drive as the configuration describes it.

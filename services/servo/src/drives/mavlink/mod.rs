@@ -50,6 +50,7 @@ use kort_thruster::rig::Rig;
 pub use protocol::Protocol;
 
 use super::forms::{DEVICE_OR_UDP, NUMBER_OF_36_OR_16};
+use super::wired::LIFE_MS;
 use super::{Own, Wired, kind_of};
 use crate::claims::Claim;
 use crate::link::Medium;
@@ -62,7 +63,12 @@ const TIMEOUT_S: f64 = 0.51;
 const MOTORS: u32 = 12;
 
 /// What of the section `drive` is its own.
-const OWN: Own = Own { keys: &["address", "motor"], port: DEVICE_OR_UDP, identity: NUMBER_OF_36_OR_16 };
+const OWN: Own = Own {
+    keys: &["address", "motor"],
+    port: DEVICE_OR_UDP,
+    identity: NUMBER_OF_36_OR_16,
+    reading_life_ms: LIFE_MS,
+};
 
 /// One thruster of an ArduSub vehicle as the configuration describes it.
 #[derive(Clone, Debug, PartialEq)]

@@ -30,8 +30,14 @@ pub use protocol::Protocol;
 use super::forms::{DEVICE, NUMBER_OF_12};
 use super::{Own, Wired, current_or_speed};
 
+/// Life of a reading where `reading_life_ms` is left out. An exchange is seven lines of text and their six answers: some 270
+/// bytes, 24 ms at 115200 baud, and by USB as long on a machine that is busy elsewhere. An answer with a line lost is none. One
+/// is missed after twice the way that the last one took, and asked for again: with the way of the answer that stands, of
+/// the lost one's patience and of the new one that is four ways, 96 ms. Half as much again for a machine that holds the thread up.
+const READING_LIFE_MS: f64 = 150.0;
+
 /// What of the section `drive` is its own.
-const OWN: Own = Own { keys: &[], port: DEVICE, identity: NUMBER_OF_12 };
+const OWN: Own = Own { keys: &[], port: DEVICE, identity: NUMBER_OF_12, reading_life_ms: READING_LIFE_MS };
 
 /// An ODrive as the configuration describes it.
 #[derive(Clone, Debug, PartialEq)]

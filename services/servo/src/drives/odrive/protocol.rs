@@ -342,7 +342,30 @@ fn error_names(bits: u64) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::{OWN, READING_LIFE_MS};
     use super::*;
+    use crate::link::Protocol as _;
+    use kort_proto::config::Config;
+
+    /// The longest exchange on the slowest usual wire, four times: the way of the answer that stands, the patience with one
+    /// that is lost, and the way of the next; half as much again is left over.
+    #[test]
+    fn a_reading_lives_for_longer_than_a_lost_answer_takes() {
+        let text = "[thrusters.t1]\nrig = \"r\"\namplifier = \"odrive\"\ndrive = { port = \"/dev/p\" }\n";
+        let config = Config::parse(text, None).unwrap();
+        let wired = crate::drives::Wired::new(&config, "t1", config.thruster("t1").unwrap(), &OWN).unwrap();
+        assert_eq!(wired.reading_life_ns as f64, READING_LIFE_MS * 1e6);
+        let mut out = Vec::new();
+        let mut protocol = Protocol::new(ODrive { wired, kind: DriveKind::Current });
+        (protocol.torque_constant_nm_a, protocol.on) = (0.0625, true);
+        protocol.tell(Some(-123.456_789), true, &mut out);
+        for answer in ["-1234567.123456 -123.456789", "-123.4567", "123.45678", "4294967295", "8", "1"] {
+            line(answer, &mut out);
+        }
+        let way_ms = out.len() as f64 * 10.0 / 115.2;
+        assert!((20.0..26.0).contains(&way_ms), "{} bytes, {way_ms} ms", out.len());
+        assert!(READING_LIFE_MS >= 1.5 * 4.0 * way_ms - 5.0, "{way_ms} ms");
+    }
 
     #[test]
     fn each_bit_of_an_error_has_its_name() {

@@ -30,10 +30,12 @@ use kort_thruster::rig::Rig;
 pub use protocol::Protocol;
 
 use super::forms::{DEVICE, NUMBER_OF_24};
+use super::wired::LIFE_MS;
 use super::{Own, Wired, kind_of};
 
 /// What of the section `drive` is its own.
-const OWN: Own = Own { keys: &["pole_pairs"], port: DEVICE, identity: NUMBER_OF_24 };
+const OWN: Own =
+    Own { keys: &["pole_pairs"], port: DEVICE, identity: NUMBER_OF_24, reading_life_ms: LIFE_MS };
 
 /// A VESC as the configuration describes it.
 #[derive(Clone, Debug, PartialEq)]
