@@ -159,6 +159,8 @@ fn a_log_is_converted_by_its_map() {
     let done = kort(&["convert", log, "--columns", "px4-uavcan:bank=1,motor=3", "-o", &parquet]);
     assert_eq!(done.status.code(), Some(0), "{}", stderr(&done));
     assert!(String::from_utf8_lossy(&done.stdout).contains("364 rows of"), "{done:?}");
+    // What the map leaves out is said, not dropped in silence.
+    assert!(stderr(&done).contains("columns not used: "), "{}", stderr(&done));
     let bytes = std::fs::read(&parquet).unwrap();
     assert!(bytes.starts_with(b"PAR1") && bytes.ends_with(b"PAR1"), "the format's own marks");
     let csv = lab::path("flight.csv");

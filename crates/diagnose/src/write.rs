@@ -6,6 +6,7 @@ use kort_identify::heldout::held_out_rows;
 use kort_identify::hypothesis::Member;
 use kort_identify::scores::{self, HeldOut, parameters};
 use kort_identify::simulate::{Problem, Stack};
+use kort_identify::thin::Thin;
 use kort_thruster::effects::Path;
 use kort_thruster::rig::Rig;
 
@@ -120,7 +121,7 @@ impl<'a, 'p> Writer<'a, 'p> {
     }
 
     /// The report, and curves for its plots.
-    pub fn write(self, mut notes: Vec<String>, thin: Option<kort_identify::thin::Thin>) -> (Report, Traces) {
+    pub fn write(self, mut notes: Vec<String>, thin: Option<Thin>) -> (Report, Traces) {
         let (problem, options) = (self.problem, self.options);
         let baseline_full = self.residual(self.baseline);
         let last_full = self.residual(self.last);
@@ -129,6 +130,11 @@ impl<'a, 'p> Writer<'a, 'p> {
         let whole = (self.excess(&baseline_full) - self.excess(&last_full)).max(1e-300);
         let left = (self.excess(&named_full) - self.excess(&last_full)).max(0.0) / whole;
         let rest = left::more_than_noise(problem, self.last, &last_full, &self.floor);
+        let baseline_trained = self.trained(self.baseline);
+        let last_trained =
+            if self.best.is_empty() { baseline_trained.clone() } else { self.trained(self.last) };
+        let idle = !self.names_only().is_empty() && !scores::predicts(problem, &self.held, &last_trained);
+        let thin = idle.then(Thin::unpredicted).or(thin);
         let actions = problem.actions(self.last);
         let negligible = left::negligible(problem, self.last, &actions);
         let circumstances = Circumstances {
@@ -141,10 +147,6 @@ impl<'a, 'p> Writer<'a, 'p> {
             more_than_noise: rest.is_some(),
         };
         let decision = decide(&self.posterior, &circumstances);
-
-        let baseline_trained = self.trained(self.baseline);
-        let last_trained =
-            if self.best.is_empty() { baseline_trained.clone() } else { self.trained(self.last) };
         let rows = problem.rows(&self.last.hypothesis, &self.last.values);
         let speed: Vec<Vec<f64>> =
             rows.iter().map(|rows| rows.iter().map(|s| s.true_speed_rad_s).collect()).collect();

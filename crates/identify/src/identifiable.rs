@@ -10,6 +10,7 @@ use serde::Serialize;
 
 use crate::data::{Driving, Response};
 use crate::fit::Fit;
+use crate::hypothesis::Target;
 use crate::simulate::Problem;
 
 /// Parameters that these recordings cannot fix together.
@@ -54,19 +55,21 @@ pub fn not_identifiable(problem: &Problem, fit: &Fit) -> Vec<NotIdentifiable> {
             .map(|k| eigen.eigenvalues[*k])
             .fold(1.0, f64::min)
     };
-    groups(&joined)
-        .into_iter()
-        .map(|members| {
-            let names: Vec<&str> = members.iter().map(|k| fit.hypothesis.free[*k].name).collect();
-            let (why, excitation) = words(problem, &names);
-            NotIdentifiable {
-                relative_std_error: (USEFUL / least(&members).max(1e-12).sqrt()).min(1e3),
-                parameters: names.into_iter().map(String::from).collect(),
-                why,
-                excitation,
-            }
+    // When samples are taken, and over how long, is the fit's own aid and no parameter of anybody's.
+    let own = |k: &&usize| {
+        !matches!(fit.hypothesis.free[**k].target, Target::Sampling { .. } | Target::Averaging { .. })
+    };
+    let open = |members: Vec<usize>| {
+        let names: Vec<&str> = members.iter().filter(own).map(|k| fit.hypothesis.free[*k].name).collect();
+        let (why, excitation) = words(problem, &names);
+        (!names.is_empty()).then(|| NotIdentifiable {
+            relative_std_error: (USEFUL / least(&members).max(1e-12).sqrt()).min(1e3),
+            parameters: names.into_iter().map(String::from).collect(),
+            why,
+            excitation,
         })
-        .collect()
+    };
+    groups(&joined).into_iter().filter_map(open).collect()
 }
 
 /// Parameters in the weak space, joined where a weak direction moves both.

@@ -198,6 +198,23 @@ pub fn channels(
         .collect()
 }
 
+/// Whether rows held out are predicted better than by their own mean on any channel; of what the fit did not see, its
+/// residual on all rows is given.
+pub fn predicts(problem: &Problem, held: &[Vec<bool>], trained: &Stack) -> bool {
+    problem.recordings.iter().enumerate().any(|(r, recording)| {
+        recording.channels.iter().enumerate().any(|(c, channel)| {
+            let picks = || {
+                (0..channel.rows.len())
+                    .filter(|k| held[r][channel.rows[*k]] && !problem.masked[r][channel.rows[*k]])
+            };
+            let n = picks().count().max(1) as f64;
+            let mean = picks().map(|k| channel.values[k]).sum::<f64>() / n;
+            let error: f64 = picks().map(|k| trained[r][c][k].powi(2)).sum();
+            error < picks().map(|k| (channel.values[k] - mean).powi(2)).sum()
+        })
+    })
+}
+
 /// First five autocorrelations of a channel's residual within three standard errors.
 fn is_white(problem: &Problem, residual: &Stack, name: &str) -> bool {
     for (r, recording) in problem.recordings.iter().enumerate() {

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use nalgebra::DVector;
 use rustdct::{DctPlanner, TransformType2And3};
 
-use crate::data::{Prepared, Response};
+use crate::data::{Channel, Prepared, Response};
 use crate::simulate::Stack;
 
 /// Bands a decade of frequency.
@@ -47,7 +47,7 @@ struct Frame {
     picks: Vec<usize>,
     full_scale: f64,
     /// Another channel of the recording that is taken off first, where both show the same signal: what they
-    /// share must not count twice.
+    /// share must not count twice. It is taken off the noisier one, which else would hide it in both.
     less: Option<usize>,
     transform: Arc<dyn TransformType2And3<f64>>,
     lines: Range<usize>,
@@ -77,14 +77,19 @@ impl Spectrum {
                 let picks: Vec<usize> =
                     (0..channel.rows.len()).filter(|k| !masked[channel.rows[*k]]).collect();
                 let n = picks.len();
-                let angle = recording.channels.iter().position(|c| {
-                    c.response == Response::ShaftAngle
-                        && channel.response == Response::ShaftSpeed
-                        && c.rows == channel.rows
+                let scatter = |channel: &Channel| scatter(&channel.values, &picks);
+                let shown_twice = recording.channels.iter().position(|other| {
+                    let turning = [channel.response, other.response];
+                    let noisier = match turning {
+                        [Response::ShaftSpeed, Response::ShaftAngle] => scatter(channel) >= scatter(other),
+                        [Response::ShaftAngle, Response::ShaftSpeed] => scatter(channel) > scatter(other),
+                        _ => return false,
+                    };
+                    noisier && other.rows == channel.rows
                 });
                 let frame = Frame {
                     full_scale: channel.full_scale,
-                    less: angle,
+                    less: shown_twice,
                     transform: planner.plan_dct2(n.max(1)),
                     lines: lines..lines + n,
                     rest: recording.at_rest(channel, masked),
@@ -105,12 +110,13 @@ impl Spectrum {
                     let power: f64 = signal[range.clone()].iter().map(|v| v * v).sum();
                     // The constant counts as half of the lowest frequency.
                     let middle = (0.5 * (range.start + range.end - 1) as f64).max(0.5);
+                    let hz = middle / (2.0 * n as f64 * interval_s);
                     bands.push(Band {
                         lines: lines + range.start..lines + range.end,
-                        hz: middle / (2.0 * n as f64 * interval_s),
+                        hz,
                         alike: range.len(),
                         signal: power / range.len() as f64,
-                        quantisation,
+                        quantisation: quantisation * differenced(channel.response, hz * interval_s),
                         row_s,
                         stale_s,
                         continues: i + 1 < ranges.len(),
@@ -258,11 +264,28 @@ pub(crate) fn is_slow(interval_s: f64, row_s: f64) -> bool {
     interval_s > 1.5 * row_s
 }
 
+/// Mean square of how far a value lies off the line through its neighbours, which is noise's for the most.
+fn scatter(values: &[f64], picks: &[usize]) -> f64 {
+    let off = |w: &[usize]| (values[w[0]] - 2.0 * values[w[1]] + values[w[2]]).powi(2);
+    picks.windows(3).map(off).sum::<f64>() / picks.len().max(1) as f64
+}
+
 /// Variance of some of the values.
 fn variance(values: &[f64], picks: &[usize]) -> f64 {
     let n = picks.len() as f64;
     let mean = picks.iter().map(|k| values[*k]).sum::<f64>() / n;
     picks.iter().map(|k| (values[*k] - mean).powi(2)).sum::<f64>() / n
+}
+
+/// Power that counts of an angle keep at a share of the sampling frequency where their differences are compared, over that of
+/// as coarse a converter, whose steps are as many in a slow signal as in a fast one: what a count is short of comes with the
+/// next.
+fn differenced(response: Response, of_sampling: f64) -> f64 {
+    if response == Response::ShaftAngle {
+        (2.0 * (std::f64::consts::PI * of_sampling).sin()).powi(2)
+    } else {
+        1.0
+    }
 }
 
 /// Least distance between two different values: the step of a coarse converter, nearly nothing of a fine one.
@@ -275,57 +298,4 @@ fn quantum(values: &[f64]) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn bands_cover_every_line_once_and_widen() {
-        for n in [1, 2, 7, 600, 6500] {
-            let ranges = band_ranges(n);
-            assert_eq!(ranges[0], 0..1);
-            assert!(ranges.windows(2).all(|w| w[0].end == w[1].start), "{ranges:?}");
-            assert_eq!(ranges.last().unwrap().end, n);
-        }
-        let ranges = band_ranges(6500);
-        assert!(ranges.len() < 22, "{}", ranges.len());
-    }
-
-    #[test]
-    fn lines_about_a_frequency_count_together_over_recordings_of_one_channel() {
-        let band = |hz: f64, lines: usize| Band {
-            lines: 0..lines,
-            hz,
-            alike: lines,
-            signal: 0.0,
-            quantisation: 0.0,
-            row_s: 0.01,
-            stale_s: 0.0,
-            continues: true,
-            rest: false,
-        };
-        let place = |recording, response, constant| Place { recording, response, constant };
-        let (speed, thrust) = (Response::ShaftSpeed, Response::Thrust);
-        let mut bands =
-            vec![band(0.01, 1), band(1.0, 20), band(0.05, 1), band(1.1, 30), band(1.0, 20), band(1.4, 5)];
-        let places = [
-            place(0, speed, true),
-            place(0, speed, false),
-            place(1, speed, true),
-            place(1, speed, false),
-            place(1, thrust, false),
-            place(0, speed, false),
-        ];
-        count_alike(&mut bands, &places);
-        let alike: Vec<usize> = bands.iter().map(|band| band.alike).collect();
-        assert_eq!(alike, [2, 50, 2, 50, 20, 5]);
-    }
-
-    #[test]
-    fn a_coarse_converter_has_its_step_and_a_fine_one_hardly_any() {
-        let coarse: Vec<f64> =
-            (0..1000).map(|k| (f64::from(k) * 0.37).sin()).map(|v| (v / 0.1).round() * 0.1).collect();
-        assert!((quantum(&coarse) - 0.1).abs() < 1e-9);
-        let fine: Vec<f64> = (0..1000).map(|k| (f64::from(k) * 0.37).sin()).collect();
-        assert!(quantum(&fine) < 0.01);
-    }
-}
+mod tests;

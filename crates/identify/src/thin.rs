@@ -27,8 +27,16 @@ const FOLLOWS: f64 = 0.5;
 pub struct Thin {
     /// In words.
     pub why: String,
-    /// Nothing moves at all: what they show is the sensors' own.
+    /// Nothing moves at all, or nothing as the model does: what they show is the sensors' own, or comes from elsewhere.
     pub still: bool,
+}
+
+impl Thin {
+    /// What is told of them predicts no channel of rows left out better than the channel's mean.
+    pub fn unpredicted() -> Self {
+        let why = "nothing that was recorded follows what drives: with all that would be told, no channel of the rows left out is predicted better than by its own mean. The log may be too slow for its command, or its columns may belong to different machines or times";
+        Self { why: why.into(), still: true }
+    }
 }
 
 /// Recordings without enough change to tell anything.
@@ -46,7 +54,7 @@ pub fn too_thin(recordings: &[Prepared], rig: &Rig) -> Option<Thin> {
         );
         return Some(Thin { why, still: true });
     }
-    if recordings.iter().map(changes).sum::<usize>() < FEWEST_CHANGES {
+    if changes(recordings) < FEWEST_CHANGES {
         return thin(
             "the driving signal hardly changes: steady data cannot part physics from parameters".into(),
         );
@@ -54,18 +62,26 @@ pub fn too_thin(recordings: &[Prepared], rig: &Rig) -> Option<Thin> {
     None
 }
 
-/// How often what drives changes by more than a trifle of its largest.
-fn changes(recording: &Prepared) -> usize {
-    let top = recording.command.iter().fold(0.0_f64, |m, c| m.max(c.abs()));
-    let mut at = recording.command[0];
-    let changed = |c: &&f64| {
-        let changed = (**c - at).abs() > CHANGE * top;
-        if changed {
-            at = **c;
-        }
-        changed
+/// How often what drives changes by more than a trifle of its largest, within recordings and from one to the next.
+fn changes(recordings: &[Prepared]) -> usize {
+    let mut drivers: Vec<&str> = recordings.iter().map(|r| r.driving.column()).collect();
+    drivers.sort_unstable();
+    drivers.dedup();
+    let of = |driver: &&str| {
+        let driven = recordings.iter().filter(|r| r.driving.column() == *driver);
+        let command: Vec<f64> = driven.flat_map(|r| r.command.iter().copied()).collect();
+        let top = command.iter().fold(0.0_f64, |m, c| m.max(c.abs()));
+        let mut at = command.first().copied().unwrap_or(0.0);
+        let changed = |c: &&f64| {
+            let changed = (**c - at).abs() > CHANGE * top;
+            if changed {
+                at = **c;
+            }
+            changed
+        };
+        command.iter().filter(changed).count()
     };
-    recording.command.iter().filter(changed).count()
+    drivers.iter().map(of).sum()
 }
 
 /// What the drive's limit makes in bollard pull; infinite where that is not stated, and for what it says nothing of.
@@ -218,6 +234,26 @@ mod tests {
             [0.05 * wave(0.1), 0.1 * wave(0.17), 0.5 * wave(0.23)]
         };
         assert_eq!(said(WET, "current_a", slow, [0.001; 3]), Some(true));
+    }
+
+    #[test]
+    fn runs_from_rest_at_several_levels_change_together_what_one_alone_does_not() {
+        let rig = Rig::from_toml(DRY).unwrap();
+        // An angle alone answers as well as a speed.
+        let run = |level: f64, answer: &str| {
+            let turned = (0..400).map(|k| level * f64::from(k * k) * 1e-4).collect();
+            let columns = vec![("current_cmd_a".to_owned(), vec![level; 400]), (answer.to_owned(), turned)];
+            let time_s = (0..400).map(|k| 0.01 * f64::from(k)).collect();
+            Prepared::new(&Series { name: "run".into(), time_s, columns }, &rig, false).unwrap()
+        };
+        for answer in ["shaft_speed_rad_s", "shaft_angle_rad"] {
+            let runs = |levels: [f64; 4]| levels.map(|level| run(level, answer));
+            assert_eq!(too_thin(&runs([1.0, 2.0, 3.0, 4.0]), &rig), None);
+            assert!(
+                too_thin(&runs([2.0; 4]), &rig).is_some_and(|thin| !thin.still),
+                "one level tells one point"
+            );
+        }
     }
 
     #[test]

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use kort_identify::fit::{Columns, Fit};
 use kort_identify::hypothesis::{Hypothesis, Member, Target};
 use kort_thruster::effects::Scale;
+use kort_thruster::effects::torque_ripple_cogging::come_again;
 use nalgebra::DVector;
 use rayon::prelude::*;
 
@@ -168,7 +169,12 @@ impl Search<'_, '_> {
             values[place] = order;
             member.clone().at(values)
         };
-        self.usual_orders(&member).into_iter().filter(|order| !taken.contains(order)).map(at).collect()
+        let comes_again = |order: &f64| {
+            let together: Vec<f64> = taken.iter().copied().chain([*order]).collect();
+            come_again(&together, self.problem.scale.turned_rad)
+        };
+        let usual = self.usual_orders(&member).into_iter();
+        usual.filter(|order| !taken.contains(order) && comes_again(order)).map(at).collect()
     }
 
     /// The orders of the shaft's angle that a member's starts have first.

@@ -42,9 +42,11 @@ pub(super) fn choose_driving(series: &Series, rig: &Rig, speed_driven: bool) -> 
     let answered = rig.propeller.is_some() && ["thrust_n", "torque_n_m", "flow_m_s"].into_iter().any(varies);
     let powered = rig.motor.winding_resistance_ohm.is_some() && electrical_power(series).is_some();
     if !varies("shaft_speed_rad_s") {
-        // One steady speed is too little to tell anything, and is said to be; it is no broken log.
-        series.column("shaft_speed_rad_s")?;
-        return commands.iter().find(held).map(|command| Driving::Command(command));
+        // One steady speed is too little to tell anything, and is said to be; it is no broken log. An angle alone tells a dry
+        // shaft's speed as well.
+        let told = series.column("shaft_speed_rad_s").is_some()
+            || rig.propeller.is_none() && varies("shaft_angle_rad");
+        return commands.iter().find(held).filter(|_| told).map(|command| Driving::Command(command));
     }
     Some(match commands.iter().find(held) {
         _ if answered => Driving::Speed,

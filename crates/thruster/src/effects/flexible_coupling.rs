@@ -28,7 +28,8 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: |scale| {
         // A ring shows a fit the way only from near its frequency.
-        (0..16).map(|k| vec![compliance(scale, 1.2 * 1.25_f64.powi(k)), 0.5, 0.1]).collect()
+        let rings = (0..16).map(|k| compliance(scale, 1.2 * 1.25_f64.powi(k)));
+        rings.filter(|k| *k <= most(scale)).map(|k| vec![k, 0.5, 0.1]).collect()
     },
     needs: free_shaft,
     build: both!(|values, context| {
@@ -47,16 +48,16 @@ fn compliance(scale: &Scale, hz: f64) -> f64 {
     1.0 / (0.25 * scale.inertia_kg_m2 * (std::f64::consts::TAU * hz).powi(2))
 }
 
+/// The softest coupling: it swings at 0.3 Hz, or twists by a turn under the drive's largest torque.
+fn most(scale: &Scale) -> f64 {
+    compliance(scale, 0.3).min(std::f64::consts::TAU / scale.torque_n_m)
+}
+
 fn parameters(scale: &Scale) -> Vec<Spec> {
+    let most = most(scale);
+    let within = |hz: f64| compliance(scale, hz).min(0.5 * most);
     vec![
-        Spec::strength(
-            "compliance_rad_nm",
-            "rad/(N m)",
-            compliance(scale, 12.0),
-            0.0,
-            compliance(scale, 0.3),
-        )
-        .sigma(compliance(scale, 5.0)),
+        Spec::strength("compliance_rad_nm", "rad/(N m)", within(12.0), 0.0, most).sigma(within(5.0)),
         Spec::shape("load_inertia_share", "1", 0.5, 0.03, 0.97).sigma(0.25),
         Spec::shape("damping_ratio", "1", 0.1, 0.01, 1.0).sigma(0.15),
     ]

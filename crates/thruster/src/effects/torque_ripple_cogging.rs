@@ -90,13 +90,27 @@ fn starts(scale: &Scale) -> Vec<Vec<f64>> {
     let (torque, per_a) = (0.02 * scale.torque_n_m, 0.02 * scale.torque_n_m / scale.current_a);
     [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 14, 18, 21, 24, 30, 36, 42, 48, 60, 72, 84]
         .iter()
-        .filter(|order| f64::from(**order) * scale.turned_rad >= WAVES * std::f64::consts::TAU)
+        .filter(|order| come_again(&[f64::from(**order)], scale.turned_rad))
         .map(|order| {
             let mut values = vec![f64::from(*order), torque, torque, per_a, per_a];
             USUAL[1..].iter().for_each(|usual| values.extend([*usual, 0.0, 0.0, 0.0, 0.0]));
             values
         })
         .collect()
+}
+
+/// Whether a shaft that turns so far, rad, meets what these orders make together often enough to show that it comes again: once
+/// in a wave of the greatest order that divides them all.
+pub fn come_again(orders: &[f64], turned_rad: f64) -> bool {
+    let divisor = |a: u32, b: u32| {
+        let (mut a, mut b) = (a, b);
+        while b > 0 {
+            (a, b) = (b, a % b);
+        }
+        a
+    };
+    let common = orders.iter().map(|order| order.round() as u32).fold(0, divisor);
+    f64::from(common) * turned_rad >= WAVES * std::f64::consts::TAU
 }
 
 fn needs(rig: &Rig, available: &Available) -> Result<(), &'static str> {
@@ -171,5 +185,18 @@ impl<T: Real> Effect<T> for TorqueRipple<T> {
             let amplitude = |i: usize| order.cogging_n_m[i] + order.ripple_nm_a[i] * at.current_a;
             balance.shaft_torque_n_m += amplitude(0) * sin + amplitude(1) * cos;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::come_again;
+
+    #[test]
+    fn orders_come_again_together_once_in_the_wave_of_their_common_divisor() {
+        let turn = std::f64::consts::TAU;
+        assert!(come_again(&[12.0], 0.2 * turn) && !come_again(&[12.0], 0.15 * turn));
+        assert!(come_again(&[12.0, 72.0, 18.0], 0.4 * turn), "six times a turn");
+        assert!(!come_again(&[6.0, 7.0], 1.9 * turn) && come_again(&[6.0, 7.0], 2.0 * turn));
     }
 }

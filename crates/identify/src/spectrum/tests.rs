@@ -1,0 +1,99 @@
+use super::*;
+
+#[test]
+fn bands_cover_every_line_once_and_widen() {
+    for n in [1, 2, 7, 600, 6500] {
+        let ranges = band_ranges(n);
+        assert_eq!(ranges[0], 0..1);
+        assert!(ranges.windows(2).all(|w| w[0].end == w[1].start), "{ranges:?}");
+        assert_eq!(ranges.last().unwrap().end, n);
+    }
+    let ranges = band_ranges(6500);
+    assert!(ranges.len() < 22, "{}", ranges.len());
+}
+
+#[test]
+fn lines_about_a_frequency_count_together_over_recordings_of_one_channel() {
+    let band = |hz: f64, lines: usize| Band {
+        lines: 0..lines,
+        hz,
+        alike: lines,
+        signal: 0.0,
+        quantisation: 0.0,
+        row_s: 0.01,
+        stale_s: 0.0,
+        continues: true,
+        rest: false,
+    };
+    let place = |recording, response, constant| Place { recording, response, constant };
+    let (speed, thrust) = (Response::ShaftSpeed, Response::Thrust);
+    let mut bands =
+        vec![band(0.01, 1), band(1.0, 20), band(0.05, 1), band(1.1, 30), band(1.0, 20), band(1.4, 5)];
+    let places = [
+        place(0, speed, true),
+        place(0, speed, false),
+        place(1, speed, true),
+        place(1, speed, false),
+        place(1, thrust, false),
+        place(0, speed, false),
+    ];
+    count_alike(&mut bands, &places);
+    let alike: Vec<usize> = bands.iter().map(|band| band.alike).collect();
+    assert_eq!(alike, [2, 50, 2, 50, 20, 5]);
+}
+
+#[test]
+fn what_speed_and_angle_both_show_is_taken_off_the_noisier_one() {
+    let rig = "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = 0.01\ntorque_constant_nm_a = 0.1\n";
+    let rig = kort_thruster::rig::Rig::from_toml(rig).unwrap();
+    let off = |k: usize, size: f64| size * ((k * 7919 % 101) as f64 / 50.0 - 1.0);
+    let less = |of_speed: f64, of_angle: f64| {
+        let columns = [
+            ("current_cmd_a", (0..400).map(|k| (0.05 * k as f64).sin()).collect::<Vec<f64>>()),
+            (
+                "shaft_speed_rad_s",
+                (0..400).map(|k| 20.0 * (0.05 * k as f64).cos() + off(k, of_speed)).collect(),
+            ),
+            ("shaft_angle_rad", (0..400).map(|k| 4.0 * (0.05 * k as f64).sin() + off(k, of_angle)).collect()),
+        ];
+        let series = crate::data::Series {
+            name: "log".into(),
+            time_s: (0..400).map(|k| 0.01 * k as f64).collect(),
+            columns: columns.map(|(name, values)| (name.to_owned(), values)).into(),
+        };
+        let all = [Prepared::new(&series, &rig, false).unwrap()];
+        let place = |wanted| all[0].channels.iter().position(|c| c.response == wanted).unwrap();
+        let spectrum = Spectrum::new(&all, &[vec![false; 400]]);
+        [Response::ShaftSpeed, Response::ShaftAngle]
+            .map(|wanted| spectrum.frames[0][place(wanted)].less.is_some())
+    };
+    // Noise of 1 mrad makes 0.14 rad/s of a rate over 10 ms.
+    assert_eq!(less(1.0, 1e-3), [true, false]);
+    assert_eq!(less(0.01, 1e-3), [false, true]);
+}
+
+#[test]
+fn rates_of_a_counted_angle_err_little_where_they_are_slow() {
+    let (n, count_rad) = (4096, 0.01);
+    let angle = |k: usize| 3.0 * (k as f64 * 0.0031).sin() + 0.0217 * k as f64;
+    let off = |k: usize| (angle(k) / count_rad).round() * count_rad - angle(k);
+    let mut lines: Vec<f64> = (0..n).map(|k| off(k + 1) - off(k)).collect();
+    DctPlanner::new().plan_dct2(n).process_dct2(&mut lines);
+    for range in band_ranges(n).into_iter().filter(|r| r.len() > 10) {
+        let scale = 2.0 / n as f64 / range.len() as f64;
+        let power = scale * lines[range.clone()].iter().map(|v| v * v).sum::<f64>();
+        let middle = 0.5 * (range.start + range.end - 1) as f64 / (2.0 * n as f64);
+        let told = count_rad.powi(2) / 12.0 * differenced(Response::ShaftAngle, middle);
+        assert!((0.4..2.5).contains(&(power / told)), "{range:?}: {power:e}, told {told:e}");
+    }
+    assert_eq!(differenced(Response::ShaftSpeed, 0.01), 1.0);
+}
+
+#[test]
+fn a_coarse_converter_has_its_step_and_a_fine_one_hardly_any() {
+    let coarse: Vec<f64> =
+        (0..1000).map(|k| (f64::from(k) * 0.37).sin()).map(|v| (v / 0.1).round() * 0.1).collect();
+    assert!((quantum(&coarse) - 0.1).abs() < 1e-9);
+    let fine: Vec<f64> = (0..1000).map(|k| (f64::from(k) * 0.37).sin()).collect();
+    assert!(quantum(&fine) < 0.01);
+}
