@@ -198,21 +198,19 @@ pub fn channels(
         .collect()
 }
 
-/// Whether rows held out are predicted better than by their own mean on any channel; of what the fit did not see, its
+/// Whether rows held out are predicted better than by nothing that moves on any channel; of what the fit did not see, its
 /// residual on all rows is given.
 pub fn predicts(problem: &Problem, held: &[Vec<bool>], trained: &Stack) -> bool {
-    problem.recordings.iter().enumerate().any(|(r, recording)| {
-        recording.channels.iter().enumerate().any(|(c, channel)| {
-            let picks = || {
-                (0..channel.rows.len())
-                    .filter(|k| held[r][channel.rows[*k]] && !problem.masked[r][channel.rows[*k]])
-            };
-            let n = picks().count().max(1) as f64;
-            let mean = picks().map(|k| channel.values[k]).sum::<f64>() / n;
-            let error: f64 = picks().map(|k| trained[r][c][k].powi(2)).sum();
-            error < picks().map(|k| (channel.values[k] - mean).powi(2)).sum()
-        })
-    })
+    let on = |r: usize, c: usize| {
+        let channel = &problem.recordings[r].channels[c];
+        let rows = channel.rows.iter().enumerate();
+        let picks = rows.filter(|(_, row)| held[r][**row] && !problem.masked[r][**row]);
+        let (error, signal) = picks.fold((0.0, 0.0), |(error, signal), (k, _)| {
+            (error + trained[r][c][k].powi(2), signal + channel.values[k].powi(2))
+        });
+        error < signal
+    };
+    (0..trained.len()).any(|r| (0..trained[r].len()).any(|c| on(r, c)))
 }
 
 /// First five autocorrelations of a channel's residual within three standard errors.

@@ -79,13 +79,14 @@ impl Spectrum {
                 let n = picks.len();
                 let scatter = |channel: &Channel| scatter(&channel.values, &picks);
                 let shown_twice = recording.channels.iter().position(|other| {
-                    let turning = [channel.response, other.response];
-                    let noisier = match turning {
-                        [Response::ShaftSpeed, Response::ShaftAngle] => scatter(channel) >= scatter(other),
-                        [Response::ShaftAngle, Response::ShaftSpeed] => scatter(channel) > scatter(other),
-                        _ => return false,
-                    };
-                    noisier && other.rows == channel.rows
+                    other.rows == channel.rows
+                        && match [channel.response, other.response] {
+                            [Response::ShaftSpeed, Response::ShaftAngle] => {
+                                scatter(channel) >= scatter(other)
+                            }
+                            [Response::ShaftAngle, Response::ShaftSpeed] => scatter(channel) > scatter(other),
+                            _ => false,
+                        }
                 });
                 let frame = Frame {
                     full_scale: channel.full_scale,

@@ -59,7 +59,7 @@ impl Guard {
             still: Stillness::new(),
             since_speed: 0,
             direction: Direction::default(),
-            agreement: Agreement::new(),
+            agreement: Agreement::default(),
             last_speed_rad_s: f64::NAN,
             held_speed_rad_s: 0.0,
             held_current_a: 0.0,

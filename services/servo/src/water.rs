@@ -156,9 +156,9 @@ pub struct Agreement {
     implausible: bool,
 }
 
-impl Agreement {
+impl Default for Agreement {
     /// Nothing seen yet.
-    pub fn new() -> Self {
+    fn default() -> Self {
         Self {
             slow_s: 0.0,
             slow_nm_s: 0.0,
@@ -171,7 +171,9 @@ impl Agreement {
             implausible: false,
         }
     }
+}
 
+impl Agreement {
     /// Is the shaft too slow for this current, at the speed and current that stand now?
     pub fn is_slow(&mut self, l: &Limits, speed: f64, current: f64, dt_s: f64) -> bool {
         let w = &l.water;
@@ -197,7 +199,8 @@ impl Agreement {
     pub fn is_implausible(&mut self, l: &Limits, speed: f64, current: f64, thrust: f64, dt_s: f64) -> bool {
         self.gap_s += dt_s;
         if self.gap_s > GAP_S {
-            *self = Self { slow_s: self.slow_s, slow_nm_s: self.slow_nm_s, gap_s: self.gap_s, ..Self::new() };
+            *self =
+                Self { slow_s: self.slow_s, slow_nm_s: self.slow_nm_s, gap_s: self.gap_s, ..Self::default() };
         }
         if !thrust.is_finite() {
             return self.implausible;

@@ -23,7 +23,7 @@ fn full_speed_is_known_without_a_limit() {
 fn a_shaft_with_a_seventh_of_its_speed_is_slow_after_a_second_and_one_in_a_crash_stop_is_not() {
     let l = of_the_stand();
     let trips_at = |speed: f64, current: f64| {
-        let mut agreement = Agreement::new();
+        let mut agreement = Agreement::default();
         (1..5000).find(|_| agreement.is_slow(&l, speed, current, 1e-3))
     };
     let full = l.water.speed_full_rad_s;
@@ -31,7 +31,7 @@ fn a_shaft_with_a_seventh_of_its_speed_is_slow_after_a_second_and_one_in_a_crash
     assert_eq!(trips_at(full, 9.0), None);
     assert_eq!(trips_at(full / 7.0, 1.0), None, "a stream holds it so");
     assert_eq!(trips_at(-full / 7.0, 9.0), None, "it turns round");
-    assert_eq!(Agreement::new().is_slow(&limits(), 1.0, 9.0, 60.0), false, "no propeller");
+    assert_eq!(Agreement::default().is_slow(&limits(), 1.0, 9.0, 60.0), false, "no propeller");
 }
 
 #[test]
@@ -43,7 +43,7 @@ fn a_thrust_is_held_against_torque_and_speed_together() {
         (speed, w.torque_n_m_s2 * speed * speed / 1.23, w.thrust_n_s2 * speed * speed)
     };
     let trips_at = |speed: f64, current: f64, thrust: &dyn Fn(u32) -> f64| {
-        let mut agreement = Agreement::new();
+        let mut agreement = Agreement::default();
         (1..9000).find(|ms| {
             // A reading every twentieth tick.
             let thrust = if ms % 20 == 0 { thrust(*ms) } else { f64::NAN };
@@ -71,7 +71,7 @@ fn a_thrust_is_held_against_torque_and_speed_together() {
 #[test]
 fn silence_says_nothing() {
     let l = of_the_stand();
-    let mut agreement = Agreement::new();
+    let mut agreement = Agreement::default();
     let (speed, current) = (l.water.speed_full_rad_s, 9.0);
     for _ in 0..4000 {
         agreement.is_implausible(&l, speed, current, -170.0, 1e-3);
