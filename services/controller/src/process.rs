@@ -182,7 +182,7 @@ fn law(
         advise(rig, period_s).map(|advice| advice.config).map_err(of_rig)
     });
     let advised = advised.transpose()?;
-    let mut law = advised.clone().unwrap_or_default();
+    let mut law = advised.unwrap_or_default();
     if keys.file != Path::new("") {
         let key = format!("thrusters.{id}.controller.file");
         let (file, text) = config.text_of(&key, &keys.file, &[]).map_err(|error| vec![error.into()])?;
