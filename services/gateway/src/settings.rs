@@ -376,7 +376,7 @@ fn controller(
     // The controller's process refuses a rig that has no default in its own words.
     let advised = rig.filter(|_| keys.takes_default()).and_then(|rig| advise(rig, period_s).ok());
     let advised = advised.map(|advice| advice.config);
-    let mut stated = advised.clone().unwrap_or_default();
+    let mut stated = advised.unwrap_or_default();
     if keys.file != Path::new("") {
         let key = format!("thrusters.{id}.controller.file");
         let (file, text) = config.text_of(&key, &keys.file, &[]).map_err(|error| vec![error])?;
