@@ -133,7 +133,7 @@ impl<'a, 'p> Writer<'a, 'p> {
         let baseline_trained = self.trained(self.baseline);
         let last_trained =
             if self.best.is_empty() { baseline_trained.clone() } else { self.trained(self.last) };
-        let idle = !self.names_only().is_empty() && !scores::predicts(problem, &self.held, &last_trained);
+        let idle = !self.names_only().is_empty() && !scores::predicts(problem, &last_full);
         let thin = idle.then(Thin::unpredicted).or(thin);
         let actions = problem.actions(self.last);
         let negligible = left::negligible(problem, self.last, &actions);

@@ -198,19 +198,21 @@ pub fn channels(
         .collect()
 }
 
-/// Whether rows held out are predicted better than by nothing that moves on any channel; of what the fit did not see, its
-/// residual on all rows is given.
-pub fn predicts(problem: &Problem, held: &[Vec<bool>], trained: &Stack) -> bool {
+/// Least share of a channel's square that what is told must make, to tell anything.
+const TOLD: f64 = 0.1;
+
+/// Whether a fit of this residual follows any channel more than nothing that moves does.
+pub fn predicts(problem: &Problem, residual: &Stack) -> bool {
     let on = |r: usize, c: usize| {
         let channel = &problem.recordings[r].channels[c];
         let rows = channel.rows.iter().enumerate();
-        let picks = rows.filter(|(_, row)| held[r][**row] && !problem.masked[r][**row]);
+        let picks = rows.filter(|(_, row)| !problem.masked[r][**row]);
         let (error, signal) = picks.fold((0.0, 0.0), |(error, signal), (k, _)| {
-            (error + trained[r][c][k].powi(2), signal + channel.values[k].powi(2))
+            (error + residual[r][c][k].powi(2), signal + channel.values[k].powi(2))
         });
-        error < signal
+        error < (1.0 - TOLD) * signal
     };
-    (0..trained.len()).any(|r| (0..trained[r].len()).any(|c| on(r, c)))
+    (0..residual.len()).any(|r| (0..residual[r].len()).any(|c| on(r, c)))
 }
 
 /// First five autocorrelations of a channel's residual within three standard errors.

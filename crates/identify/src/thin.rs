@@ -32,9 +32,9 @@ pub struct Thin {
 }
 
 impl Thin {
-    /// What is told of them predicts no channel of rows left out better than a shaft at rest does.
+    /// What is told of them follows no channel better than a shaft at rest does.
     pub fn unpredicted() -> Self {
-        let why = "nothing that was recorded follows what drives: with all that would be told, no channel of the rows left out is predicted better than by a thruster at rest. The log may be too slow for its command, or its columns may belong to different machines or times";
+        let why = "nothing that was recorded follows what drives: with all that would be told, no channel is followed better than by a thruster at rest. The log may be too slow for its command, or its columns may belong to different machines or times";
         Self { why: why.into(), still: true }
     }
 }

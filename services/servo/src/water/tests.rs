@@ -31,7 +31,7 @@ fn a_shaft_with_a_seventh_of_its_speed_is_slow_after_a_second_and_one_in_a_crash
     assert_eq!(trips_at(full, 9.0), None);
     assert_eq!(trips_at(full / 7.0, 1.0), None, "a stream holds it so");
     assert_eq!(trips_at(-full / 7.0, 9.0), None, "it turns round");
-    assert_eq!(Agreement::default().is_slow(&limits(), 1.0, 9.0, 60.0), false, "no propeller");
+    assert!(!Agreement::default().is_slow(&limits(), 1.0, 9.0, 60.0), "no propeller");
 }
 
 #[test]
