@@ -85,7 +85,10 @@ fn while_somebody_holds_the_lease_every_change_needs_it() {
         // One event for all of it, and one of the disarming before.
         let told = |kind: &str| told(&stack, kind);
         assert_eq!((told("stopped").len(), told("disarmed").len()), (1, 1));
-        assert_eq!(told("stopped")[0]["detail"], "local stopped every thruster; confirmed: t1");
+        assert_eq!(
+            told("stopped")[0]["detail"],
+            "local stopped every thruster; confirmed: t1; was armed: t1"
+        );
         // What did not come about is not told as done.
         kill(stack.process_of("servo"), "STOP");
         let (status, answer) = ask(port, "POST", "/v1/stop", &[], "");

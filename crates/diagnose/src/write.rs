@@ -134,7 +134,7 @@ impl<'a, 'p> Writer<'a, 'p> {
         let last_trained =
             if self.best.is_empty() { baseline_trained.clone() } else { self.trained(self.last) };
         let idle = !self.names_only().is_empty() && !scores::predicts(problem, &last_full);
-        let thin = idle.then(Thin::unpredicted).or(thin);
+        let thin = thin.filter(|thin| thin.still || !idle).or(idle.then(Thin::unpredicted));
         let actions = problem.actions(self.last);
         let negligible = left::negligible(problem, self.last, &actions);
         let circumstances = Circumstances {

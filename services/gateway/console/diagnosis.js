@@ -1,7 +1,7 @@
 "use strict";
 // Diagnosis: path lights, what the model left out, earlier ones, use it, go back, and what that did to the thrust.
 const LOOK_EVERY_MS = 2000, SETTLE_S = 5, BEFORE_S = 1, ERROR_SPAN_S = 60;
-let found = null, proposed = null, opened = null; // the diagnosis that is shown: the newest, or an earlier one that was opened, and the newest then
+let found = null, proposed = null, earlier = null; // the diagnosis that is shown: the newest, or an earlier one that was opened, and the newest then
 
 const diagnosesOf = () => `${base()}/diagnoses`;
 const percent = (share) => (share === null || share === undefined ? "–" : `${Math.round(100 * share)} %`);
@@ -53,8 +53,8 @@ async function loadDiagnosis() {
   if (thruster !== of) return; // another was chosen meanwhile: these are not its
   const newest = list.at(-1) ?? null;
   const last = list.findLast((item) => item.state === "done") ?? newest; // what ended otherwise takes nothing away
-  if (opened && opened.newest !== newest?.id) opened = null; // another was begun since
-  found = list.find((item) => item.id === opened?.id) ?? last;
+  if (earlier && earlier.newest !== newest?.id) earlier = null; // another was begun since
+  found = list.find((item) => item.id === earlier?.id) ?? last;
   $("back").disabled = rig.before === null || isStale();
   says("rig-text", `In force: revision ${rig.number} of the rig, from ${rig.source}${rig.note ? ` (${rig.note})` : ""}.`);
   showEarlier(list);
@@ -96,7 +96,7 @@ function showEarlier(list) {
   if ($("earlier-list").dataset.shown === shown || $("earlier-list").contains(document.activeElement)) return; // nothing is taken away from under the finger
   $("earlier-list").dataset.shown = shown;
   $("earlier-list").replaceChildren(...told.map(([id, when, of, words, done, here]) => {
-    const open = Object.assign(document.createElement("button"), { textContent: here ? "shown" : "Open", disabled: here, ariaLabel: `open ${id}`, onclick: (event) => { event.target.blur(); opened = { id, newest: list.at(-1).id }; loadDiagnosis().catch(() => {}); } });
+    const open = Object.assign(document.createElement("button"), { textContent: here ? "shown" : "Open", disabled: here, ariaLabel: `open ${id}`, onclick: (event) => { event.target.blur(); earlier = { id, newest: list.at(-1).id }; loadDiagnosis().catch(() => {}); } });
     return cells([when, of, words, done ? open : ""]);
   }));
 }
@@ -222,7 +222,7 @@ async function offer() {
 setInterval(() => { if (!document.hidden && thruster) offer().catch(() => {}); }, 5000);
 setTimeout(() => { if (thruster) { offer().catch(() => {}); loadDiagnosis().catch(() => {}); } }, 500);
 $("thruster").addEventListener("change", () => {
-  found = null; opened = null; proposed = null; $("page").hidden = true;
+  found = null; earlier = null; proposed = null; $("page").hidden = true;
   for (const id of ["findings", "earlier-list", "diagnosis-of"]) delete $(id).dataset.shown;
   $("findings").replaceChildren(); $("earlier-list").replaceChildren(); $("earlier").hidden = true; $("report").replaceChildren(); says("diagnosis-text", ""); says("next-text", ""); says("rig-text", "");
   for (const box of document.querySelectorAll("#known-effects input")) box.checked = false; // what is known of one is not of another

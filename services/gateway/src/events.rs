@@ -91,12 +91,19 @@ impl Events {
         }
     }
 
-    /// An event of now; repeats of it are told together, with their count.
+    /// An event of now. Repeats of what anybody may do are told together, with their count; what takes the lease is one man's
+    /// doing, each time.
     pub fn tell(&self, kind: EventKind, thruster: Option<&str>, who: &str, detail: impl Into<String>) {
+        use EventKind::{
+            Armed, CalibrationEnded, CalibrationStarted, Commanded, ControllerChanged, ExcitationEnded,
+            ExcitationStarted, FaultsCleared, RigChanged, RigRolledBack, RigWorse,
+        };
         let event = Event::now(kind, thruster, who, detail);
-        // Told later it would clear what came meanwhile.
         let now = match kind {
-            EventKind::FaultsCleared => Some(event),
+            Armed | CalibrationEnded | CalibrationStarted | Commanded | ControllerChanged
+            | ExcitationEnded | ExcitationStarted | FaultsCleared | RigChanged | RigRolledBack | RigWorse => {
+                Some(event)
+            }
             _ => lock(&self.pace).take(event, Instant::now()),
         };
         if let Some(event) = now {
