@@ -117,7 +117,7 @@ impl Spectrum {
                         hz,
                         alike: range.len(),
                         signal: power / range.len() as f64,
-                        quantisation: quantisation * differenced(channel.response, hz * interval_s),
+                        quantisation: quantisation * differenced(channel.response, hz * interval_s, n),
                         row_s,
                         stale_s,
                         continues: i + 1 < ranges.len(),
@@ -280,10 +280,10 @@ fn variance(values: &[f64], picks: &[usize]) -> f64 {
 
 /// Power that counts of an angle keep at a share of the sampling frequency where their differences are compared, over that of
 /// as coarse a converter, whose steps are as many in a slow signal as in a fast one: what a count is short of comes with the
-/// next.
-fn differenced(response: Response, of_sampling: f64) -> f64 {
+/// next, but for the two at the ends of so many.
+fn differenced(response: Response, of_sampling: f64, samples: usize) -> f64 {
     if response == Response::ShaftAngle {
-        (2.0 * (std::f64::consts::PI * of_sampling).sin()).powi(2)
+        (2.0 * (std::f64::consts::PI * of_sampling).sin()).powi(2) + 4.0 / samples as f64
     } else {
         1.0
     }

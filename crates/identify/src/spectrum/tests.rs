@@ -83,10 +83,10 @@ fn rates_of_a_counted_angle_err_little_where_they_are_slow() {
         let scale = 2.0 / n as f64 / range.len() as f64;
         let power = scale * lines[range.clone()].iter().map(|v| v * v).sum::<f64>();
         let middle = 0.5 * (range.start + range.end - 1) as f64 / (2.0 * n as f64);
-        let told = count_rad.powi(2) / 12.0 * differenced(Response::ShaftAngle, middle);
+        let told = count_rad.powi(2) / 12.0 * differenced(Response::ShaftAngle, middle, n);
         assert!((0.4..2.5).contains(&(power / told)), "{range:?}: {power:e}, told {told:e}");
     }
-    assert_eq!(differenced(Response::ShaftSpeed, 0.01), 1.0);
+    assert_eq!(differenced(Response::ShaftSpeed, 0.01, n), 1.0);
 }
 
 #[test]
