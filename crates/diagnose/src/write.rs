@@ -130,9 +130,6 @@ impl<'a, 'p> Writer<'a, 'p> {
         let whole = (self.excess(&baseline_full) - self.excess(&last_full)).max(1e-300);
         let left = (self.excess(&named_full) - self.excess(&last_full)).max(0.0) / whole;
         let rest = left::more_than_noise(problem, self.last, &last_full, &self.floor);
-        let baseline_trained = self.trained(self.baseline);
-        let last_trained =
-            if self.best.is_empty() { baseline_trained.clone() } else { self.trained(self.last) };
         let idle = !self.names_only().is_empty() && !scores::predicts(problem, &last_full);
         let thin = thin.filter(|thin| thin.still || !idle).or(idle.then(Thin::unpredicted));
         let actions = problem.actions(self.last);
@@ -147,6 +144,9 @@ impl<'a, 'p> Writer<'a, 'p> {
             more_than_noise: rest.is_some(),
         };
         let decision = decide(&self.posterior, &circumstances);
+        let baseline_trained = self.trained(self.baseline);
+        let last_trained =
+            if self.best.is_empty() { baseline_trained.clone() } else { self.trained(self.last) };
         let rows = problem.rows(&self.last.hypothesis, &self.last.values);
         let speed: Vec<Vec<f64>> =
             rows.iter().map(|rows| rows.iter().map(|s| s.true_speed_rad_s).collect()).collect();

@@ -321,3 +321,43 @@ fn pieces(
     }
     out.into_values().collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use kort_thruster::models::ModelName;
+    use kort_thruster::rig::Rig;
+
+    use super::*;
+    use crate::data::Series;
+    use crate::noise::Criterion;
+    use crate::setup::Setup;
+
+    #[test]
+    fn a_shaft_that_is_taken_to_stand_tells_nothing_of_one_that_moves_and_a_level_is_told_by_its_mean() {
+        let rig = "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = 0.01\ntorque_constant_nm_a = 0.1\n";
+        let rig = Rig::from_toml(rig).unwrap();
+        let criterion =
+            Criterion { form_error: 0.005, own_form_error: 0.2, facts_a_band: 10.0, timing_s: 0.001 };
+        let tells = |speed: fn(usize) -> f64, left: fn(f64) -> f64| {
+            let series = Series {
+                name: "log".into(),
+                time_s: (0..400).map(|k| 0.01 * k as f64).collect(),
+                columns: vec![
+                    ("current_cmd_a".into(), (0..400).map(|k| (0.1 * k as f64).sin()).collect()),
+                    ("shaft_speed_rad_s".into(), (0..400).map(speed).collect()),
+                ],
+            };
+            let problem = Setup::new(&[series], &rig, ModelName::Model2, criterion).unwrap().problem;
+            let of = |channel: &crate::data::Channel| channel.values.iter().map(|v| left(*v)).collect();
+            let residual: Stack =
+                problem.recordings.iter().map(|r| r.channels.iter().map(of).collect()).collect();
+            predicts(&problem, &residual)
+        };
+        let noise = |k: usize| 10.0 * (k as f64 * k as f64 * 0.7).sin();
+        let level = |k: usize| 40.0 + 0.1 * (k as f64 * k as f64 * 0.7).sin();
+        assert!(!tells(noise, |v| v), "at rest");
+        assert!(!tells(noise, |v| 0.97 * v), "hardly more than at rest");
+        assert!(tells(noise, |v| 0.5 * v));
+        assert!(tells(level, |v| v - 40.0), "what is left of a level is noise");
+    }
+}
