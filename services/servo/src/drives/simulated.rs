@@ -6,7 +6,7 @@ use kort_proto::config::{Config, ConfigError, Thruster};
 use kort_proto::faults::Fault;
 use kort_proto::messages::DriveKind;
 use kort_proto::signals::Signals;
-use kort_scenario::{Measuring, ScenarioError};
+use kort_scenario::Measuring;
 use kort_thruster::effects::Descriptor;
 use kort_thruster::models::ModelName;
 use kort_thruster::parameters::{Parameter, Parameters};
@@ -49,6 +49,8 @@ impl Default for Simulation {
 #[derive(Clone, Debug, Deserialize)]
 struct EffectKeys {
     id: String,
+    #[serde(default)]
+    after_s: f64,
     #[serde(flatten)]
     values: BTreeMap<String, f64>,
 }
@@ -64,6 +66,10 @@ pub(super) fn check_keys(config: &Config, section: &str, thruster: &Thruster) ->
 /// The simulated drive.
 pub struct Simulated {
     plant: Plant,
+    /// Stands that take its place from an instant on, s, in order, and how many of them have: an effect that comes on
+    /// later.
+    later: Vec<(f64, Plant)>,
+    passed: usize,
     kind: DriveKind,
     command: f64,
     tick_s: f64,
@@ -113,18 +119,37 @@ impl Simulated {
         let tick_s = thruster.servo_period_ns() as f64 * 1e-9;
         let parameters = Parameters::stated(rig);
         let scale = kort_scenario::scale(rig, &parameters, full_drive(rig, &parameters), tick_s, 60.0);
-        let mut chosen = Vec::new();
+        let (mut chosen, mut wrong) = (Vec::new(), Vec::new());
         for (i, effect) in keys.effects.iter().enumerate() {
             let (named, given) = (format!("{section}.effects[{i}].id"), format!("{section}.effects[{i}]"));
             let used = kort_scenario::used_effect((&named, &effect.id), (&given, &effect.values), &scale);
-            let first = |wrong: Vec<ScenarioError>| {
-                config.error(wrong.first().map(ToString::to_string).unwrap_or_default())
-            };
-            chosen.push(used.map_err(first)?);
+            match used {
+                Ok(used) => chosen.push((effect.after_s, used)),
+                Err(said) => wrong.extend(said.iter().map(|e| config.error(e.to_string()))),
+            }
+            if !(0.0..=1e6).contains(&effect.after_s) {
+                let words = format!(
+                    "{} is outside 0 to 1e6\nhint: seconds after the servo's start from which the effect acts",
+                    effect.after_s
+                );
+                wrong.push(fail(&format!("effects[{i}].after_s"), words));
+            }
         }
-        let chosen: Vec<(&Descriptor, &[f64])> = chosen.iter().map(|(d, v)| (*d, v.as_slice())).collect();
+        if let Some(first) = config.first_of(wrong.into_iter()) {
+            return Err(first);
+        }
+        let mut onsets: Vec<f64> = chosen.iter().map(|(after_s, _)| *after_s).chain([0.0]).collect();
+        onsets.sort_by(f64::total_cmp);
+        onsets.dedup();
+        let from = |onset_s: f64| {
+            let acting = chosen.iter().filter(|(after_s, _)| *after_s <= onset_s);
+            let acting: Vec<(&Descriptor, &[f64])> = acting.map(|(_, (d, v))| (*d, v.as_slice())).collect();
+            Plant::new(model, rig, &parameters, &acting, tick_s).with_encoder_quantised(true)
+        };
         Ok(Self {
-            plant: Plant::new(model, rig, &parameters, &chosen, tick_s).with_encoder_quantised(true),
+            plant: from(0.0),
+            later: onsets.into_iter().skip(1).map(|onset_s| (onset_s, from(onset_s))).collect(),
+            passed: 0,
             kind: kind_of(rig),
             command: 0.0,
             tick_s,
@@ -144,6 +169,7 @@ impl Drive for Simulated {
 
     fn show(&mut self, at: At) -> Shown {
         for _ in 0..at.ticks.clamp(1, CATCH_UP) {
+            self.go_on();
             self.plant.step(&Tick {
                 time_s: self.time_s,
                 command: self.command,
@@ -171,6 +197,19 @@ impl Drive for Simulated {
 }
 
 impl Simulated {
+    /// Takes the next stand into use where its time has come, from the state of the one before.
+    fn go_on(&mut self) {
+        let Some((from_s, next)) = self.later.get_mut(self.passed) else { return };
+        if self.time_s < *from_s {
+            return;
+        }
+        let was = *self.plant.truth();
+        next.start(self.time_s, was.shaft_speed_rad_s, was.axial_m_s, was.current_a, was.shaft_angle_rad);
+        // The one before stays in its place: nothing is given back while the loop runs.
+        std::mem::swap(&mut self.plant, next);
+        self.passed += 1;
+    }
+
     /// Reads the stand's sensors.
     fn read(&mut self, into: &mut Signals) {
         let read = self.measuring.read(self.time_s, &self.plant.sensed());
@@ -205,5 +244,44 @@ fn full_drive(rig: &Rig, p: &Parameters) -> f64 {
         }
         AmplifierKind::Voltage => supply.unwrap_or(10.0),
         AmplifierKind::Speed => supply.map_or(100.0, |v| v / p.get(Parameter::TorqueConstantNmA)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use kort_proto::config::Config;
+    use kort_thruster::rig::Rig;
+
+    use super::{At, Drive, Simulated};
+
+    /// Shaft speed of a dry motor under 2 A at each of the first hundredths of a second, rad/s.
+    fn speeds(effects: &str) -> Vec<f64> {
+        let rig = "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = 0.01\ntorque_constant_nm_a = 0.1\n\
+                   viscous_friction_nm_s = 0.01\n[amplifier]\nkind = \"current\"\ncurrent_limit_a = 5.0\n";
+        let rig = Rig::from_toml(rig).unwrap();
+        let text = format!(
+            "[thrusters.t1]\nrig = \"r\"\namplifier = \"simulated\"\n\
+             simulation = {{ seed = 0, effects = [{effects}] }}\n"
+        );
+        let config = Config::parse(&text, None).unwrap();
+        let mut stand = Simulated::new(&config, "t1", config.thruster("t1").unwrap(), &rig).unwrap();
+        let mut show = |k: u64| {
+            stand.drive(0, Some(2.0));
+            stand.show(At { now_ns: k * 10_000_000, ticks: 10 });
+            stand.plant.truth().shaft_speed_rad_s
+        };
+        (0..400).map(&mut show).collect()
+    }
+
+    #[test]
+    fn an_effect_comes_on_when_its_time_has_come_and_the_shaft_goes_on_from_where_it_is() {
+        let rubs =
+            |after: &str| format!("{{ id = \"viscous_friction\", viscous_friction_nm_s = 0.005{after} }}");
+        let (smooth, late, rough) = (speeds(""), speeds(&rubs(", after_s = 2.0")), speeds(&rubs("")));
+        assert_eq!(smooth[..195], late[..195]);
+        assert!(late.windows(2).all(|w| (w[1] - w[0]).abs() < 0.5), "no jump");
+        let end = |speeds: &[f64]| speeds[399];
+        assert!(end(&smooth) > 18.0 && end(&rough) < 14.0, "{} {}", end(&smooth), end(&rough));
+        assert!((end(&late) - end(&rough)).abs() < 0.5, "{}", end(&late));
     }
 }
