@@ -22,8 +22,8 @@ impl Prepared {
         row > 0 && self.time_s[row] - self.time_s[row - 1] > GAP_INTERVALS * usual_s
     }
 
-    /// Rows that follow a gap in which a change of the command may have been missed.
-    fn silent(&self) -> Vec<usize> {
+    /// Gaps in which a change of the command may have been missed, by the rows they lie between.
+    fn silent(&self) -> Vec<(usize, usize)> {
         if !matches!(self.driving, Driving::Command(_)) {
             return Vec::new();
         }
@@ -33,17 +33,18 @@ impl Prepared {
         (1..self.time_s.len())
             .filter(|row| self.after_gap(*row, usual_s) && !self.after_pause(*row))
             .filter(|row| often_1_s * (self.time_s[*row] - self.time_s[row - 1]) > MISSED)
+            .map(|row| (row - 1, row))
             .collect()
     }
 
-    /// The command, at its far end within these gaps.
-    fn otherwise(&self, commands: &[f64], silent: &[usize]) -> Vec<f64> {
+    /// The command, at its far end between these rows.
+    fn otherwise(&self, commands: &[f64], silent: &[(usize, usize)]) -> Vec<f64> {
         let (low, high) =
             commands.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), c| (l.min(*c), h.max(*c)));
         let mut other = commands.to_vec();
-        for row in silent {
+        for (before, after) in silent {
             let tick = |k: usize| self.stimulus.logs[k].0.min(other.len());
-            let (from, to) = (tick(row - 1), tick(*row));
+            let (from, to) = (tick(*before), tick(*after));
             for command in &mut other[from..to] {
                 *command = if *command - low > high - *command { low } else { high };
             }
@@ -79,11 +80,17 @@ impl Hidden {
 impl Problem<'_> {
     /// Rows on which what a gap hides may still show; none if no gap hides anything.
     pub fn hidden_by_gaps(&self, stated: &Hypothesis) -> Option<Hidden> {
-        let silent: Vec<Vec<usize>> = self.recordings.iter().map(Prepared::silent).collect();
+        let silent: Vec<_> = self.recordings.iter().map(Prepared::silent).collect();
+        let rows = self.shown_after(&silent, stated)?;
+        Some(Hidden { rows, gaps: silent.iter().map(Vec::len).collect() })
+    }
+
+    /// Rows on which what the command did between these may still show, by recording; none where there are none.
+    pub fn shown_after(&self, silent: &[Vec<(usize, usize)>], stated: &Hypothesis) -> Option<Vec<Vec<bool>>> {
         if silent.iter().all(Vec::is_empty) {
             return None;
         }
-        let commands = self.recordings.iter().zip(&stated.inputs.commands).zip(&silent);
+        let commands = self.recordings.iter().zip(&stated.inputs.commands).zip(silent);
         let commands = commands.map(|((r, commands), silent)| r.otherwise(commands, silent)).collect();
         let inputs = Inputs { edges: stated.inputs.edges.clone(), commands };
         let other = Hypothesis { inputs: inputs.into(), ..stated.clone() };
@@ -97,7 +104,7 @@ impl Problem<'_> {
                 }
             }
         }
-        Some(Hidden { rows, gaps: silent.iter().map(Vec::len).collect() })
+        Some(rows)
     }
 }
 

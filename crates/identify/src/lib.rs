@@ -33,4 +33,5 @@ mod smooth;
 pub mod spectrum;
 mod step;
 pub mod thin;
+mod too_slow;
 pub use quadratic::{Minimum, Quadratic};

@@ -18,6 +18,7 @@ use crate::refuse;
 use crate::simulate::Problem;
 use crate::spectrum::median_interval;
 use crate::thin::{Thin, too_thin};
+use crate::too_slow;
 
 /// Most steps of the fit that tells whether known effects are as stated.
 const STEPS: usize = 24;
@@ -134,7 +135,7 @@ impl<'a> Setup<'a> {
                     .into(),
             );
         }
-        let thin = too_thin(&recordings, rig);
+        let mut thin = too_thin(&recordings, rig);
         let prescribed = recordings.iter().all(|p| p.driving == Driving::Speed);
         let stated = Parameters::stated(rig);
         let compared = |mut recordings: Vec<Prepared>| {
@@ -151,6 +152,14 @@ impl<'a> Setup<'a> {
             (problem, baseline) = compared(led.recordings);
             baseline.start = led.values;
             problem = problem.doubted_at(&baseline);
+        }
+        if let Some(rows) = problem.too_slow(&baseline) {
+            let nothing = too_slow::tells_nothing(&problem.recordings, &rows);
+            notes.extend(too_slow::words(&problem.recordings, &rows));
+            if nothing.is_none() {
+                problem = problem.without(&rows);
+            }
+            thin = thin.or(nothing);
         }
         if let Some(hidden) = problem.hidden_by_gaps(&baseline) {
             notes.extend(hidden.words(&problem.recordings));
