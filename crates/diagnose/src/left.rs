@@ -67,8 +67,30 @@ pub fn more_than_noise(problem: &Problem, fit: &Fit, residual: &Stack, floor: &N
 
 /// Whether a fit leaves more than noise.
 pub fn leaves_more(problem: &Problem, fit: &Fit) -> bool {
-    let residual = problem.residual(&fit.hypothesis, &fit.values);
-    more_than_noise(problem, fit, &residual, &scores::noise_floor(problem, &residual)).is_some()
+    let more = |fit: &Fit| {
+        let residual = problem.residual(&fit.hypothesis, &fit.values);
+        more_than_noise(problem, fit, &residual, &scores::noise_floor(problem, &residual)).is_some()
+    };
+    more(fit) && more(&at_its_best(problem, fit))
+}
+
+/// Steps of a fit that is taken further.
+const STEPS: usize = 10;
+
+/// A fit of effects taken as far as they go: while sets are compared what explains a mismatch is excused for a share of
+/// it, within which numbers lie where their priors have them; that is for the odds and no part of what is left. The
+/// fit itself where that leaves no less.
+pub fn at_its_best(problem: &Problem, fit: &Fit) -> Fit {
+    if fit.hypothesis.effects.is_empty() {
+        return fit.clone();
+    }
+    let mut further = problem.fit(&fit.resume(), &fit.columns, &problem.floor, STEPS);
+    let squares = |fit: &Fit| fit.lines.norm_squared();
+    if !further.lines.iter().all(|v| v.is_finite()) || squares(&further) >= squares(fit) {
+        return fit.clone();
+    }
+    further.floor = fit.floor.clone();
+    problem.finish(further)
 }
 
 /// Effects of a fit that do less, on every channel, than our equations may err by, each with what it does at most over

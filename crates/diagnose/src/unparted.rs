@@ -21,7 +21,9 @@ pub fn unparted(search: &Search, set: &Set) -> Vec<(&'static str, &'static str)>
         let only_in =
             |one: &Set, not: &Set| one.iter().copied().filter(|id| !not.contains(id)).collect::<Vec<_>>();
         let ([member], [rival]) = (&only_in(set, other)[..], &only_in(other, set)[..]) else { continue };
-        let holds_it = search.descriptor(rival).is_some_and(|effect| effect.same_as.contains(member));
+        let holds_it = search
+            .descriptor(rival)
+            .is_some_and(|effect| effect.same_as.iter().any(|same| same.contains(member)));
         let as_simple = fit.values.len() <= best.values.len() && !holds_it;
         let near = by_data(other) - by_data(set) <= BARE_MENTION.ln();
         if near && as_simple && !is_term(member) && !is_term(rival) {

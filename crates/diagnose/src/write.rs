@@ -3,7 +3,6 @@
 use kort_identify::data::{Series, available};
 use kort_identify::fit::Fit;
 use kort_identify::heldout::held_out_rows;
-use kort_identify::hypothesis::Member;
 use kort_identify::scores::{self, HeldOut, parameters};
 use kort_identify::simulate::{Problem, Stack};
 use kort_identify::thin::Thin;
@@ -31,7 +30,7 @@ pub struct Writer<'a, 'p> {
     posterior: Posterior,
     best: Set,
     baseline: &'a Fit,
-    last: &'a Fit,
+    last: Fit,
     series: &'a [Series],
     rig: &'a Rig,
     options: &'a Options,
@@ -60,7 +59,8 @@ impl<'a, 'p> Writer<'a, 'p> {
     ) -> Self {
         let problem = search.problem;
         let best = posterior.told().map_or_else(Set::new, |e| e.set().clone());
-        let (baseline, last) = (&search.fits[&Set::new()], &search.fits[&best]);
+        let baseline = &search.fits[&Set::new()];
+        let last = left::at_its_best(problem, &search.fits[&best]);
         let held = held_out_rows(problem, &[&last.hypothesis]);
         let floor = scores::noise_floor(problem, &problem.residual(&last.hypothesis, &last.values));
         Self {
@@ -93,24 +93,6 @@ impl<'a, 'p> Writer<'a, 'p> {
         scores::held_out(self.problem, &self.held, before, after, &self.floor, self.options.seed)
     }
 
-    /// The fit of a set without one member: the one that was searched, or the set's own with the member taken
-    /// out and the rest fitted again.
-    fn without(&self, set: &Set, member: &str) -> Fit {
-        let rest: Set = set.iter().copied().filter(|id| *id != member).collect();
-        if let Some(fit) = self.search.fits.get(&rest) {
-            return fit.clone();
-        }
-        let from = &self.search.fits[set];
-        let members: Vec<Member> = self
-            .problem
-            .members(&from.hypothesis, &from.values)
-            .into_iter()
-            .filter(|m| m.effect.id != member)
-            .collect();
-        let (hypothesis, columns) = self.problem.recompose(from, &members);
-        self.problem.fit(&hypothesis, &columns, &self.last.floor, 2 * TRAINING)
-    }
-
     fn excess(&self, residual: &Stack) -> f64 {
         left::excess(self.problem, residual, &self.floor)
     }
@@ -124,21 +106,25 @@ impl<'a, 'p> Writer<'a, 'p> {
     pub fn write(self, mut notes: Vec<String>, thin: Option<Thin>) -> (Report, Traces) {
         let (problem, options) = (self.problem, self.options);
         let baseline_full = self.residual(self.baseline);
-        let last_full = self.residual(self.last);
-        let named_fit = self.search.fits.get(&self.names_only()).unwrap_or(self.last);
-        let named_full = self.residual(named_fit);
+        let last_full = self.residual(&self.last);
+        let named_full = match self.search.fits.get(&self.names_only()) {
+            Some(named) if self.names_only() != self.best => {
+                self.residual(&left::at_its_best(problem, named))
+            }
+            _ => last_full.clone(),
+        };
         let whole = (self.excess(&baseline_full) - self.excess(&last_full)).max(1e-300);
         let left = (self.excess(&named_full) - self.excess(&last_full)).max(0.0) / whole;
-        let rest = left::more_than_noise(problem, self.last, &last_full, &self.floor);
+        let rest = left::more_than_noise(problem, &self.last, &last_full, &self.floor);
         let idle = !self.names_only().is_empty() && !scores::predicts(problem, &last_full);
         let thin = thin.filter(|thin| thin.still || !idle).or(idle.then(Thin::unpredicted));
-        let actions = problem.actions(self.last);
-        let negligible = left::negligible(problem, self.last, &actions);
+        let actions = problem.actions(&self.last);
+        let negligible = left::negligible(problem, &self.last, &actions);
         let circumstances = Circumstances {
             negligible: negligible.iter().map(|n| n.0).collect(),
             thin: thin.clone(),
             unparted: crate::unparted::unparted(self.search, &self.best),
-            steady: left::steady(problem, self.last, &actions),
+            steady: left::steady(problem, &self.last, &actions),
             broke_down: false,
             left,
             more_than_noise: rest.is_some(),
@@ -146,7 +132,7 @@ impl<'a, 'p> Writer<'a, 'p> {
         let decision = decide(&self.posterior, &circumstances);
         let baseline_trained = self.trained(self.baseline);
         let last_trained =
-            if self.best.is_empty() { baseline_trained.clone() } else { self.trained(self.last) };
+            if self.best.is_empty() { baseline_trained.clone() } else { self.trained(&self.last) };
         let rows = problem.rows(&self.last.hypothesis, &self.last.values);
         let speed: Vec<Vec<f64>> =
             rows.iter().map(|rows| rows.iter().map(|s| s.true_speed_rad_s).collect()).collect();
@@ -157,12 +143,13 @@ impl<'a, 'p> Writer<'a, 'p> {
         let members = self.best.iter().copied().filter(stated);
         let empty_cost = self.search.cost(&Set::new());
         for member in members {
-            let smaller = self.without(&self.best, member);
+            let smaller =
+                left::at_its_best(problem, &self.search.fit_without(&self.best, member, 2 * TRAINING));
             let smaller_full = self.residual(&smaller);
             let smaller_trained = self.trained(&smaller);
             let mut located = locate(problem, &smaller_full, &last_full, &speed);
             if member == load_steps::LOAD_STEPS.id {
-                (located.regime, located.spans) = load_steps::regime(problem, self.last);
+                (located.regime, located.spans) = load_steps::regime(problem, &self.last);
             }
             let gain = (smaller.noise.misfit - self.last.noise.misfit).max(0.0);
             let share = ((self.excess(&smaller_full) - self.excess(&last_full)) / whole).clamp(0.0, 1.0);
@@ -184,7 +171,7 @@ impl<'a, 'p> Writer<'a, 'p> {
             for named in here {
                 let finding = if named.effect == member {
                     let heldout = self.score(&smaller_trained, &last_trained);
-                    self.finding(named, self.last, heldout, Some(&located))
+                    self.finding(named, &self.last, heldout, Some(&located))
                 } else {
                     // In the likeliest set that has it in the member's place, alone or beside another.
                     let rest = self.best.iter().filter(|id| **id != member);
@@ -195,8 +182,9 @@ impl<'a, 'p> Writer<'a, 'p> {
                     };
                     let swapped = self.posterior.sets.iter().find(stands_in);
                     let Some(fit) = swapped.and_then(|e| self.search.fits.get(e.set())) else { continue };
-                    let heldout = self.score(&smaller_trained, &self.trained(fit));
-                    self.finding(named, fit, heldout, None)
+                    let fit = left::at_its_best(problem, fit);
+                    let heldout = self.score(&smaller_trained, &self.trained(&fit));
+                    self.finding(named, &fit, heldout, None)
                 };
                 findings.push((share, finding));
             }
@@ -211,11 +199,11 @@ impl<'a, 'p> Writer<'a, 'p> {
         mismatch.sort_by(|a, b| b.0.total_cmp(&a.0));
         let findings: Vec<Finding> = findings.into_iter().map(|f| f.1).collect();
         let mismatch: Vec<Mismatch> = mismatch.into_iter().map(|m| m.1).collect();
-        let std_last = problem.standard_errors(self.last);
+        let std_last = problem.standard_errors(&self.last);
         let empirical_term = decision.term.map(|term| {
-            let smaller = self.without(&self.best, term);
+            let smaller = self.search.fit_without(&self.best, term, 2 * TRAINING);
             let heldout = self.score(&self.trained(&smaller), &last_trained);
-            words::empirical(problem, self.last, &std_last, term, heldout)
+            words::empirical(problem, &self.last, &std_last, term, heldout)
         });
         let remainder = match (decision.term, rest) {
             _ if decision.named.is_empty() => None,
@@ -297,7 +285,7 @@ impl<'a, 'p> Writer<'a, 'p> {
             residual.iter().map(|r| r.iter().map(|c| vec![0.0; c.len()]).collect()).collect();
         let located = locate(self.problem, residual, &nothing, speed);
         let offered = available(self.options.model, self.series, &self.problem.recordings);
-        let path = place::path(self.problem, self.last, self.rig, &offered);
+        let path = place::path(self.problem, &self.last, self.rig, &offered);
         Mismatch {
             path: path.map_or("sensor", Path::name).into(),
             channel: rest.channel.into(),

@@ -256,7 +256,8 @@ fn stated(rig: &Rig, parameter: P, values: &Parameters) -> Option<Quantity> {
 fn reach(stated: &Quantity, positive: bool) -> (f64, f64) {
     let reach = 2.0 * REACH * stated.sigma();
     let low = stated.value - reach;
-    (if positive { low.max(0.02 * stated.value) } else { low }, stated.value + reach)
+    // No friction gives energy away.
+    (low.max(if positive { 0.02 * stated.value } else { 0.0 }), stated.value + reach)
 }
 
 /// True when the rig gives no tolerance for any parameter: then coefficients are taken as

@@ -7,6 +7,7 @@ mod every_start;
 mod expand;
 mod forms;
 mod relatives;
+mod stand_in;
 #[cfg(test)]
 mod tests;
 mod two_at_once;
@@ -298,31 +299,6 @@ impl<'a, 'p> Search<'a, 'p> {
         }
     }
 
-    /// Fits what does the same as a member in its place: the data part them no further than their prior odds. The
-    /// best set.
-    fn stand_in(&mut self, set: &Set) -> Set {
-        let mut tried = Vec::new();
-        for member in set {
-            let same = self.descriptor(member).map_or(&[][..], |effect| effect.same_as);
-            let offered: Vec<_> = self.effects.iter().copied().filter(|e| same.contains(&e.id)).collect();
-            if same.is_empty() || offered.len() < same.len() || same.iter().any(|id| set.contains(id)) {
-                continue;
-            }
-            let mut place = without(set, member);
-            self.ensure(&place, set);
-            for effect in offered {
-                let Some(parent) = self.fits.get(&place).cloned() else { break };
-                let new = Member::new(effect, &self.problem.scale);
-                let hypothesis = parent.hypothesis.with(&parent.values, new, &self.problem.scale);
-                place = with(&place, effect.id);
-                self.fit_set(place.clone(), &hypothesis, &parent.columns);
-            }
-            self.reshape(&place);
-            tried.push(place);
-        }
-        self.better(set.clone(), tried)
-    }
-
     /// Leaves members out as long as that helps.
     fn backward(&mut self, set: Set) -> Set {
         let mut best = set;
@@ -367,6 +343,19 @@ impl<'a, 'p> Search<'a, 'p> {
         let members: Vec<Member> = all.into_iter().filter(|m| set.contains(&m.effect.id)).collect();
         let (hypothesis, columns) = self.problem.recompose(from, &members);
         self.fit_set(set.clone(), &hypothesis, &columns);
+    }
+
+    /// The fit of a set without one member: the one that was searched, or the set's own with the member taken out and the
+    /// rest fitted again.
+    pub fn fit_without(&self, set: &Set, member: &str, steps: usize) -> Fit {
+        if let Some(fit) = self.fits.get(&without(set, member)) {
+            return fit.clone();
+        }
+        let from = &self.fits[set];
+        let all = self.problem.members(&from.hypothesis, &from.values);
+        let members: Vec<Member> = all.into_iter().filter(|m| m.effect.id != member).collect();
+        let (hypothesis, columns) = self.problem.recompose(from, &members);
+        self.problem.fit(&hypothesis, &columns, &from.floor, steps)
     }
 
     fn keep(&mut self, set: Set, fit: Fit) {

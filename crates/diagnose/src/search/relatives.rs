@@ -13,7 +13,8 @@ type Starts = Vec<(Hypothesis, Columns)>;
 
 impl Search<'_, '_> {
     /// Fits, in the place of a member, what the catalogue says it is confused with and no screen led to, or not well: play,
-    /// friction or a limit at another size is another motion, of which one linear step says nothing, and an equation that
+    /// friction or a limit at another size is another motion, of which one linear step says nothing; what promises half of
+    /// what the member gains may give all of it; and an equation that
     /// holds a plainer one within itself finds a way on which the plainer one got lost. The best set.
     pub(super) fn relatives(&mut self, set: &Set) -> Set {
         let mut tried = Vec::new();
@@ -22,16 +23,23 @@ impl Search<'_, '_> {
             let Some(named) = self.descriptor(member) else { continue };
             let related =
                 |e: &Descriptor| named.confused_with.contains(&e.id) || e.confused_with.contains(member);
+            self.ensure(&rest, set);
+            let half = self.half_way(&rest, set);
+            let promising = |e: &Descriptor| {
+                let screened = self.screens.get(&rest).into_iter().flatten();
+                screened.into_iter().any(|s| s.effect.id == e.id && s.cost < half)
+            };
             let Some(probes) = self.probes.get(&self.equations(&rest)) else { continue };
             let others: Vec<&'static Descriptor> = self
                 .effects
                 .iter()
                 .zip(probes)
                 .filter(|(e, _)| related(e) && !rest.contains(&e.id))
-                .filter(|(e, probes)| bends(probes) || self.fits.contains_key(&with(&rest, e.id)))
+                .filter(|(e, probes)| {
+                    bends(probes) || promising(e) || self.fits.contains_key(&with(&rest, e.id))
+                })
                 .map(|(e, _)| *e)
                 .collect();
-            self.ensure(&rest, set);
             for effect in others {
                 let place = with(&rest, effect.id);
                 let mut starts: Vec<Starts> = Vec::new();
@@ -52,6 +60,12 @@ impl Search<'_, '_> {
             }
         }
         self.better(set.clone(), tried)
+    }
+
+    /// Half of what a set costs less than a smaller one.
+    fn half_way(&self, smaller: &Set, set: &Set) -> f64 {
+        let cost = |set: &Set| self.fits.get(set).map_or(f64::NAN, Fit::cost);
+        0.5 * (cost(smaller) + cost(set))
     }
 
     /// An effect at each of its starts on top of a set, beside the set's values and beside the stated ones, which it had

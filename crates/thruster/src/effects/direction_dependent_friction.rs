@@ -26,7 +26,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     commonness: 1.5,
     shifts_time: false,
     nonparametric: false,
-    same_as: &["coulomb_friction", "torque_channel_bias"],
+    same_as: &[&["coulomb_friction", "torque_channel_bias"], &["coulomb_friction", "viscous_friction"]],
     forms: &[&[0, 1], &[2, 3], &[0, 1, 2, 3]],
     parameters,
     starts: |scale| {

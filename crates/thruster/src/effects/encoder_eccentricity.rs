@@ -2,7 +2,8 @@
 
 use super::memory::EncoderAhead;
 use super::{
-    Available, Descriptor, Effect, Hooks, Path, Scale, Spec, angle_known, speed_measured, turns_round,
+    Available, Descriptor, Effect, Hooks, Path, Scale, Sensing, Spec, angle_known, speed_measured,
+    turns_round,
 };
 use crate::plant::{Sensed, Tick};
 use crate::real::Real;
@@ -93,6 +94,10 @@ const LEAST_SLOPE: f64 = 0.3;
 impl<T: Real> Effect<T> for Eccentricity<T> {
     fn hooks(&self) -> Hooks {
         Hooks::SENSE
+    }
+
+    fn sensing(&self) -> Sensing {
+        Sensing::Disc
     }
 
     fn sense(&mut self, tick: &Tick, sensed: &mut Sensed<T>) {

@@ -1,7 +1,7 @@
 //! A belt, a long shaft or a magnetic coupling between motor and load.
 
 use super::memory::EncoderAhead;
-use super::{Context, Descriptor, Effect, Hooks, Path, Scale, Spec, free_shaft};
+use super::{Context, Descriptor, Effect, Hooks, Path, Scale, Sensing, Spec, free_shaft};
 use crate::blade::{Inflow, REFERENCE_RADIUS};
 use crate::parameters::Parameter as P;
 use crate::plant::{Balance, Drive, Local, Sensed, Tick};
@@ -122,6 +122,10 @@ impl<T: Real> Effect<T> for Coupling<T> {
 
     fn hooks(&self) -> Hooks {
         Hooks { drive: true, inflow: true, balance: true, sense: true, ..Hooks::NONE }
+    }
+
+    fn sensing(&self) -> Sensing {
+        Sensing::Mounting
     }
 
     /// A coupling stiffer than a tick can follow lets the load move little by itself.

@@ -1,7 +1,7 @@
 //! Play between motor gear and propeller shaft.
 
 use super::memory::EncoderAhead;
-use super::{Context, Descriptor, Effect, Hooks, Path, Scale, Spec, geared};
+use super::{Context, Descriptor, Effect, Hooks, Path, Scale, Sensing, Spec, geared};
 use crate::blade::{Inflow, REFERENCE_RADIUS};
 use crate::parameters::Parameter as P;
 use crate::plant::{Balance, Drive, Local, Sensed, Tick};
@@ -164,6 +164,10 @@ impl<T: Real> Effect<T> for GearBacklash<T> {
 
     fn hooks(&self) -> Hooks {
         Hooks { drive: true, inflow: true, balance: true, sense: true, ..Hooks::NONE }
+    }
+
+    fn sensing(&self) -> Sensing {
+        Sensing::Mounting
     }
 
     /// The back-EMF is of the motor's own speed.

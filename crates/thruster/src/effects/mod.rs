@@ -42,6 +42,19 @@ impl Path {
     }
 }
 
+/// What lies between the shaft's motion and what is logged of it, in its order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Sensing {
+    /// Which part of the shaft the encoder turns with.
+    Mounting,
+    /// The encoder's own disc.
+    Disc,
+    /// Pulses without a direction.
+    Counting,
+    /// Filters, clocks and scales behind it, and all other instruments.
+    Reading,
+}
+
 /// What an effect does at the hooks of the plant. All default to nothing.
 ///
 /// `own` holds the effect's continuous states (as many as [`Effect::states`] says), integrated
@@ -64,6 +77,11 @@ pub trait Effect<T = f64>: Send {
     /// Smallest share of the shaft's inertia that its states let move by itself.
     fn lightest_share(&self) -> f64 {
         1.0
+    }
+    /// Where [`Effect::sense`] stands on the way from the shaft to the log: a sign that is lost there is lost of all that
+    /// the encoder turns with, whichever of two effects was named first.
+    fn sensing(&self) -> Sensing {
+        Sensing::Reading
     }
     /// Once, before the run: other equations or other values of their parameters.
     fn amend(&self, _model: &mut ModelName, _parameters: &mut Parameters<T>) {}
@@ -137,8 +155,9 @@ pub struct Descriptor {
     pub shifts_time: bool,
     /// It changes freely with time (knots), and so can stand in for almost anything.
     pub nonparametric: bool,
-    /// Effects that do together exactly what this one does, under any excitation: no recording parts them.
-    pub same_as: &'static [&'static str],
+    /// Sets of effects that do together exactly what this one does, under any excitation, at all of its sizes or where they
+    /// are alike: no recording parts them.
+    pub same_as: &'static [&'static [&'static str]],
     /// Which of its parameters make sense without the others, by their places; none listed: all together.
     /// Those left out of a form stay at their prior means. See [`Descriptor::forms`].
     pub forms: &'static [&'static [usize]],

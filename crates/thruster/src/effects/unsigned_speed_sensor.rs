@@ -1,6 +1,6 @@
 //! The speed sensor does not know the direction.
 
-use super::{Available, Descriptor, Effect, Hooks, Path, Scale, Spec, one_start, speed_measured};
+use super::{Available, Descriptor, Effect, Hooks, Path, Scale, Sensing, Spec, one_start, speed_measured};
 use crate::plant::{Sensed, Tick};
 use crate::real::Real;
 use crate::rig::Rig;
@@ -43,6 +43,10 @@ struct UnsignedSpeed<T> {
 impl<T: Real> Effect<T> for UnsignedSpeed<T> {
     fn hooks(&self) -> Hooks {
         Hooks::SENSE
+    }
+
+    fn sensing(&self) -> Sensing {
+        Sensing::Counting
     }
 
     fn sense(&mut self, _: &Tick, sensed: &mut Sensed<T>) {

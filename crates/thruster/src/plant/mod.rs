@@ -184,6 +184,8 @@ impl<T: Real> Plant<T> {
         let hooked = |used: fn(&crate::effects::Hooks) -> bool| -> Vec<usize> {
             (0..effects.len()).filter(|i| used(&effects[*i].effect.hooks())).collect()
         };
+        let mut sense_hooks = hooked(|h| h.sense);
+        sense_hooks.sort_by_key(|i| effects[*i].effect.sensing());
         let changes_between_ticks = |e: &Hooked<T>| {
             let h = e.effect.hooks();
             (h.drive || h.sense) && (h.inflow || h.foil || h.balance)
@@ -208,7 +210,7 @@ impl<T: Real> Plant<T> {
             inflow_hooks: hooked(|h| h.inflow),
             foil_hooks: hooked(|h| h.foil),
             balance_hooks: hooked(|h| h.balance),
-            sense_hooks: hooked(|h| h.sense),
+            sense_hooks,
             effects,
             used_states: next,
             constants: Constants::new(&parameters, rig),
