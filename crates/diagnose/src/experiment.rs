@@ -191,7 +191,9 @@ fn where_they_differ(search: &Search, rig: &Rig, best: &Set, other: &Set) -> Opt
         let b = respond(&scenario, rig, search, theirs)?;
         Some(Differs { difference: difference(&a, &b, &search.problem.scale), scenario, words })
     };
-    let most = SIGNALS.iter().filter_map(differ).max_by(|x, y| x.difference.total_cmp(&y.difference))?;
+    // The last one is of water that moves.
+    let signals = if rig.propeller.is_some() { &SIGNALS[..] } else { &SIGNALS[..SIGNALS.len() - 1] };
+    let most = signals.iter().filter_map(differ).max_by(|x, y| x.difference.total_cmp(&y.difference))?;
     Some(Differs { scenario: with_effects(most.scenario, search, mine), ..most })
 }
 

@@ -54,7 +54,8 @@ fn by_every_parameter_of_every_load() {
 fn by_every_value_of_every_effect() {
     for effect in effects::ALL {
         let model = if effect.id == "axial_flow_dynamics" { ModelName::Model0 } else { ModelName::Model2 };
-        let kind = if effect.id == "supply_sag" { AmplifierKind::Voltage } else { AmplifierKind::Current };
+        let of_voltage = ["supply_sag", "drive_freewheels"].contains(&effect.id);
+        let kind = if of_voltage { AmplifierKind::Voltage } else { AmplifierKind::Current };
         by_every_value(effect, model, kind);
     }
 }

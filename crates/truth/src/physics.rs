@@ -110,6 +110,8 @@ pub struct Drive {
     pub supply_ratio: f64,
     /// Factor on the torque of the motor.
     pub torque_gain: f64,
+    /// Factor on a current that the back-EMF drives against the voltage.
+    pub braking: f64,
 }
 
 /// The shaft at an instant.

@@ -169,6 +169,7 @@ impl Bench<'_> {
             voltage_limit_v: f64::INFINITY,
             supply_ratio: 1.0,
             torque_gain: 1.0,
+            braking: 1.0,
         };
         physics.iter().for_each(|each| each.drive(now, &mut drive));
         drive
@@ -181,7 +182,10 @@ impl Bench<'_> {
         let wanted = match machine.drive {
             DriveKind::Current => drive.target.clamp(-drive.current_limit_a, drive.current_limit_a),
             DriveKind::Voltage => {
-                let current = (drive.target * drive.supply_ratio - emf) / machine.winding_resistance_ohm;
+                let applied = drive.target * drive.supply_ratio;
+                let driven = (applied - emf) / machine.winding_resistance_ohm;
+                // Against the voltage that is on, or at none, current is the back-EMF's own.
+                let current = if driven * applied > 0.0 { driven } else { driven * drive.braking };
                 current.clamp(-drive.current_limit_a, drive.current_limit_a)
             }
         };

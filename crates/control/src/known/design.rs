@@ -252,6 +252,7 @@ fn empty() -> Drive {
         supply_v: f64::INFINITY,
         resistance_ohm: 0.0,
         back_emf_v: 0.0,
+        freewheels: 0.0,
         shaft_speed_rad_s: 0.0,
         current_a: 0.0,
         voltage_limited: false,

@@ -91,6 +91,7 @@ impl DriveChain {
             supply_v: self.supply_v(at),
             resistance_ohm: self.resistance_ohm,
             back_emf_v: self.torque_constant_nm_a * at.shaft_speed_rad_s,
+            freewheels: 0.0,
             shaft_speed_rad_s: at.shaft_speed_rad_s,
             current_a: at.current_a,
             voltage_limited: false,

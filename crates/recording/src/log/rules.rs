@@ -100,6 +100,9 @@ pub(super) const DRIVE: &[&str] = &[
     "bat",
 ];
 
+/// What "current" before it says is the one now, and no amperes.
+const NOW: &[&str] = &["position", "angle", "velocity", "speed", "torque", "force", "temperature"];
+
 /// Commands: the words of the measured value, and one of [`ASKED`].
 pub(super) const COMMANDS: &[(&str, &str)] = &[
     ("shaft_speed_rad_s", "speed_cmd_rad_s"),
@@ -131,6 +134,11 @@ const TELLING: &[(&str, &[&str])] = &[
 
 pub(super) fn has(names: &[String], list: &[&str]) -> bool {
     list.iter().any(|phrase| says(names, phrase))
+}
+
+/// Whether a name tells of the present value of something else.
+fn is_of_now(names: &[String]) -> bool {
+    names.windows(2).any(|two| two[0] == "current" && NOW.contains(&two[1].as_str()))
 }
 
 /// A pulse of milliseconds for a speed controller.
@@ -189,6 +197,9 @@ pub(super) fn fit(rule: &Rule, topic: &Topic, field: &Field, table: bool) -> Opt
     }
     let names = words(&field.name);
     let beside = words(&topic.name);
+    if matches!(rule.column, "current_a" | "supply_current_a") && is_of_now(&names) {
+        return None;
+    }
     if has(&names, rule.without) || rule.column == "current_a" && has(&beside, SUPPLY) {
         return None;
     }

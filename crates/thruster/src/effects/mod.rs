@@ -258,6 +258,7 @@ catalogue! {
     thermal_drift_kt,
     voltage_limit_backemf,
     supply_sag,
+    drive_freewheels,
     torque_ripple_cogging,
     command_dead_band,
     command_curve,

@@ -1,7 +1,6 @@
 //! Friction in proportion to shaft speed: oil, seals, sheared water.
 
 use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, free_shaft, one_start};
-use crate::parameters::Parameter as P;
 use crate::plant::{Balance, Local};
 use crate::real::Real;
 
@@ -24,16 +23,13 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: one_start,
     needs: free_shaft,
-    build: both!(|values, context| {
-        let least = -context.parameters.get(P::ViscousFrictionNmS);
-        Box::new(ViscousFriction { viscous_nm_s: values[0].max(least) })
-    }),
+    build: both!(|values, _| Box::new(ViscousFriction { viscous_nm_s: values[0] })),
 };
 
-/// A negative value says that less friction acts than the rig states; none gives energy away.
+/// Of what the rig states less may act within its tolerance; friction that gives energy away there is none.
 fn parameters(scale: &Scale) -> Vec<Spec> {
     let full = scale.torque_n_m / scale.shaft_speed_rad_s;
-    vec![Spec::strength("viscous_friction_nm_s", "N m s", 0.02 * full, -0.2 * full, full).sigma(0.1 * full)]
+    vec![Spec::strength("viscous_friction_nm_s", "N m s", 0.02 * full, 0.0, full).sigma(0.1 * full)]
 }
 
 struct ViscousFriction<T> {

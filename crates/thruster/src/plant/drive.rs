@@ -75,6 +75,7 @@ impl<T: Real> Plant<T> {
             supply_v: T::from(tick.supply_v.unwrap_or(self.nominal_supply_v)),
             resistance_ohm: self.constants.resistance_ohm,
             back_emf_v: self.constants.torque_constant_nm_a * self.x[SPEED],
+            freewheels: T::ZERO,
             shaft_speed_rad_s: self.x[SPEED],
             current_a: self.current_a,
             voltage_limited: false,
@@ -224,7 +225,7 @@ impl<T: Real> Plant<T> {
         let target = match self.amplifier {
             AmplifierKind::Current => drive.command,
             // (10)-(12) with the inductance neglected; the lag then stands for L/R and the stage.
-            AmplifierKind::Voltage => (drive.command - back_emf_v) / r,
+            AmplifierKind::Voltage => (drive.command - felt_emf_v(drive, back_emf_v)) / r,
             // Told above.
             AmplifierKind::Speed => T::ZERO,
         };
@@ -252,4 +253,15 @@ impl<T: Real> Plant<T> {
         };
         target + (self.current_a - target) * left
     }
+}
+
+/// Back-EMF that a voltage drive's current feels, V: through diodes it drives none against the command's own voltage.
+#[inline(always)]
+fn felt_emf_v<T: Real>(drive: &Drive<T>, back_emf_v: T) -> T {
+    let brakes = drive.freewheels == T::ZERO && drive.freewheels.same_slopes(T::ZERO);
+    if brakes {
+        return back_emf_v;
+    }
+    let most = drive.command.abs();
+    back_emf_v + (back_emf_v.clamp(-most, most) - back_emf_v) * drive.freewheels
 }

@@ -104,6 +104,8 @@ pub struct Drive<T = f64> {
     pub resistance_ohm: T,
     /// Back-EMF at the start of the tick, V.
     pub back_emf_v: T,
+    /// Share of a braking current that a voltage drive does not let flow.
+    pub freewheels: T,
     /// Shaft speed at the start of the tick, rad/s.
     pub shaft_speed_rad_s: T,
     /// Motor current at the start of the tick, A.

@@ -63,3 +63,22 @@ fn the_supply_is_there_before_the_first_tick() {
         assert!(seen.shaft_speed_rad_s.is_finite() && seen.current_a > 0.0, "{seen:?}");
     }
 }
+
+/// A step down and a release are answered by friction alone, a step up and a reversal as by any drive.
+#[test]
+fn a_drive_that_freewheels_drives_and_does_not_brake() {
+    let after = |share: f64, from_rad_s: f64, command: f64| {
+        let effects: &[(&str, &[f64])] = &[("drive_freewheels", &[share])];
+        let mut plant = plant(&voltage(0.0), effects, 0.002);
+        plant.start(0.0, from_rad_s, 0.0, 0.0, 0.0);
+        speed_after(&mut plant, 100, Tick { command, ..Tick::default() })
+    };
+    let brakes = 10.0 * (-0.2_f64 / 0.05).exp();
+    assert!((after(0.0, 10.0, 0.0) - brakes).abs() < 1e-3);
+    assert_eq!(after(1.0, 10.0, 0.0), 10.0, "released");
+    assert_eq!(after(1.0, 10.0, 4.0), 10.0, "stepped down");
+    assert_eq!(after(1.0, 2.0, 8.0), after(0.0, 2.0, 8.0), "stepped up");
+    assert!(after(1.0, 10.0, -4.0) < 8.0, "reversed");
+    let half = after(0.5, 10.0, 0.0);
+    assert!(brakes < half && half < 10.0, "{half}");
+}

@@ -28,6 +28,7 @@ families!(
     cross_flow,
     current_saturation,
     direction_dependent_friction,
+    drive_freewheels,
     duct_loss,
     encoder_eccentricity,
     encoder_filter_lag,
@@ -131,6 +132,10 @@ fn belt(machine: &Machine) -> bool {
 
 fn current_driven(machine: &Machine) -> bool {
     machine.drive == DriveKind::Current
+}
+
+fn voltage_driven(machine: &Machine) -> bool {
+    machine.drive == DriveKind::Voltage
 }
 
 fn encoder(machine: &Machine) -> bool {
