@@ -30,7 +30,8 @@ fn a_current_along_the_q_axis_is_told_from_what_was_asked_of_it() {
 
 #[test]
 fn the_current_position_is_no_current() {
-    let found = surveyed("Time,TargetPosition,CurrentPosition,Velocity,Current\n0,1,0,0,0.1\n0.1,2,1,0.5,0.2\n");
+    let found =
+        surveyed("Time,TargetPosition,CurrentPosition,Velocity,Current\n0,1,0,0,0.1\n0.1,2,1,0.5,0.2\n");
     let map = map_of(&found);
     assert!(lines(map, "current_a").unwrap().starts_with("\"Current\""), "{map}");
     assert!(lines(map, "shaft_angle_rad").unwrap().starts_with("\"CurrentPosition\""), "{map}");
