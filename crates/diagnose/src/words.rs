@@ -9,6 +9,7 @@ use kort_identify::simulate::{Problem, Stack};
 use kort_thruster::effects::{Descriptor, speaks_of_a_gear};
 use kort_thruster::rig::Rig;
 
+use crate::choices::choices;
 use crate::flexible;
 use crate::locate;
 use crate::report::{
@@ -253,6 +254,8 @@ pub fn summary(told: &Told) -> String {
         Verdict::Ambiguous => {
             let doubtful: Vec<&Finding> =
                 told.findings.iter().filter(|f| !f.confounded_with.is_empty()).collect();
+            let places: Vec<_> =
+                doubtful.iter().map(|f| (f.effect.as_str(), f.confounded_with.as_slice())).collect();
             let sure: Vec<Finding> =
                 told.findings.iter().filter(|f| f.confounded_with.is_empty()).cloned().collect();
             let beside = if sure.is_empty() {
@@ -263,7 +266,7 @@ pub fn summary(told: &Told) -> String {
             format!(
                 "{model} leaves something out{}, and this excitation cannot tell which of these it is: {}.{beside}",
                 one_path(&doubtful),
-                doubtful.iter().map(|f| plain(&f.effect)).collect::<Vec<_>>().join(" or "),
+                choices(&places).join("; and which of these: "),
             )
         }
         Verdict::Unexplained => {
@@ -365,7 +368,7 @@ fn shows(told: &Told) -> String {
     )
 }
 
-fn plain(id: &str) -> String {
+pub(crate) fn plain(id: &str) -> String {
     id.replace('_', " ")
 }
 

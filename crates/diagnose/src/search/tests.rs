@@ -13,6 +13,7 @@ use kort_thruster::rig::Rig;
 
 use super::{ITERATIONS, Search, Set};
 use crate::constants::Constants;
+use crate::left::at_its_best;
 use crate::probe::Promise;
 use crate::screen;
 
@@ -78,6 +79,31 @@ fn two_that_pay_together_are_found_without_either_alone() {
         let members = search.problem.members(&fit.hypothesis, &fit.values);
         let friction = members.iter().find(|m| m.effect.id == "coulomb_friction").unwrap().values[0];
         assert!((friction / FRICTION_N_M - 1.0).abs() < 0.25, "{friction} N m");
+    });
+}
+
+#[test]
+fn what_is_told_goes_as_far_as_it_can_and_is_held_to_what_it_was() {
+    with_search(vec![&coulomb_friction::DESCRIPTOR, &encoder_filter_lag::DESCRIPTOR], |search| {
+        let nothing = Set::new();
+        search.expand(&nothing, f64::NEG_INFINITY);
+        let both = search.two_at_once(&nothing);
+        let (problem, baseline) = (search.problem, &search.fits[&nothing]);
+        let bands = &problem.spectrum.bands;
+        let floor =
+            problem.floor.explaining(bands, &problem.spectrum.powers(&baseline.lines), &problem.criterion);
+        let mut off = search.fits[&both].resume();
+        let friction = off.free.iter().position(|free| free.name == "coulomb_torque_n_m").unwrap();
+        off.start[friction] *= 1.3;
+        let excused = problem.finish(problem.fit(&off, &Vec::new(), &floor, 0));
+        let told = at_its_best(problem, &excused);
+        assert!(told.lines.norm() < 0.7 * excused.lines.norm(), "{}", told.lines.norm());
+        assert_eq!(told.floor, excused.floor);
+        assert_eq!(
+            at_its_best(problem, baseline).values,
+            baseline.values,
+            "a baseline stays as it was searched"
+        );
     });
 }
 
