@@ -26,6 +26,9 @@ const RANDOM_LEVELS: Signal = (
     include_str!("../../../config/scenarios/identification-random-levels.toml"),
     "random steps both ways, logged with the fastest rate there is",
 );
+/// Only where there is water.
+const TOW: Signal =
+    (include_str!("../../../config/scenarios/tow.toml"), "steps while towed ahead and astern");
 /// Test signals to choose from.
 const SIGNALS: [Signal; 5] = [
     (
@@ -35,7 +38,7 @@ const SIGNALS: [Signal; 5] = [
     STAIRCASE,
     (include_str!("../../../config/scenarios/chirp.toml"), "a chirp of 0.05 to 5 Hz about a mean"),
     RANDOM_LEVELS,
-    (include_str!("../../../config/scenarios/tow.toml"), "steps while towed ahead and astern"),
+    TOW,
 ];
 
 /// What a recording leaves open beside its names.
@@ -191,9 +194,8 @@ fn where_they_differ(search: &Search, rig: &Rig, best: &Set, other: &Set) -> Opt
         let b = respond(&scenario, rig, search, theirs)?;
         Some(Differs { difference: difference(&a, &b, &search.problem.scale), scenario, words })
     };
-    // The last one is of water that moves.
-    let signals = if rig.propeller.is_some() { &SIGNALS[..] } else { &SIGNALS[..SIGNALS.len() - 1] };
-    let most = signals.iter().filter_map(differ).max_by(|x, y| x.difference.total_cmp(&y.difference))?;
+    let signals = SIGNALS.iter().filter(|signal| rig.propeller.is_some() || **signal != TOW);
+    let most = signals.filter_map(differ).max_by(|x, y| x.difference.total_cmp(&y.difference))?;
     Some(Differs { scenario: with_effects(most.scenario, search, mine), ..most })
 }
 

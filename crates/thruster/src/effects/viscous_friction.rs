@@ -26,7 +26,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     build: both!(|values, _| Box::new(ViscousFriction { viscous_nm_s: values[0] })),
 };
 
-/// Of what the rig states less may act within its tolerance; friction that gives energy away there is none.
+/// Never negative: friction gives no energy away. Less than the rig states is told by its own number, within its tolerance.
 fn parameters(scale: &Scale) -> Vec<Spec> {
     let full = scale.torque_n_m / scale.shaft_speed_rad_s;
     vec![Spec::strength("viscous_friction_nm_s", "N m s", 0.02 * full, 0.0, full).sigma(0.1 * full)]
