@@ -242,8 +242,8 @@ pub fn summary(told: &Told) -> String {
                     None => ("They", "that has no name here".into()),
                 };
                 text.push_str(&format!(
-                    " {who} leave {:.0} % of the error above the noise, on the {} path, most in {}, {}: {what}.",
-                    100.0 * left.share_of_excess_error,
+                    " {who} leave {} of the error above the noise, on the {} path, most in {}, {}: {what}.",
+                    percent(left.share_of_excess_error),
                     left.path,
                     left.channel,
                     left.regime
@@ -312,6 +312,11 @@ pub fn summary(told: &Told) -> String {
 
 /// An error so many times the sensor's noise is more than that noise.
 const ABOVE_NOISE: f64 = 2.0;
+
+/// A share as per cent; what is there is not nothing.
+fn percent(share: f64) -> String {
+    if (0.0..0.005).contains(&share) { "less than 1 %".into() } else { format!("{:.0} %", 100.0 * share) }
+}
 
 /// What a baseline leaves beyond the noise from sample to sample, in the channel where that is most; none where it is
 /// about the noise.

@@ -123,6 +123,7 @@ impl<'a> Setup<'a> {
                     .into(),
             );
         }
+        notes.extend(recordings.iter().flat_map(Prepared::held_samples));
         if nothing_stated(rig) {
             notes.push(format!(
                 "the rig description states no tolerance: coefficients are taken as uncertain by {:.0} % (two sigma)",

@@ -105,7 +105,11 @@ impl Spectrum {
                 let quantisation = (quantum(&channel.values) / channel.full_scale).powi(2) / 12.0;
                 let row_s = median_interval(&recording.time_s);
                 // Of a delay anywhere in a row the mean is a free number; what differs from sample to sample is not.
-                let stale_s = if is_slow(interval_s, row_s) { row_s / 12.0_f64.sqrt() } else { 0.0 };
+                let stale_s = match channel.held_s {
+                    Some(held_s) => held_s / 12.0_f64.sqrt(),
+                    None if is_slow(interval_s, row_s) => row_s / 12.0_f64.sqrt(),
+                    None => 0.0,
+                };
                 let ranges = band_ranges(n);
                 for (i, range) in ranges.iter().enumerate() {
                     let power: f64 = signal[range.clone()].iter().map(|v| v * v).sum();

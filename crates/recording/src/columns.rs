@@ -16,7 +16,8 @@ pub struct Known {
 }
 
 /// The one column that is no signal.
-const TIME: Known = Known { name: "time_s", unit: "s", meaning: "Log instant, strictly increasing." };
+pub(crate) const TIME: Known =
+    Known { name: "time_s", unit: "s", meaning: "Log instant, strictly increasing." };
 
 /// Every known column: the time, then the one table of signals, in its order.
 pub fn known() -> impl Iterator<Item = Known> {

@@ -243,7 +243,7 @@ impl Prepared {
                 r.name() != driving.column() && !(driving == Driving::Speed && *r == Response::Current)
             })
             .filter(|r| shown(rig, driving, *r))
-            .filter_map(|r| Channel::new(series, r))
+            .filter_map(|r| Channel::new(series, rig, r))
             .collect();
         if !channels.iter().any(|c| c.response != Response::Current) {
             if let Some((column, kind)) = driving::other_drive(series, rig) {

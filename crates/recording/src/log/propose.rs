@@ -31,9 +31,13 @@ pub(super) fn propose(log: &Log) -> (Proposal, Chosen) {
     (proposal, if native { Chosen::new() } else { chosen })
 }
 
+/// Rows that kort reads as they are: stamped in its way, without a name that lacks its unit, and with something beside the
+/// stamps that it knows.
 fn is_native(topic: &Topic) -> bool {
-    let mut names = topic.fields.iter().map(|f| f.name.as_str());
-    names.clone().any(|n| n == "time_s") && names.all(|n| columns::unit_missing(n).is_none())
+    let names = || topic.fields.iter().map(|f| f.name.as_str());
+    names().any(|n| n == columns::TIME.name)
+        && names().all(|n| columns::unit_missing(n).is_none())
+        && names().any(|n| n != columns::TIME.name && columns::find(n).is_some())
 }
 
 fn choose(log: &Log, table: bool) -> Chosen {

@@ -12,7 +12,13 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     equation: "y = g T + b + h sat(play(T)); g [1], b, h [N]",
     signature: "thrust alone is off, in proportion (gain), by a constant also at rest (bias), or by a loop between rising \
                 and falling load (hysteresis); shaft speed and flow fit",
-    confused_with: &["forward_reverse_asymmetry", "ambient_axial_flow", "duct_loss", "water_density"],
+    confused_with: &[
+        "forward_reverse_asymmetry",
+        "ambient_axial_flow",
+        "duct_loss",
+        "water_density",
+        "thrust_deduction_interaction",
+    ],
     separated_by: "known static loads; the zero before and after the run",
     reference: "Doebelin, Measurement Systems; a play operator for the loop",
     commonness: 3.0,

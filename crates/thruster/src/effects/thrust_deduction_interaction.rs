@@ -1,6 +1,6 @@
 //! A hull or a neighbouring thruster takes part.
 
-use super::{Available, Descriptor, Effect, Hooks, Path, Scale, Spec, one_start, wet};
+use super::{Available, Descriptor, Effect, Hooks, Path, Scale, Spec, one_start, thrust_measured, wet};
 use crate::plant::{Balance, Drive, Local, Tick};
 use crate::real::Real;
 use crate::rig::Rig;
@@ -11,16 +11,17 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     path: Path::Flow,
     what: "the jet of a neighbouring thruster feeds or starves this one, and suction on the hull takes some of the thrust",
     equation: "va += C n; y = T (1 - t); n a neighbour's recorded signal over its standard deviation, 0 where it is at rest [1], C [m/s], t [1]",
-    signature: "thrust and flow follow another thruster's command; thrust is low in proportion",
+    signature: "thrust and flow follow another thruster's command; thrust is low in proportion, which a force sensor's gain \
+                looks just like",
     confused_with: &[
         "ambient_axial_flow",
         "ambient_flow_unsteady",
         "thrust_bias_gain_hysteresis",
         "duct_loss",
     ],
-    separated_by: "the thrusters run one by one, then together",
+    separated_by: "the thrusters run one by one, then together; known static loads, which a hull takes nothing of",
     reference: "Carlton, Marine Propellers and Propulsion (thrust deduction, interaction)",
-    commonness: 0.5,
+    commonness: 1.0,
     shifts_time: false,
     nonparametric: false,
     same_as: &[],
@@ -45,7 +46,12 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
 
 fn needs(rig: &Rig, available: &Available) -> Result<(), &'static str> {
     wet(rig, available)?;
-    if available.has(super::EXTRA) { Ok(()) } else { Err("no signal of a neighbouring thruster is recorded") }
+    // What a hull takes shows in the thrust, no neighbour needed.
+    if available.has(super::EXTRA) || thrust_measured(rig, available).is_ok() {
+        Ok(())
+    } else {
+        Err("neither the thrust nor a signal of a neighbouring thruster is recorded")
+    }
 }
 
 struct Interaction<T> {

@@ -77,7 +77,7 @@ impl<T: Real> Plant<T> {
         let drive = self.drive_over(tick, command);
         let mut balance = Balance::default();
         let mut x: [T; N] = each(|i| self.x[i]);
-        if N == OWN && stiff.steps > 1 {
+        if N == OWN {
             let whole = self.push(tick, &drive, &x, 1.0, stiff, &mut balance);
             if whole.moves_less(CALM, self.tick_s, stiff) {
                 let kept = self.slopes.take().filter(|kept| kept.hold_at(&self.x, stiff));
