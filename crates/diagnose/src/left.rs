@@ -37,6 +37,8 @@ pub struct Rest {
     pub size: f64,
     /// Over what may be.
     pub ratio: f64,
+    /// Whether every other channel, and there is one, fits.
+    pub alone: bool,
 }
 
 /// What a fit leaves that is no noise: either it follows what the machine does by more than our equations may err, or
@@ -53,6 +55,7 @@ pub fn more_than_noise(problem: &Problem, fit: &Fit, residual: &Stack, floor: &N
                 channel: channel.response.name(),
                 size: size / channel.full_scale,
                 ratio: size / may.max(1e-300),
+                alone: false,
             };
             all.push(rest(following[r][c], may_err[r][c].sqrt()));
             let noise = floor.get(channel.response.name()).copied().unwrap_or(0.0);
@@ -62,7 +65,9 @@ pub fn more_than_noise(problem: &Problem, fit: &Fit, residual: &Stack, floor: &N
             all.push(rest(beyond, sensor.hypot(doubt[r][c].sqrt())));
         }
     }
-    all.into_iter().filter(|rest| rest.ratio > 1.0).max_by(|a, b| a.ratio.total_cmp(&b.ratio))
+    let most = *all.iter().filter(|rest| rest.ratio > 1.0).max_by(|a, b| a.ratio.total_cmp(&b.ratio))?;
+    let mut others = all.iter().filter(|rest| rest.channel != most.channel).peekable();
+    Some(Rest { alone: others.peek().is_some() && others.all(|rest| rest.ratio <= 1.0), ..most })
 }
 
 /// Whether a fit leaves more than noise.

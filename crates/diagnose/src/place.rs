@@ -117,8 +117,9 @@ place!(FLOW, Flow, Sensor, flow_measured, |s| course(s, "m/s", s.flow_m_s));
 const PLACES: &[&Descriptor] =
     &[&COMMAND, &MOTOR_TORQUE, &SHAFT_TORQUE, &BLADE, &AMBIENT_FLOW, &THRUST, &TORQUE, &SPEED, &FLOW];
 
-/// The path on which a cause that is free in time leaves least of what a fit leaves, all its numbers paid.
-pub fn path(problem: &Problem, fit: &Fit, rig: &Rig, offered: &Available) -> Option<Path> {
+/// The path on which a cause that is free in time leaves least of what a fit leaves, all its numbers paid. Where none earns
+/// its numbers and one channel is off `alone`, what that channel shows is its sensor's: a cause elsewhere would move others too.
+pub fn path(problem: &Problem, fit: &Fit, rig: &Rig, offered: &Available, alone: bool) -> Option<Path> {
     let known = problem.about(&fit.lines, &fit.columns, &fit.hypothesis);
     let free = PLACES.par_iter().filter(|place| (place.needs)(rig, offered).is_ok());
     let tried = free.filter_map(|place| {
@@ -126,7 +127,8 @@ pub fn path(problem: &Problem, fit: &Fit, rig: &Rig, offered: &Available) -> Opt
         let best = promises(problem, fit, known.curvature(), &probes).into_iter().next()?;
         Some((best.cost, place.path))
     });
-    tried.min_by(|a, b| a.0.total_cmp(&b.0)).map(|best| best.1)
+    let (cost, path) = tried.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some(if alone && cost >= fit.cost() { Path::Sensor } else { path })
 }
 
 #[cfg(test)]
@@ -140,7 +142,7 @@ mod tests {
     use crate::constants::Constants;
 
     /// The path found for a cause at a place that comes and goes in a few seconds.
-    fn found(place: &'static Descriptor, size: f64) -> Option<Path> {
+    fn found(place: &'static Descriptor, size: f64, alone: bool) -> Option<Path> {
         let rig =
             Rig::from_toml(include_str!("../../../config/thrusters/whitcomb-yoerger-1999.toml")).unwrap();
         let rows = 3000;
@@ -176,13 +178,19 @@ mod tests {
         let series = [series];
         let setup = Setup::new(&series, &rig, ModelName::Model2, criterion).unwrap();
         let fit = setup.problem.settle_from_stated(&setup.baseline, 5);
-        path(&setup.problem, &fit, &rig, &available(ModelName::Model2, &series, &setup.problem.recordings))
+        let offered = available(ModelName::Model2, &series, &setup.problem.recordings);
+        path(&setup.problem, &fit, &rig, &offered, alone)
     }
 
     #[test]
     fn a_cause_that_is_free_in_time_is_found_on_its_path() {
-        assert_eq!(found(&SHAFT_TORQUE, 0.6), Some(Path::Shaft));
-        assert_eq!(found(&AMBIENT_FLOW, 0.15), Some(Path::Flow));
-        assert_eq!(found(&BLADE, 0.3), Some(Path::Blade));
+        assert_eq!(found(&SHAFT_TORQUE, 0.6, false), Some(Path::Shaft));
+        assert_eq!(found(&AMBIENT_FLOW, 0.15, false), Some(Path::Flow));
+        assert_eq!(found(&BLADE, 0.3, true), Some(Path::Blade));
+    }
+
+    #[test]
+    fn what_one_channel_shows_and_no_cause_follows_is_its_sensor_s() {
+        assert_eq!(found(&SPEED, 0.0, true), Some(Path::Sensor));
     }
 }

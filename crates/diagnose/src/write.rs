@@ -285,7 +285,7 @@ impl<'a, 'p> Writer<'a, 'p> {
             residual.iter().map(|r| r.iter().map(|c| vec![0.0; c.len()]).collect()).collect();
         let located = locate(self.problem, residual, &nothing, speed);
         let offered = available(self.options.model, self.series, &self.problem.recordings);
-        let path = place::path(self.problem, &self.last, self.rig, &offered);
+        let path = place::path(self.problem, &self.last, self.rig, &offered, rest.alone);
         Mismatch {
             path: path.map_or("sensor", Path::name).into(),
             channel: rest.channel.into(),

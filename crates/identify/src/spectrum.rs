@@ -46,13 +46,22 @@ struct Frame {
     /// Samples in use.
     picks: Vec<usize>,
     full_scale: f64,
-    /// Another channel of the recording that is taken off first, where both show the same signal: what they
-    /// share must not count twice. It is taken off the noisier one, which else would hide it in both.
-    less: Option<usize>,
+    /// What else shows the same motion.
+    twice: Option<Twice>,
     transform: Arc<dyn TransformType2And3<f64>>,
     lines: Range<usize>,
     /// Samples at rest; their mean is a line of its own, after the others.
     rest: Vec<usize>,
+}
+
+/// Speed and angle show one motion, which must not count twice: the lines of the speed are those of the less noisy of the
+/// two, the lines of the angle's rate are its difference to the speed, which shows what the sensors do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Twice {
+    /// Of a speed: the angle's place among the channels, and how many of the lowest lines are its rate's.
+    Speed { angle: usize, lines: usize },
+    /// Of an angle: the speed's place.
+    Angle { speed: usize },
 }
 
 /// All channels of all recordings.
@@ -77,20 +86,11 @@ impl Spectrum {
                 let picks: Vec<usize> =
                     (0..channel.rows.len()).filter(|k| !masked[channel.rows[*k]]).collect();
                 let n = picks.len();
-                let scatter = |channel: &Channel| scatter(&channel.values, &picks);
-                let shown_twice = recording.channels.iter().position(|other| {
-                    other.rows == channel.rows
-                        && match [channel.response, other.response] {
-                            [Response::ShaftSpeed, Response::ShaftAngle] => {
-                                scatter(channel) >= scatter(other)
-                            }
-                            [Response::ShaftAngle, Response::ShaftSpeed] => scatter(channel) > scatter(other),
-                            _ => false,
-                        }
-                });
+                let ranges = band_ranges(n);
+                let twice = shown_twice(recording, channel, &picks, &ranges);
                 let frame = Frame {
                     full_scale: channel.full_scale,
-                    less: shown_twice,
+                    twice,
                     transform: planner.plan_dct2(n.max(1)),
                     lines: lines..lines + n,
                     rest: recording.at_rest(channel, masked),
@@ -100,9 +100,11 @@ impl Spectrum {
                     frame.picks.iter().map(|k| recording.time_s[channel.rows[*k]]).collect();
                 let interval_s = median_interval(&times);
                 let mut signal = vec![0.0; n];
-                let less = frame.less.map(|c| recording.channels[c].values.as_slice());
-                frame.transform(&channel.values, less, &mut signal);
-                let quantisation = (quantum(&channel.values) / channel.full_scale).powi(2) / 12.0;
+                let samples = |c: usize| recording.channels[c].values.as_slice();
+                frame.transform(&channel.values, samples, &mut signal);
+                let quantised =
+                    |channel: &Channel| (quantum(&channel.values) / frame.full_scale).powi(2) / 12.0;
+                let quantisation = quantised(channel);
                 let row_s = median_interval(&recording.time_s);
                 // Of a delay anywhere in a row the mean is a free number; what differs from sample to sample is not.
                 let stale_s = match channel.held_s {
@@ -110,7 +112,6 @@ impl Spectrum {
                     None if is_slow(interval_s, row_s) => row_s / 12.0_f64.sqrt(),
                     None => 0.0,
                 };
-                let ranges = band_ranges(n);
                 for (i, range) in ranges.iter().enumerate() {
                     let power: f64 = signal[range.clone()].iter().map(|v| v * v).sum();
                     // The constant counts as half of the lowest frequency.
@@ -121,7 +122,13 @@ impl Spectrum {
                         hz,
                         alike: range.len(),
                         signal: power / range.len() as f64,
-                        quantisation: quantisation * differenced(channel.response, hz * interval_s, n),
+                        quantisation: match frame.twice {
+                            Some(Twice::Speed { angle, lines }) if range.start < lines => {
+                                let counts = quantised(&recording.channels[angle]);
+                                counts * differenced(Response::ShaftAngle, hz * interval_s, n)
+                            }
+                            _ => quantisation * differenced(channel.response, hz * interval_s, n),
+                        },
                         row_s,
                         stale_s,
                         continues: i + 1 < ranges.len(),
@@ -159,8 +166,8 @@ impl Spectrum {
         let mut out = DVector::zeros(self.lines);
         for (frames, channels) in self.frames.iter().zip(stack) {
             for (frame, samples) in frames.iter().zip(channels) {
-                let less = frame.less.map(|c| channels[c].as_slice());
-                frame.transform(samples, less, &mut out.as_mut_slice()[frame.lines.clone()]);
+                let own = &mut out.as_mut_slice()[frame.lines.clone()];
+                frame.transform(samples, |c| channels[c].as_slice(), own);
                 if !frame.rest.is_empty() {
                     let sum: f64 = frame.rest.iter().map(|k| samples[*k]).sum();
                     out[frame.lines.end] = sum / frame.rest.len() as f64 / frame.full_scale;
@@ -182,23 +189,61 @@ impl Spectrum {
     /// Mean of a variance by band over the lines of each channel of each recording, in its unit squared. What a
     /// channel shares with another counts with it.
     pub fn variances(&self, by_band: &[f64]) -> Vec<Vec<f64>> {
-        let mean = |frame: &Frame| {
-            let bands = self.bands.iter().zip(by_band).filter(|(b, _)| frame.lines.contains(&b.lines.start));
+        let over = |frame: &Frame, lines: Range<usize>| {
+            let lines = frame.lines.start + lines.start..frame.lines.start + lines.end;
+            let bands = self.bands.iter().zip(by_band).filter(|(b, _)| lines.contains(&b.lines.start));
             let sum: f64 = bands.map(|(b, v)| v * b.lines.len() as f64).sum();
             sum / frame.lines.len().max(1) as f64 * frame.full_scale.powi(2)
         };
-        let of = |frames: &Vec<Frame>| {
-            frames.iter().map(|f| mean(f) + f.less.map_or(0.0, |other| mean(&frames[other]))).collect()
+        let of = |frames: &Vec<Frame>, frame: &Frame| {
+            let n = frame.lines.len();
+            over(frame, 0..n)
+                + match frame.twice {
+                    None => 0.0,
+                    // Where the lines are the other's, the difference of the two lies between.
+                    Some(Twice::Speed { angle, lines }) => over(&frames[angle], 0..lines),
+                    Some(Twice::Angle { speed }) => {
+                        let lines = frames[speed].lines_of_other();
+                        over(&frames[speed], 0..n) - over(frame, 0..lines)
+                    }
+                }
         };
-        self.frames.iter().map(of).collect()
+        self.frames.iter().map(|frames| frames.iter().map(|frame| of(frames, frame)).collect()).collect()
     }
 }
 
 impl Frame {
-    fn transform(&self, samples: &[f64], less: Option<&[f64]>, lines: &mut [f64]) {
+    /// Lines of a speed that are an angle's rate.
+    const fn lines_of_other(&self) -> usize {
+        match self.twice {
+            Some(Twice::Speed { lines, .. }) => lines,
+            _ => 0,
+        }
+    }
+
+    fn transform<'s>(&self, samples: &[f64], of: impl Fn(usize) -> &'s [f64], lines: &mut [f64]) {
+        match self.twice {
+            None => self.cosines(|k| samples[k], lines),
+            Some(Twice::Angle { speed }) => {
+                let speed = of(speed);
+                self.cosines(|k| samples[k] - speed[k], lines);
+            }
+            Some(Twice::Speed { angle, lines: slow }) => {
+                self.cosines(|k| samples[k], lines);
+                if slow > 0 {
+                    let angle = of(angle);
+                    let mut rates = vec![0.0; lines.len()];
+                    self.cosines(|k| angle[k], &mut rates);
+                    lines[..slow].copy_from_slice(&rates[..slow]);
+                }
+            }
+        }
+    }
+
+    fn cosines(&self, sample: impl Fn(usize) -> f64, lines: &mut [f64]) {
         let n = self.picks.len();
         for (line, k) in lines.iter_mut().zip(&self.picks) {
-            *line = (samples[*k] - less.map_or(0.0, |l| l[*k])) / self.full_scale;
+            *line = sample(*k) / self.full_scale;
         }
         if n == 0 {
             return;
@@ -208,6 +253,36 @@ impl Frame {
         let scale = (2.0 / n as f64).sqrt();
         lines.iter_mut().for_each(|v| *v *= scale);
         lines[0] *= std::f64::consts::FRAC_1_SQRT_2;
+    }
+}
+
+/// Which other channel shows the motion that this one shows. Noise of a speed is as strong in its slow lines as in its fast
+/// ones, that of an angle's rate grows with frequency, since what one sample is off the next rate makes up for: below where
+/// they are equal the angle tells more.
+fn shown_twice(
+    recording: &Prepared,
+    channel: &Channel,
+    picks: &[usize],
+    bands: &[Range<usize>],
+) -> Option<Twice> {
+    let find = |response| {
+        let alike = |other: &Channel| other.response == response && other.rows == channel.rows;
+        recording.channels.iter().position(alike)
+    };
+    match channel.response {
+        Response::ShaftAngle => find(Response::ShaftSpeed).map(|speed| Twice::Angle { speed }),
+        Response::ShaftSpeed => find(Response::ShaftAngle).map(|angle| {
+            // Power a line of white noise of a speed, and of samples whose differences are the rates.
+            let speed_noise = scatter(&channel.values, picks) / 6.0;
+            let sample_noise = scatter(&recording.channels[angle].values, picks) / 20.0;
+            let tells_more = |range: &&Range<usize>| {
+                let of_sampling = 0.25 * (range.start + range.end - 1) as f64 / picks.len() as f64;
+                sample_noise * (2.0 * (std::f64::consts::PI * of_sampling).sin()).powi(2) < speed_noise
+            };
+            let slow = bands.iter().take_while(tells_more).last();
+            Twice::Speed { angle, lines: slow.map_or(0, |range| range.end) }
+        }),
+        _ => None,
     }
 }
 

@@ -49,7 +49,7 @@ pub enum DataError {
     },
     /// A value that no thruster gives.
     #[error(
-        "{recording}: {column} = {value:e} at {time_s} s is outside what is allowed: -{most:e} to {most:e}\nhint: is the unit right? a value not measured is an empty cell"
+        "{recording}: {column} = {value:e} at {time_s} s is outside what is allowed: -{most:e} to {most:e}\nhint: is the unit right (a column map reads scale * source + offset)? a value not measured is an empty cell"
     )]
     Implausible {
         /// The recording.

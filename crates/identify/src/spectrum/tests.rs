@@ -42,34 +42,57 @@ fn lines_about_a_frequency_count_together_over_recordings_of_one_channel() {
     assert_eq!(alike, [2, 50, 2, 50, 20, 5]);
 }
 
-#[test]
-fn what_speed_and_angle_both_show_is_taken_off_the_noisier_one() {
+/// A speed and an angle of one shaft, each with noise of such a size.
+fn speed_and_angle(of_speed: f64, of_angle: f64) -> Prepared {
     let rig = "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = 0.01\ntorque_constant_nm_a = 0.1\n";
     let rig = kort_thruster::rig::Rig::from_toml(rig).unwrap();
-    let off = |k: usize, size: f64| size * ((k * 7919 % 101) as f64 / 50.0 - 1.0);
-    let less = |of_speed: f64, of_angle: f64| {
-        let columns = [
-            ("current_cmd_a", (0..400).map(|k| (0.05 * k as f64).sin()).collect::<Vec<f64>>()),
-            (
-                "shaft_speed_rad_s",
-                (0..400).map(|k| 20.0 * (0.05 * k as f64).cos() + off(k, of_speed)).collect(),
-            ),
-            ("shaft_angle_rad", (0..400).map(|k| 4.0 * (0.05 * k as f64).sin() + off(k, of_angle)).collect()),
-        ];
-        let series = crate::data::Series {
-            name: "log".into(),
-            time_s: (0..400).map(|k| 0.01 * k as f64).collect(),
-            columns: columns.map(|(name, values)| (name.to_owned(), values)).into(),
-        };
-        let all = [Prepared::new(&series, &rig, false).unwrap()];
-        let place = |wanted| all[0].channels.iter().position(|c| c.response == wanted).unwrap();
-        let spectrum = Spectrum::new(&all, &[vec![false; 400]]);
-        [Response::ShaftSpeed, Response::ShaftAngle]
-            .map(|wanted| spectrum.frames[0][place(wanted)].less.is_some())
+    let off = |k: usize, size: f64| size * ((k * k * 7919 % 1009) as f64 / 504.0 - 1.0);
+    let rows = 0..2000;
+    let columns = [
+        ("current_cmd_a", rows.clone().map(|k| (0.05 * k as f64).sin()).collect::<Vec<f64>>()),
+        (
+            "shaft_speed_rad_s",
+            rows.clone().map(|k| 20.0 * (0.05 * k as f64).cos() + off(k, of_speed)).collect(),
+        ),
+        (
+            "shaft_angle_rad",
+            rows.clone().map(|k| 4.0 * (0.05 * k as f64).sin() + off(k + 700, of_angle)).collect(),
+        ),
+    ];
+    let series = crate::data::Series {
+        name: "log".into(),
+        time_s: rows.map(|k| 0.01 * k as f64).collect(),
+        columns: columns.map(|(name, values)| (name.to_owned(), values)).into(),
     };
-    // Noise of 1 mrad makes 0.14 rad/s of a rate over 10 ms.
-    assert_eq!(less(1.0, 1e-3), [true, false]);
-    assert_eq!(less(0.01, 1e-3), [false, true]);
+    Prepared::new(&series, &rig, false).unwrap()
+}
+
+#[test]
+fn speed_and_angle_show_one_motion_each_where_its_noise_is_the_lower() {
+    let slow = |of_speed: f64, of_angle: f64| {
+        let all = [speed_and_angle(of_speed, of_angle)];
+        let spectrum = Spectrum::new(&all, &[vec![false; 2000]]);
+        let lines = spectrum.frames[0].iter().map(Frame::lines_of_other).max().unwrap();
+        lines as f64 / 2000.0 * 50.0
+    };
+    // Noise of 1 mrad makes 0.1 rad/s times 2 sin(pi f / 100 Hz) of a rate over 10 ms.
+    let alike = slow(0.1, 1e-3);
+    assert!((11.0..25.0).contains(&alike), "{alike} Hz");
+    assert_eq!(slow(1.0, 1e-3), 50.0, "the angle throughout");
+    let low = slow(0.01, 1e-3);
+    assert!((1.0..2.6).contains(&low), "{low} Hz");
+}
+
+#[test]
+fn what_speed_and_angle_err_by_comes_back_channel_by_channel() {
+    let all = [speed_and_angle(0.1, 1e-3)];
+    let spectrum = Spectrum::new(&all, &[vec![false; 2000]]);
+    let stack: Stack = all.iter().map(|r| r.channels.iter().map(|c| c.values.clone()).collect()).collect();
+    let powers = spectrum.powers(&spectrum.transform(&stack));
+    for (channel, variance) in all[0].channels.iter().zip(&spectrum.variances(&powers)[0]) {
+        let square = channel.values.iter().map(|v| v * v).sum::<f64>() / channel.values.len() as f64;
+        assert!((variance / square - 1.0).abs() < 0.05, "{:?}: {variance}, {square}", channel.response);
+    }
 }
 
 #[test]
