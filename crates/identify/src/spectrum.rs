@@ -274,7 +274,9 @@ fn shown_twice(
         Response::ShaftSpeed => find(Response::ShaftAngle).map(|angle| {
             // Power a line of white noise of a speed, and of samples whose differences are the rates.
             let speed_noise = scatter(&channel.values, picks) / 6.0;
-            let sample_noise = scatter(&recording.channels[angle].values, picks) / 20.0;
+            // The first rate is none.
+            let sample_noise =
+                scatter(&recording.channels[angle].values, picks.get(1..).unwrap_or_default()) / 20.0;
             let tells_more = |range: &&Range<usize>| {
                 let of_sampling = 0.25 * (range.start + range.end - 1) as f64 / picks.len() as f64;
                 sample_noise * (2.0 * (std::f64::consts::PI * of_sampling).sin()).powi(2) < speed_noise

@@ -46,17 +46,23 @@ fn lines_about_a_frequency_count_together_over_recordings_of_one_channel() {
 fn speed_and_angle(of_speed: f64, of_angle: f64) -> Prepared {
     let rig = "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = 0.01\ntorque_constant_nm_a = 0.1\n";
     let rig = kort_thruster::rig::Rig::from_toml(rig).unwrap();
-    let off = |k: usize, size: f64| size * ((k * k * 7919 % 1009) as f64 / 504.0 - 1.0);
+    // White: a mixed counter (Steele et al. 2014, SplitMix64).
+    let off = |k: usize, size: f64| {
+        let mut z = (k as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        size * ((z >> 33) as f64 / f64::from(1_u32 << 30) - 1.0)
+    };
     let rows = 0..2000;
     let columns = [
         ("current_cmd_a", rows.clone().map(|k| (0.05 * k as f64).sin()).collect::<Vec<f64>>()),
         (
             "shaft_speed_rad_s",
-            rows.clone().map(|k| 20.0 * (0.05 * k as f64).cos() + off(k, of_speed)).collect(),
+            rows.clone().map(|k| 20.0 * (0.01 * k as f64).cos() + off(k, of_speed)).collect(),
         ),
         (
             "shaft_angle_rad",
-            rows.clone().map(|k| 4.0 * (0.05 * k as f64).sin() + off(k + 700, of_angle)).collect(),
+            rows.clone().map(|k| 20.0 * (0.01 * k as f64).sin() + off(k + 7000, of_angle)).collect(),
         ),
     ];
     let series = crate::data::Series {
