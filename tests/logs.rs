@@ -103,6 +103,8 @@ fn a_recording_of_kort_needs_no_map() {
         assert_eq!(speed, 1, "{found}");
         assert_eq!(found["proposal"]["native"], true, "{output}");
     }
+    let joint = columns(&write("joint.csv", "time_s,q,qd\n0,0.1,0.2\n0.01,0.2,0.3\n"));
+    assert_eq!(joint["proposal"]["native"], false, "stamps alone make no recording of kort: {joint}");
 }
 
 #[test]
