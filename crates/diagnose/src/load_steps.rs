@@ -7,10 +7,10 @@
 
 use std::sync::Arc;
 
-use kort_identify::Quadratic;
-use kort_identify::fit::{Columns, Fit};
+use kort_identify::fit::{Columns, Fit, known_of};
 use kort_identify::hypothesis::{Free, Hypothesis, Member};
 use kort_identify::simulate::Problem;
+use kort_identify::{Quadratic, products};
 use kort_thruster::both;
 use kort_thruster::effects::{Context, Descriptor, Effect, Hooks, Path, Scale, Spec, free_shaft, one_start};
 use kort_thruster::plant::{Balance, Local};
@@ -24,6 +24,8 @@ use crate::nameless::nameless;
 const MOST: usize = 4;
 /// Instants of the grid; from each the true one is found by halving the step.
 const INSTANTS: usize = 80;
+/// Changes of the grid whose products are summed at once.
+const AT_ONCE: usize = 10;
 /// Share of the recording before the first change, and after the last, at least.
 const MARGIN: f64 = 0.02;
 /// How long a change takes, s: least (long against a tick), usually, and most.
@@ -156,15 +158,18 @@ pub fn promise(problem: &Problem, parent: &Fit, grid: &[Change]) -> Option<(f64,
     let mut changes: Vec<Change> = Vec::new();
     let mut best: Option<(Promise, Vec<f64>)> = None;
     let mut in_vain = 0;
+    let mut model = problem.about(&parent.lines, &parent.columns, &parent.hypothesis);
     while changes.len() < MOST && in_vain < LOOKAHEAD {
-        let beside = |next: &Change| [changes.as_slice(), std::slice::from_ref(next)].concat();
-        let costs = grid.par_iter().map(|next| looking.promise(&beside(next)).cost);
-        let costs: Vec<f64> = costs.collect();
+        let costs = looking.with_each_of(&model, grid, changes.len());
         let Some(least) = (0..grid.len()).min_by(|a, b| costs[*a].total_cmp(&costs[*b])) else { break };
-        changes = beside(&grid[least]);
+        changes.push(grid[least].clone());
         let pays = costs[least] < parent.cost();
-        let promise =
-            if pays { looking.place(&mut changes, grid_step_s(problem)) } else { looking.promise(&changes) };
+        let promise = if pays {
+            looking.place(&model, &mut changes, grid_step_s(problem))
+        } else {
+            looking.promise(&model, &changes)
+        };
+        model = looking.with_changes(&model, &changes).0;
         if best.as_ref().is_none_or(|(known, _)| promise.cost < known.cost) {
             best = Some((promise, changes.iter().map(|c| c.from_s).collect()));
             in_vain = 0;
@@ -213,9 +218,7 @@ struct Looking<'a> {
     problem: &'a Problem<'a>,
     parent: &'a Fit,
     /// Derivatives of what is free in the set.
-    columns: Vec<&'a DVector<f64>>,
-    /// Their products.
-    known: Vec<DMatrix<f64>>,
+    columns: Vec<Arc<DVector<f64>>>,
     /// A change's size, in small loads.
     size: Free,
     small_n_m: f64,
@@ -233,8 +236,7 @@ impl<'a> Looking<'a> {
         Self {
             problem,
             parent,
-            columns: parent.columns.iter().flatten().map(AsRef::as_ref).collect(),
-            known: problem.about(&parent.lines, &parent.columns, &parent.hypothesis).curvature().to_vec(),
+            columns: known_of(&parent.columns),
             size: Free {
                 sigma: size.sigma / small_n_m,
                 low: size.low / small_n_m,
@@ -256,25 +258,43 @@ impl<'a> Looking<'a> {
         action.iter().all(|v| v.is_finite()).then(|| Change { from_s, action: Arc::new(action) })
     }
 
-    fn promise(&self, changes: &[Change]) -> Promise {
-        let (problem, parent) = (self.problem, self.parent);
-        let actions = changes.iter().map(|change| change.action.as_ref());
-        let columns: Vec<&DVector<f64>> = self.columns.iter().copied().chain(actions).collect();
-        let mut free = parent.hypothesis.free.clone();
+    /// The criterion with these changes on the set, from one with others: what both have is not summed again.
+    fn with_changes(&self, before: &Quadratic<'a>, changes: &[Change]) -> (Quadratic<'a>, Vec<Free>) {
+        let actions = changes.iter().map(|change| change.action.clone());
+        let columns: Vec<Arc<DVector<f64>>> = self.columns.iter().cloned().chain(actions).collect();
+        let mut free = self.parent.hypothesis.free.clone();
         free.extend(changes.iter().map(|_| self.size.clone()));
+        (before.beside(&self.parent.lines, &columns, &free), free)
+    }
+
+    fn promise(&self, before: &Quadratic<'a>, changes: &[Change]) -> Promise {
+        let (model, free) = self.with_changes(before, changes);
+        self.promise_of(&model, &free, changes.len())
+    }
+
+    /// What it costs to add each change of a grid to so many.
+    fn with_each_of(&self, before: &Quadratic<'a>, grid: &[Change], changes: usize) -> Vec<f64> {
+        let mut free = self.parent.hypothesis.free.clone();
+        free.extend((0..=changes).map(|_| self.size.clone()));
+        let costs = |some: &[Change]| -> Vec<f64> {
+            let actions: Vec<&DVector<f64>> = some.iter().map(|change| change.action.as_ref()).collect();
+            let crossed = before.crossed(&self.parent.lines, &actions);
+            let with = |(action, crossed): (&&DVector<f64>, &DMatrix<f64>)| {
+                let own = products(&self.problem.spectrum, &[*action]);
+                self.promise_of(&before.joined(&[crossed], &own, &free), &free, changes + 1).cost
+            };
+            actions.iter().zip(&crossed).map(with).collect()
+        };
+        grid.par_chunks(AT_ONCE).flat_map_iter(costs).collect()
+    }
+
+    fn promise_of(&self, model: &Quadratic, free: &[Free], changes: usize) -> Promise {
+        let parent = self.parent;
         let mut values = parent.values.clone();
         values.resize(free.len(), 0.0);
-        let model = Quadratic::extended(
-            &problem.spectrum,
-            &problem.criterion,
-            &parent.lines,
-            &columns,
-            &free,
-            &self.known,
-        );
-        let found = model.minimise(&parent.floor, &free, &values, 0.0);
+        let found = model.minimise(&parent.floor, free, &values, 0.0);
         // An instant is a number too: one of so many.
-        let instants = 2.0 * (INSTANTS as f64).ln() * changes.len() as f64;
+        let instants = 2.0 * (INSTANTS as f64).ln() * changes as f64;
         let size = |k: usize| found.step[k] * free[k].sigma * self.small_n_m;
         Promise {
             cost: model.cost(&found) + instants,
@@ -283,9 +303,9 @@ impl<'a> Looking<'a> {
     }
 
     /// Moves each change to where they leave least together.
-    fn place(&self, changes: &mut [Change], step_s: f64) -> Promise {
+    fn place(&self, before: &Quadratic<'a>, changes: &mut [Change], step_s: f64) -> Promise {
         let [first, last] = within(&self.problem.scale);
-        let mut least = self.promise(changes);
+        let mut least = self.promise(before, changes);
         for halving in 1..=HALVINGS {
             let by = step_s * 0.5_f64.powi(halving);
             for k in 0..changes.len() {
@@ -294,9 +314,9 @@ impl<'a> Looking<'a> {
                     let Some(moved) = self.change(to.clamp(first, last)) else {
                         continue;
                     };
-                    let before = std::mem::replace(&mut changes[k], moved);
-                    let there = self.promise(changes);
-                    if there.cost < least.cost { least = there } else { changes[k] = before }
+                    let was = std::mem::replace(&mut changes[k], moved);
+                    let there = self.promise(before, changes);
+                    if there.cost < least.cost { least = there } else { changes[k] = was }
                 }
             }
         }

@@ -124,7 +124,7 @@ pub fn path(problem: &Problem, fit: &Fit, rig: &Rig, offered: &Available, alone:
     let free = PLACES.par_iter().filter(|place| (place.needs)(rig, offered).is_ok());
     let tried = free.filter_map(|place| {
         let probes = probe(problem, fit, place);
-        let best = promises(problem, fit, known.curvature(), &probes).into_iter().next()?;
+        let best = promises(problem, fit, &known, &probes).into_iter().next()?;
         Some((best.cost, place.path))
     });
     let (cost, path) = tried.min_by(|a, b| a.0.total_cmp(&b.0))?;

@@ -4,20 +4,23 @@
 //! residuals, but an effect's action on them is nearly the same: which effects are worth a closer look on top
 //! of any set is told by these without simulating.
 
-use kort_identify::Quadratic;
-use kort_identify::fit::Fit;
+use kort_identify::fit::{Fit, known_of};
 use kort_identify::hypothesis::{Free, Member};
 use kort_identify::simulate::Problem;
+use kort_identify::{Quadratic, products};
 use kort_thruster::effects::{Descriptor, Scale};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 /// Starts of one effect with the action of each of its sizes there.
+#[derive(Clone)]
 pub struct Probe {
     /// The effect where it was probed.
     pub member: Member,
     /// Its sizes, by their places among the effect's values, with what each does to the response as lines.
     sizes: Vec<(usize, DVector<f64>)>,
+    /// Products of those.
+    products: DMatrix<f64>,
     /// What it does where it has no sizes.
     always: Option<DVector<f64>>,
     /// Larger than the catalogue's start, where what it does is not in proportion.
@@ -30,6 +33,12 @@ pub fn bends(probes: &[Probe]) -> bool {
 }
 
 impl Probe {
+    fn new(problem: &Problem, member: Member, sizes: Vec<(usize, DVector<f64>)>, bends: bool) -> Self {
+        let actions: Vec<&DVector<f64>> = sizes.iter().map(|s| &s.1).collect();
+        let products = products(&problem.spectrum, &actions);
+        Self { member, sizes, products, always: None, bends }
+    }
+
     /// Whether the effect does nothing to the set it was probed on: a limit that does not bind there, water that
     /// the model does not hold.
     pub fn inert(&self) -> bool {
@@ -101,8 +110,8 @@ pub fn probe(problem: &Problem, baseline: &Fit, effect: &'static Descriptor) -> 
             let size = whole.values[*j];
             (*j, c.1 * if size == 0.0 { 1.0 } else { size })
         });
-        let sizes: Vec<(usize, DVector<f64>)> = sizes.collect();
-        return vec![Probe { member: whole, sizes, always: None, bends: false }];
+        let sizes = sizes.collect();
+        return vec![Probe::new(problem, whole, sizes, false)];
     }
     let strengths: Vec<usize> = (0..specs.len()).filter(|j| !specs[*j].shape && !specs[*j].held).collect();
     let action = |values: Vec<f64>| {
@@ -122,10 +131,11 @@ pub fn probe(problem: &Problem, baseline: &Fit, effect: &'static Descriptor) -> 
             let member = whole.clone().at(start.clone());
             if strengths.is_empty() {
                 // Without a size it is there or not.
-                return Some(Probe { member, sizes: Vec::new(), always: Some(action(start)?), bends: false });
+                let always = Some(action(start)?);
+                return Some(Probe { always, ..Probe::new(problem, member, Vec::new(), false) });
             }
             let sizes: Vec<_> = strengths.iter().filter_map(|j| Some((*j, alone(&start, *j)?))).collect();
-            (!sizes.is_empty()).then_some(Probe { member, sizes, always: None, bends: false })
+            (!sizes.is_empty()).then(|| Probe::new(problem, member, sizes, false))
         })
         .collect();
     let Some(first) = probes.first().filter(|p| p.always.is_none()) else { return probes };
@@ -141,12 +151,7 @@ pub fn probe(problem: &Problem, baseline: &Fit, effect: &'static Descriptor) -> 
             if in_proportion {
                 break;
             }
-            more.push(Probe {
-                member: whole.clone().at(start),
-                sizes: vec![(*j, action)],
-                always: None,
-                bends: true,
-            });
+            more.push(Probe::new(problem, whole.clone().at(start), vec![(*j, action)], true));
         }
         more
     };
@@ -161,17 +166,35 @@ const BENDS: f64 = 0.05;
 /// Promises of one effect that are worth a closer look: where its shape is far off, a size alone shows little.
 const MOST_PROMISES: usize = 3;
 
-/// What an effect's probes promise on top of a set, each by its best form; the best few. `known` are the
-/// products of the set's own derivatives.
-pub fn promises(problem: &Problem, parent: &Fit, known: &[DMatrix<f64>], probes: &[Probe]) -> Vec<Promise> {
-    let mut all: Vec<Promise> =
-        probes.iter().filter_map(|probe| of_probe(problem, parent, known, probe)).collect();
+/// What an effect's probes promise on top of a set, each by its best form; the best few. `known` is the criterion about
+/// the set.
+pub fn promises(problem: &Problem, parent: &Fit, known: &Quadratic, probes: &[Probe]) -> Vec<Promise> {
+    let actions: Vec<&DVector<f64>> =
+        probes.iter().flat_map(|p| &p.sizes).map(|(_, action)| action).collect();
+    let crossed = known.crossed(&parent.lines, &actions);
+    let mut crossed = crossed.iter();
+    let mut of_probe = |probe: &Probe| {
+        let crossed: Vec<&DMatrix<f64>> = crossed.by_ref().take(probe.sizes.len()).collect();
+        let free = with_sizes(problem, parent, probe)?;
+        let whole = match &probe.always {
+            Some(action) => known.about(&(&parent.lines - action), &known_of(&parent.columns), &free),
+            None => known.joined(&crossed, &probe.products, &free),
+        };
+        by_best_form(problem, parent, (&whole, &free), probe)
+    };
+    let mut all: Vec<Promise> = probes.iter().filter_map(&mut of_probe).collect();
     all.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     all.truncate(MOST_PROMISES);
     all
 }
 
-fn of_probe(problem: &Problem, parent: &Fit, known: &[DMatrix<f64>], probe: &Probe) -> Option<Promise> {
+/// What a probe promises by its best form, of the criterion with all its sizes.
+fn by_best_form(
+    problem: &Problem,
+    parent: &Fit,
+    whole: (&Quadratic, &[Free]),
+    probe: &Probe,
+) -> Option<Promise> {
     let specs = (probe.member.effect.parameters)(&problem.scale);
     // Forms of the same sizes differ in their shapes, about which a size alone tells nothing: all of them are
     // free until the fit has shown which it needs ([`Search`](crate::search::Search) tries the other forms then).
@@ -187,35 +210,19 @@ fn of_probe(problem: &Problem, parent: &Fit, known: &[DMatrix<f64>], probe: &Pro
     forms
         .into_iter()
         .filter(|(_, sizes)| !sizes.is_empty() || probe.always.is_some())
-        .filter_map(|(form, sizes)| of_form(problem, parent, known, probe, &form, &sizes))
+        .filter_map(|(form, sizes)| of_form(problem, parent, whole, probe, &form, &sizes))
         .min_by(|a, b| a.cost.total_cmp(&b.cost))
 }
 
-/// Most sizes of an effect with a form.
-const MOST_ALONE: usize = 8;
-/// Standard deviations tried for what changes freely with time, over the catalogue's: how much it moves is
-/// learnt from the recording.
-const LIVELINESS: [f64; 3] = [1.0, 0.3, 0.1];
-
-fn of_form(
-    problem: &Problem,
-    parent: &Fit,
-    known: &[DMatrix<f64>],
-    probe: &Probe,
-    places: &[usize],
-    form: &[usize],
-) -> Option<Promise> {
+/// A set's free numbers and the sizes of a probe: each in units of where it was probed; it starts from nothing.
+fn with_sizes(problem: &Problem, parent: &Fit, probe: &Probe) -> Option<Vec<Free>> {
     let specs = (probe.member.effect.parameters)(&problem.scale);
+    let alone = parent.hypothesis.with(&parent.values, probe.member.clone(), &problem.scale);
     let mut free = parent.hypothesis.free.clone();
-    let mut columns: Vec<&DVector<f64>> = parent.columns.iter().flatten().map(AsRef::as_ref).collect();
-    let mut values = parent.values.clone();
-    let mut member = probe.member.clone();
-    let alone = parent.hypothesis.with(&parent.values, member.clone(), &problem.scale);
-    for k in form {
-        let (place, action) = &probe.sizes[*k];
+    for (place, _) in &probe.sizes {
         let own = alone.free[free_len(parent)..].iter().find(|f| f.name == specs[*place].name)?;
-        // In units of where it was probed; it starts from nothing.
-        let unit = if member.values[*place] == 0.0 { 1.0 } else { member.values[*place] };
+        let value = probe.member.values[*place];
+        let unit = if value == 0.0 { 1.0 } else { value };
         let (a, b) = (own.low / unit, own.high / unit);
         free.push(Free {
             mean: own.mean / unit,
@@ -224,21 +231,45 @@ fn of_form(
             high: a.max(b),
             ..own.clone()
         });
-        columns.push(action);
-        values.push(0.0);
     }
-    let lines = match &probe.always {
-        Some(action) => &parent.lines - action,
-        None => parent.lines.clone(),
+    Some(free)
+}
+
+/// Most sizes of an effect with a form.
+const MOST_ALONE: usize = 8;
+/// Standard deviations tried for what changes freely with time, over the catalogue's: how much it moves is
+/// learnt from the recording.
+const LIVELINESS: [f64; 3] = [1.0, 0.3, 0.1];
+
+/// What a probe promises with the sizes of one form, of the criterion with all of them.
+fn of_form(
+    problem: &Problem,
+    parent: &Fit,
+    (whole, all): (&Quadratic, &[Free]),
+    probe: &Probe,
+    places: &[usize],
+    form: &[usize],
+) -> Option<Promise> {
+    let specs = (probe.member.effect.parameters)(&problem.scale);
+    let mut member = probe.member.clone();
+    let kept: Vec<usize> = (0..free_len(parent)).chain(form.iter().map(|k| free_len(parent) + k)).collect();
+    let free: Vec<Free> = kept.iter().map(|k| all[*k].clone()).collect();
+    let mut values = parent.values.clone();
+    values.resize(free.len(), 0.0);
+    let part;
+    let model = if kept.len() == all.len() {
+        whole
+    } else {
+        part = whole.only(&kept);
+        &part
     };
-    let model = Quadratic::extended(&problem.spectrum, &problem.criterion, &lines, &columns, &free, known);
     let lively = if form.len() > MOST_ALONE { &LIVELINESS[..] } else { &LIVELINESS[..1] };
     let tried = lively.iter().map(|liveliness| {
         let mut free = free.clone();
         free[free_len(parent)..].iter_mut().for_each(|f| f.sigma *= liveliness);
         let narrowed;
         let model = if *liveliness == 1.0 {
-            &model
+            model
         } else {
             narrowed = model.scaled(free_len(parent), *liveliness);
             &narrowed

@@ -4,12 +4,12 @@
 use std::sync::Arc;
 
 use kort_identify::Quadratic;
-use kort_identify::fit::{Columns, Fit};
+use kort_identify::fit::{Columns, Fit, known_of};
 use kort_identify::hypothesis::{Hypothesis, Member};
 use kort_identify::simulate::Problem;
 use kort_thruster::dual::LANES;
 use kort_thruster::effects::Descriptor;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 use rayon::prelude::*;
 
 use crate::probe::{Probe, Promise, promises};
@@ -48,8 +48,7 @@ pub fn screen(
     worth: impl Fn(&Promise) -> bool,
 ) -> Vec<Screened> {
     let parent = &Arc::new(parent.clone());
-    let known = problem.about(&parent.lines, &parent.columns, &parent.hypothesis);
-    let known = known.curvature();
+    let known = &problem.about(&parent.lines, &parent.columns, &parent.hypothesis);
     let mut promised: Vec<Promise> =
         probes.par_iter().flat_map_iter(|probes| promises(problem, parent, known, probes)).collect();
     promised.retain(worth);
@@ -79,12 +78,7 @@ pub fn screen(
 
 /// A closer look at a promise: at the size that a straight line promises and, where that does not keep it, at the size
 /// that was probed. What switches on or binds may do nothing at the first.
-pub fn look(
-    problem: &Problem,
-    parent: &Arc<Fit>,
-    known: &[DMatrix<f64>],
-    promise: Promise,
-) -> Option<Screened> {
+pub fn look(problem: &Problem, parent: &Arc<Fit>, known: &Quadratic, promise: Promise) -> Option<Screened> {
     let promised = parent.cost() - promise.cost;
     let scaled = at(problem, parent, known, promise.member);
     if scaled.as_ref().is_some_and(|s| parent.cost() - s.cost > KEPT * promised) {
@@ -94,7 +88,7 @@ pub fn look(
     scaled.into_iter().chain(probed).min_by(|a, b| a.cost.total_cmp(&b.cost))
 }
 
-fn at(problem: &Problem, parent: &Arc<Fit>, known: &[DMatrix<f64>], member: Member) -> Option<Screened> {
+fn at(problem: &Problem, parent: &Arc<Fit>, known: &Quadratic, member: Member) -> Option<Screened> {
     let effect = member.effect;
     let hypothesis = parent.hypothesis.with(&parent.values, member, &problem.scale);
     let own: Vec<usize> = (parent.values.len()..hypothesis.free.len()).collect();
@@ -109,12 +103,11 @@ fn at(problem: &Problem, parent: &Arc<Fit>, known: &[DMatrix<f64>], member: Memb
     if !finite(&lines) || !new.iter().all(finite) {
         return None;
     }
-    let columns: Vec<&DVector<f64>> =
-        parent.columns.iter().flatten().map(AsRef::as_ref).chain(&new).collect();
-    let model =
-        Quadratic::extended(&problem.spectrum, &problem.criterion, &lines, &columns, &hypothesis.free, known);
+    let new: Vec<Arc<DVector<f64>>> = new.into_iter().map(Arc::new).collect();
+    let columns = [known_of(&parent.columns), new.clone()].concat();
+    let model = known.about(&lines, &columns, &hypothesis.free);
     let minimum = model.minimise(&parent.floor, &hypothesis.free, &hypothesis.start, 0.0);
     let cost = model.cost(&minimum);
-    let columns = parent.columns.iter().cloned().chain(new.into_iter().map(|c| Some(Arc::new(c)))).collect();
+    let columns = parent.columns.iter().cloned().chain(new.into_iter().map(Some)).collect();
     Some(Screened { effect, hypothesis, columns, lines, upon: parent.clone(), cost })
 }

@@ -1,12 +1,12 @@
 //! Is something left that no name explains? A term that bends to anything is put on each place where physics
 //! may be missing, on top of the best set and instead of its members. It pays for all its numbers.
 
-use kort_identify::Quadratic;
-use kort_identify::fit::Fit;
+use std::sync::Arc;
+
+use kort_identify::fit::{Fit, known_of};
 use kort_identify::hypothesis::{Hypothesis, Member};
 use kort_thruster::effects::{Available, Descriptor};
 use kort_thruster::rig::Rig;
-use nalgebra::DVector;
 use rayon::prelude::*;
 
 use crate::flexible::TERMS;
@@ -131,16 +131,9 @@ fn promise(
             {
                 return None;
             }
-            let columns: Vec<&DVector<f64>> =
-                parent.columns.iter().flatten().map(AsRef::as_ref).chain(new.iter().map(|c| &c.1)).collect();
-            let model = Quadratic::extended(
-                &problem.spectrum,
-                &problem.criterion,
-                &lines,
-                &columns,
-                &hypothesis.free,
-                known.curvature(),
-            );
+            let mut columns = known_of(&parent.columns);
+            columns.extend(new.into_iter().map(|c| Arc::new(c.1)));
+            let model = known.about(&lines, &columns, &hypothesis.free);
             let found = model.minimise(&parent.floor, &hypothesis.free, &hypothesis.start, 0.0);
             let cost = model.cost(&found);
             let start = hypothesis

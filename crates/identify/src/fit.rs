@@ -40,6 +40,11 @@ const PLACINGS: usize = 8;
 /// Derivatives of the response by free number, as lines, where they are known.
 pub type Columns = Vec<Option<Arc<DVector<f64>>>>;
 
+/// Those derivatives that are known.
+pub fn known_of(columns: &Columns) -> Vec<Arc<DVector<f64>>> {
+    columns.iter().flatten().cloned().collect()
+}
+
 /// Where a fit stands.
 struct Point {
     values: Vec<f64>,
@@ -108,10 +113,15 @@ impl Problem<'_> {
         columns.resize(at.values.len(), None);
         let mut fresh = columns.iter().all(Option::is_none);
         let mut damping = 0.0;
+        let mut model: Option<Quadratic> = None;
         for _ in 0..if at.merit.is_finite() { iterations } else { 0 } {
             self.complete(hypothesis, &at.values, &mut columns);
-            let model = self.about(&at.lines, &columns, hypothesis);
-            let step = self.step(hypothesis, &at, &model, floor, &mut damping, fresh);
+            let about = match &model {
+                Some(before) => before.about(&at.lines, &known_of(&columns), &hypothesis.free),
+                None => self.about(&at.lines, &columns, hypothesis),
+            };
+            let step = self.step(hypothesis, &at, &about, floor, &mut damping, fresh);
+            model = Some(about);
             let (gain, promised) = step.as_ref().map_or((0.0, 0.0), |s| (at.merit - s.to.merit, s.promised));
             at = step.map_or(at, |step| step.to);
             if gain > 0.0 && (gain - promised).abs() < HOLDS * promised {
@@ -325,8 +335,7 @@ impl Problem<'_> {
 
     /// The criterion about a point whose derivatives are all known.
     pub fn about(&self, lines: &DVector<f64>, columns: &Columns, hypothesis: &Hypothesis) -> Quadratic<'_> {
-        let columns: Vec<&DVector<f64>> = columns.iter().flatten().map(AsRef::as_ref).collect();
-        Quadratic::new(&self.spectrum, &self.criterion, lines, &columns, &hypothesis.free)
+        Quadratic::new(&self.spectrum, &self.criterion, lines, &known_of(columns), &hypothesis.free)
     }
 
     /// Information of the data on the free numbers of a fit, in units of their priors'.

@@ -34,4 +34,4 @@ pub mod spectrum;
 mod step;
 pub mod thin;
 mod too_slow;
-pub use quadratic::{Minimum, Quadratic};
+pub use quadratic::{Minimum, Quadratic, products};

@@ -1,6 +1,11 @@
 //! The criterion about one point, with the response taken as linear in the parameters: cheap to minimise,
 //! however often the noise is learnt anew.
 
+#[cfg(test)]
+mod tests;
+
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector, DVectorView};
 
 use crate::hypothesis::Free;
@@ -9,15 +14,21 @@ use crate::spectrum::{Band, Spectrum};
 use crate::step::bounded_step;
 
 /// Products of residual and derivative by band; parameters in units of their priors' standard deviations.
+///
+/// A derivative that stands again beside another residual, or beside other derivatives, has most of its products already:
+/// they are not summed again.
 pub struct Quadratic<'a> {
     spectrum: &'a Spectrum,
     criterion: &'a Criterion,
+    /// What the products are of, where they may serve again.
+    columns: Vec<Arc<DVector<f64>>>,
+    sigmas: Vec<f64>,
     /// Sum of squares of the residual.
-    residual: Vec<f64>,
-    /// Derivative times residual.
-    slope: Vec<DVector<f64>>,
-    /// Derivative times derivative.
-    curvature: Vec<DMatrix<f64>>,
+    residual: DVector<f64>,
+    /// Derivative times residual, a column for each band.
+    slope: DMatrix<f64>,
+    /// Derivative times derivative: of each band the lower triangle, row by row, in one column.
+    curvature: DMatrix<f64>,
 }
 
 /// Where the criterion is least, as far as the linear response tells.
@@ -43,98 +54,197 @@ fn lines_of<'v>(all: &'v DVector<f64>, band: &Band) -> DVectorView<'v, f64> {
     all.rows(band.lines.start, band.lines.len())
 }
 
+/// Lines summed at once where many derivatives meet the same few: those stay in the processor's cache.
+const PIECE: usize = 512;
+
+/// Products among derivatives, in their own units: of each band the lower triangle, row by row, in one column.
+pub fn products(spectrum: &Spectrum, columns: &[&DVector<f64>]) -> DMatrix<f64> {
+    let mut all = DMatrix::zeros(place(columns.len(), 0), spectrum.bands.len());
+    for (b, band) in spectrum.bands.iter().enumerate() {
+        for (i, column) in columns.iter().enumerate() {
+            let a = lines_of(column, band);
+            (0..=i).for_each(|j| all[(place(i, j), b)] = a.dot(&lines_of(columns[j], band)));
+        }
+    }
+    all
+}
+
+/// Place of a product in its triangle; the row comes first.
+const fn place(row: usize, column: usize) -> usize {
+    row * (row + 1) / 2 + column
+}
+
 impl<'a> Quadratic<'a> {
     /// From a residual (measured less simulated) and the response's derivatives, all as lines.
     pub fn new(
         spectrum: &'a Spectrum,
         criterion: &'a Criterion,
         residual: &DVector<f64>,
-        columns: &[&DVector<f64>],
+        columns: &[Arc<DVector<f64>>],
         free: &[Free],
     ) -> Self {
-        Self::extended(spectrum, criterion, residual, columns, free, &[])
+        let bands = spectrum.bands.len();
+        let nothing = Self {
+            spectrum,
+            criterion,
+            columns: Vec::new(),
+            sigmas: Vec::new(),
+            residual: DVector::zeros(bands),
+            slope: DMatrix::zeros(0, bands),
+            curvature: DMatrix::zeros(0, bands),
+        };
+        nothing.about(residual, columns, free)
     }
 
-    /// The same where the products of the first columns are known (see [`Quadratic::curvature`]).
-    pub fn extended(
-        spectrum: &'a Spectrum,
-        criterion: &'a Criterion,
+    /// About another point. Where it has the same derivatives in the same places, their products are known.
+    pub fn about(&self, residual: &DVector<f64>, columns: &[Arc<DVector<f64>>], free: &[Free]) -> Self {
+        self.made(residual, columns, free, false)
+    }
+
+    /// About the same point, of the same `residual`, with other derivatives: those in the same places as here have their
+    /// products already.
+    pub fn beside(&self, residual: &DVector<f64>, columns: &[Arc<DVector<f64>>], free: &[Free]) -> Self {
+        self.made(residual, columns, free, true)
+    }
+
+    fn made(
+        &self,
         residual: &DVector<f64>,
-        columns: &[&DVector<f64>],
+        columns: &[Arc<DVector<f64>>],
         free: &[Free],
-        known: &[DMatrix<f64>],
+        same_residual: bool,
     ) -> Self {
-        let n = columns.len();
-        let (mut squares, mut slope, mut curvature) = (Vec::new(), Vec::new(), Vec::new());
-        for (k, band) in spectrum.bands.iter().enumerate() {
-            // Several sums at once: one that waits for its last addend takes eight times as long.
+        let (n, bands) = (columns.len(), self.spectrum.bands.len());
+        let sigmas: Vec<f64> = free.iter().take(n).map(|f| f.sigma).collect();
+        let known = |k: &usize| {
+            let was = self.columns.get(*k).zip(self.sigmas.get(*k));
+            was.is_some_and(|(column, sigma)| Arc::ptr_eq(column, &columns[*k]) && *sigma == sigmas[*k])
+        };
+        let known: Vec<bool> = (0..n).map(|k| known(&k)).collect();
+        let mut squares = if same_residual { self.residual.clone() } else { DVector::zeros(bands) };
+        let mut slope = DMatrix::zeros(n, bands);
+        let mut curvature = DMatrix::zeros(place(n, 0), bands);
+        for (b, band) in self.spectrum.bands.iter().enumerate() {
             let r = lines_of(residual, band);
-            squares.push(r.dot(&r));
-            let mut gradient = DVector::zeros(n);
-            let mut gram = DMatrix::zeros(n, n);
-            let before = known.get(k).map_or(0, DMatrix::nrows);
-            if let Some(known) = known.get(k) {
-                gram.view_mut((0, 0), (before, before)).copy_from(known);
+            if !same_residual {
+                squares[b] = r.dot(&r);
             }
+            let (mut slope, mut products) = (slope.column_mut(b), curvature.column_mut(b));
             for i in 0..n {
-                let a = lines_of(columns[i], band);
-                gradient[i] = free[i].sigma * a.dot(&r);
-                if i < before {
-                    continue;
-                }
+                let a = lines_of(&columns[i], band);
+                slope[i] = if known[i] && same_residual { self.slope[(i, b)] } else { sigmas[i] * a.dot(&r) };
                 for j in 0..=i {
-                    let product = free[i].sigma * free[j].sigma * a.dot(&lines_of(columns[j], band));
-                    gram[(i, j)] = product;
-                    gram[(j, i)] = product;
+                    products[place(i, j)] = if known[i] && known[j] {
+                        self.curvature[(place(i, j), b)]
+                    } else {
+                        sigmas[i] * sigmas[j] * a.dot(&lines_of(&columns[j], band))
+                    };
                 }
             }
-            slope.push(gradient);
-            curvature.push(gram);
         }
-        Self { spectrum, criterion, residual: squares, slope, curvature }
+        Self {
+            spectrum: self.spectrum,
+            criterion: self.criterion,
+            columns: columns.to_vec(),
+            sigmas,
+            residual: squares,
+            slope,
+            curvature,
+        }
+    }
+
+    /// Products of each of these with every derivative here and, in the last row, with the `residual`, in their own units; a
+    /// column for each band.
+    pub fn crossed(&self, residual: &DVector<f64>, others: &[&DVector<f64>]) -> Vec<DMatrix<f64>> {
+        let n = self.columns.len();
+        let firsts: Vec<&DVector<f64>> = self.columns.iter().map(AsRef::as_ref).chain([residual]).collect();
+        let mut crossed = vec![DMatrix::zeros(n + 1, self.spectrum.bands.len()); others.len()];
+        for (b, band) in self.spectrum.bands.iter().enumerate() {
+            for from in band.lines.clone().step_by(PIECE) {
+                let lines = PIECE.min(band.lines.end - from);
+                for (other, crossed) in others.iter().zip(&mut crossed) {
+                    let a = other.rows(from, lines);
+                    for (k, first) in firsts.iter().enumerate() {
+                        crossed[(k, b)] += a.dot(&first.rows(from, lines));
+                    }
+                }
+            }
+        }
+        crossed
+    }
+
+    /// About the same point, with more derivatives: what [`crossed`](Self::crossed) says of each, and their [`products`].
+    pub fn joined(&self, crossed: &[&DMatrix<f64>], own: &DMatrix<f64>, free: &[Free]) -> Self {
+        let (n, all, bands) = (self.sigmas.len(), free.len(), self.spectrum.bands.len());
+        let sigmas: Vec<f64> = free.iter().map(|f| f.sigma).collect();
+        let mut slope = DMatrix::zeros(all, bands);
+        let mut curvature = DMatrix::zeros(place(all, 0), bands);
+        slope.rows_mut(0, n).copy_from(&self.slope);
+        curvature.rows_mut(0, place(n, 0)).copy_from(&self.curvature);
+        for b in 0..bands {
+            let (mut slope, mut products) = (slope.column_mut(b), curvature.column_mut(b));
+            for (i, (row, crossed)) in (n..all).zip(crossed).enumerate() {
+                slope[row] = sigmas[row] * crossed[(n, b)];
+                for column in 0..=row {
+                    let product =
+                        if column < n { crossed[(column, b)] } else { own[(place(i, column - n), b)] };
+                    products[place(row, column)] = sigmas[row] * sigmas[column] * product;
+                }
+            }
+        }
+        let (residual, columns) = (self.residual.clone(), Vec::new());
+        Self { columns, sigmas, residual, slope, curvature, ..*self }
+    }
+
+    /// The same with these parameters only.
+    pub fn only(&self, kept: &[usize]) -> Self {
+        let pairs = (0..kept.len()).flat_map(|i| (0..=i).map(move |j| (kept[i], kept[j])));
+        let products: Vec<usize> = pairs.map(|(i, j)| place(i.max(j), i.min(j))).collect();
+        Self {
+            columns: Vec::new(),
+            sigmas: kept.iter().map(|k| self.sigmas[*k]).collect(),
+            residual: self.residual.clone(),
+            slope: self.slope.select_rows(kept),
+            curvature: self.curvature.select_rows(&products),
+            ..*self
+        }
     }
 
     /// The same with the last parameters' priors wider or narrower by a factor.
     pub fn scaled(&self, from: usize, factor: f64) -> Self {
-        let mut slope = self.slope.clone();
-        let mut curvature = self.curvature.clone();
-        for (s, c) in slope.iter_mut().zip(&mut curvature) {
-            for k in from..s.len() {
-                s[k] *= factor;
-                c.row_mut(k).scale_mut(factor);
-                c.column_mut(k).scale_mut(factor);
-            }
+        let scale = |k: usize| if k < from { 1.0 } else { factor };
+        let (mut slope, mut curvature) = (self.slope.clone(), self.curvature.clone());
+        for i in from..self.sigmas.len() {
+            slope.row_mut(i).scale_mut(factor);
+            (0..=i).for_each(|j| curvature.row_mut(place(i, j)).scale_mut(factor * scale(j)));
         }
-        Self { residual: self.residual.clone(), slope, curvature, ..*self }
-    }
-
-    /// Products of the derivatives by band.
-    pub fn curvature(&self) -> &[DMatrix<f64>] {
-        &self.curvature
+        Self {
+            columns: Vec::new(),
+            sigmas: self.sigmas.iter().enumerate().map(|(k, sigma)| sigma * scale(k)).collect(),
+            residual: self.residual.clone(),
+            slope,
+            curvature,
+            ..*self
+        }
     }
 
     /// Mean squares by band after a step.
     pub fn powers(&self, step: &DVector<f64>) -> Vec<f64> {
-        self.spectrum
-            .bands
-            .iter()
-            .enumerate()
-            .map(|(b, band)| {
-                let sum = self.residual[b] - 2.0 * step.dot(&self.slope[b])
-                    + step.dot(&(&self.curvature[b] * step));
-                (sum / band.lines.len() as f64).max(0.0)
-            })
-            .collect()
+        let n = step.len();
+        // Of the lower triangle what is off the diagonal stands for two.
+        let times = |i: usize, j: usize| if i == j { 1.0 } else { 2.0 } * step[i] * step[j];
+        let pairs = (0..n).flat_map(|i| (0..=i).map(move |j| times(i, j)));
+        let pairs = DVector::from_iterator(place(n, 0), pairs);
+        let sums = &self.residual - 2.0 * self.slope.tr_mul(step) + self.curvature.tr_mul(&pairs);
+        let bands = self.spectrum.bands.iter();
+        bands.zip(sums.iter()).map(|(band, sum)| (sum / band.lines.len() as f64).max(0.0)).collect()
     }
 
     /// The information that the data hold, in units of the priors': the weighted normal matrix.
     pub fn information(&self, noise: &Noise) -> DMatrix<f64> {
-        let n = self.slope.first().map_or(0, DVector::len);
-        let mut sum = DMatrix::zeros(n, n);
-        for (gram, weight) in self.curvature.iter().zip(&noise.weight) {
-            sum += gram * *weight;
-        }
-        sum
+        let sum = &self.curvature * DVectorView::from_slice(&noise.weight, noise.weight.len());
+        let n = self.sigmas.len();
+        DMatrix::from_fn(n, n, |i, j| sum[place(i.max(j), i.min(j))])
     }
 
     /// Laplace's price of the numbers under a noise: `ln det(I + information)`.
@@ -169,11 +279,10 @@ impl<'a> Quadratic<'a> {
         let held_back = |step: &DVector<f64>| step.component_mul(step).dot(&drag);
         let mut merit = noise.misfit + penalty;
         for _ in 0..ROUNDS {
-            let normal = self.information(&noise) + DMatrix::from_diagonal(&drag.add_scalar(1.0));
-            let mut gradient = -(&z0 + &step) - drag.component_mul(&step);
-            for ((slope, curvature), weight) in self.slope.iter().zip(&self.curvature).zip(&noise.weight) {
-                gradient += (slope - curvature * &step) * *weight;
-            }
+            let information = self.information(&noise);
+            let slope = &self.slope * DVectorView::from_slice(&noise.weight, noise.weight.len());
+            let gradient = slope - &information * &step - (&z0 + &step) - drag.component_mul(&step);
+            let normal = information + DMatrix::from_diagonal(&drag.add_scalar(1.0));
             let room = |k: usize| {
                 let (f, at) = (&free[k], free[k].mean + (z0[k] + step[k]) * free[k].sigma);
                 ((f.low - at) / f.sigma, (f.high - at) / f.sigma)

@@ -159,6 +159,7 @@ fn orders_of_cogging_that_are_not_the_usual_ones_are_found_one_after_the_other()
 fn what_does_nothing_where_a_line_promises_much_is_looked_at_where_it_was_probed() {
     with_search(vec![&coulomb_friction::DESCRIPTOR], |search| {
         let parent = Arc::new(search.fits[&Set::new()].clone());
+        let known = search.problem.about(&parent.lines, &parent.columns, &parent.hypothesis);
         let member = |friction_n_m: f64| {
             let whole = Member::new(&coulomb_friction::DESCRIPTOR, &search.problem.scale);
             let mut values = whole.values.clone();
@@ -168,7 +169,7 @@ fn what_does_nothing_where_a_line_promises_much_is_looked_at_where_it_was_probed
         let looked = |scaled, probed, gain: f64| {
             let promise =
                 Promise { cost: parent.cost() - gain, member: member(scaled), probed: member(probed) };
-            let found = screen::look(search.problem, &parent, &[], promise).unwrap();
+            let found = screen::look(search.problem, &parent, &known, promise).unwrap();
             found.hypothesis.effects[0].values[0]
         };
         let nothing = 1e-9 * FRICTION_N_M;

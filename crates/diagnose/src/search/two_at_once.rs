@@ -4,10 +4,7 @@
 //! that adds one at a time stops before both. What two do together follows from what was screened of each, without
 //! simulating: their actions add, as far as the response is linear.
 
-use std::sync::Arc;
-
-use kort_identify::Quadratic;
-use kort_identify::fit::Columns;
+use kort_identify::fit::{Columns, known_of};
 use kort_identify::hypothesis::Hypothesis;
 use nalgebra::DVector;
 use rayon::prelude::*;
@@ -57,7 +54,6 @@ impl Search<'_, '_> {
         let Some(screened) = self.screens.get(set) else { return Vec::new() };
         let Some(parent) = screened.first().map(|s| &s.upon) else { return Vec::new() };
         let known = self.problem.about(&parent.lines, &parent.columns, &parent.hypothesis);
-        let known = known.curvature();
         // Of several starts of one effect the cheapest, which comes first.
         let mut firsts: Vec<&Screened> = Vec::new();
         for one in screened {
@@ -75,10 +71,8 @@ impl Search<'_, '_> {
             let hypothesis = a.hypothesis.with(&a.hypothesis.start, member, &self.problem.scale);
             let columns: Columns = a.columns.iter().chain(&b.columns[n..]).cloned().collect();
             let lines: DVector<f64> = &a.lines + &b.lines - &parent.lines;
-            let columns_there: Vec<&DVector<f64>> = columns.iter().flatten().map(Arc::as_ref).collect();
-            let (spectrum, criterion) = (&self.problem.spectrum, &self.problem.criterion);
             let free = &hypothesis.free;
-            let model = Quadratic::extended(spectrum, criterion, &lines, &columns_there, free, known);
+            let model = known.about(&lines, &known_of(&columns), free);
             let minimum = model.minimise(&parent.floor, free, &hypothesis.start, 0.0);
             let cost = model.cost(&minimum);
             let set = with(&with(set, a.effect.id), b.effect.id);
