@@ -35,6 +35,8 @@ pub struct SearchConstants {
     pub rivals: f64,
     /// Effects of one screen that are fitted exactly at most.
     pub exact: usize,
+    /// Share of the form error of what explains a mismatch with which a set is looked at once more.
+    pub closer: f64,
 }
 
 /// How costs become odds.
@@ -80,6 +82,7 @@ mod tests {
             c.criterion.facts_a_band,
             c.criterion.timing_s,
             c.search.rivals,
+            c.search.closer,
             c.posterior.temper,
             c.posterior.form_share,
             c.posterior.surprise,

@@ -191,6 +191,11 @@ impl Floor {
         }
     }
 
+    /// The same with a share of the form error of what explains the mismatch.
+    pub fn excusing_less(&self, share: f64) -> Self {
+        Self { own: self.own.iter().map(|own| own * share * share).collect(), ..self.clone() }
+    }
+
     /// The lower of two, band by band.
     pub fn or_lower(&self, other: &Self) -> Self {
         let lower = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a.min(*b)).collect();

@@ -7,6 +7,7 @@ mod every_start;
 mod expand;
 mod forms;
 mod relatives;
+mod second_look;
 mod stand_in;
 #[cfg(test)]
 mod tests;
@@ -167,7 +168,8 @@ impl<'a, 'p> Search<'a, 'p> {
         self.expand(&best, self.cost(&best));
         self.look_from_afar();
         let best = self.climb(best, progress);
-        self.elsewhere(best, progress)
+        let best = self.elsewhere(best, progress);
+        self.second_look(best, progress)
     }
 
     /// Members of a set that are other equations in the place of the model's.

@@ -234,3 +234,27 @@ fn another_way_begins_with_what_explains_something_else() {
         assert_eq!(search.elsewhere(late, &|_| ()), [friction.id, lag.id]);
     });
 }
+
+#[test]
+fn what_hides_below_what_a_strong_name_is_excused_for_shows_at_a_second_look() {
+    let effects: Vec<&'static Descriptor> = vec![
+        &coulomb_friction::DESCRIPTOR,
+        &encoder_filter_lag::DESCRIPTOR,
+        &torque_ripple_cogging::DESCRIPTOR,
+    ];
+    for (cogging_n_m, shows) in [(5e-5, false), (2e-4, true)] {
+        with_search_of(recording(|angle| cogging_n_m * (angle + 1.0).sin()), effects.clone(), |search| {
+            let nothing = Set::new();
+            search.hold(&nothing, "");
+            search.probes.insert(nothing.clone(), search.probe_all(&nothing));
+            search.expand(&nothing, f64::NEG_INFINITY);
+            let both = search.two_at_once(&nothing);
+            assert_eq!(search.forward(&both), both, "below what is excused");
+            let (cost, fits) = (search.cost(&both), search.fits.len());
+            let found = search.second_look(both.clone(), &|_| ());
+            assert_eq!(found.contains(&"torque_ripple_cogging"), shows, "{found:?}");
+            assert_eq!(search.fits.contains_key(&found) && search.cost(&found) < cost, shows);
+            assert!(search.fits.len() >= fits, "every set that was fitted is weighed again");
+        });
+    }
+}
