@@ -143,7 +143,8 @@ fn from_rivals(search: &Search, best: &Set, rig: &Rig, place: &Named) -> Option<
     most.scenario.what = format!("Parts {} from {}: {}", chosen.id, rival.id, most.words);
     most.scenario.name = format!("separate-{}-{}", chosen.id, rival.id).replace('_', "-");
     let separates = std::iter::once(place.effect).chain(place.rivals.iter().copied());
-    most.told(separates, why(search, chosen, rival, most.difference))
+    let (sizes, advice) = why(search, chosen, rival, most.difference);
+    most.told(separates, sizes, advice)
 }
 
 /// The signal on which a name in doubt shows most.
@@ -162,8 +163,7 @@ fn from_absence(search: &Search, best: &Set, rig: &Rig, place: &Named) -> Option
             chosen.id
         )
     };
-    let why = with_advice(size, most.difference, chosen.separated_by);
-    most.told(std::iter::once(place.effect), why)
+    most.told(std::iter::once(place.effect), size, chosen.separated_by)
 }
 
 /// A test signal on which two sets differ.
@@ -175,10 +175,25 @@ struct Differs {
 }
 
 impl Differs {
-    fn told(&self, separates: impl Iterator<Item = &'static str>, why: String) -> Option<NextExperiment> {
+    /// What to run: this signal, or what the catalogue advises where it shows nothing.
+    fn told(
+        &self,
+        separates: impl Iterator<Item = &'static str>,
+        sizes: String,
+        advice: &str,
+    ) -> Option<NextExperiment> {
+        let shows = self.difference >= SHOWS;
+        let why = if shows {
+            format!("{sizes}; the catalogue's advice: {advice}")
+        } else {
+            format!(
+                "{sizes}: none of the shipped test signals shows that well; the best of them is {}",
+                self.words
+            )
+        };
         Some(NextExperiment {
             separates: separates.map(str::to_string).collect(),
-            excitation: self.words.into(),
+            excitation: if shows { self.words } else { advice }.into(),
             why,
             scenario: serde_json::to_value(&self.scenario).ok()?,
         })
@@ -199,12 +214,10 @@ fn where_they_differ(search: &Search, rig: &Rig, best: &Set, other: &Set) -> Opt
     Some(Differs { scenario: with_effects(most.scenario, search, mine), ..most })
 }
 
-fn why(search: &Search, chosen: &Descriptor, rival: &Descriptor, difference: f64) -> String {
+/// How much two rivals differ on a signal, and what the catalogue says parts them.
+fn why(search: &Search, chosen: &Descriptor, rival: &Descriptor, difference: f64) -> (String, &'static str) {
     let percent = 100.0 * difference;
-    let (sizes, advice) = match (
-        free_in_time(chosen, &search.problem.scale),
-        free_in_time(rival, &search.problem.scale),
-    ) {
+    match (free_in_time(chosen, &search.problem.scale), free_in_time(rival, &search.problem.scale)) {
         (false, false) => (
             format!(
                 "fitted to this recording, {} and {} would then differ by {percent:.1} % of full scale on the channel where they differ most",
@@ -224,20 +237,11 @@ fn why(search: &Search, chosen: &Descriptor, rival: &Descriptor, difference: f64
             );
             (text, formed.separated_by)
         }
-    };
-    with_advice(sizes, difference, advice)
+    }
 }
 
 /// Difference over full scale below which a signal shows nothing.
 const SHOWS: f64 = 0.003;
-
-fn with_advice(sizes: String, difference: f64, advice: &str) -> String {
-    if difference < SHOWS {
-        format!("{sizes}: none of the shipped test signals shows that well; what does is {advice}")
-    } else {
-        format!("{sizes}; the catalogue's advice: {advice}")
-    }
-}
 
 /// What to run for a term without a name, of which a signal both ways tells most, and why.
 fn of_unknown(term: &Descriptor, rig: &Rig, both_ways: &str) -> (String, String) {
@@ -365,6 +369,19 @@ mod tests {
                 assert!(run.is_some(), "{words} on {drive}");
             }
         }
+    }
+
+    #[test]
+    fn where_no_signal_shows_a_difference_the_catalogue_s_advice_is_what_to_run() {
+        let (text, words) = STAIRCASE;
+        let told = |difference: f64| {
+            let differs = Differs { difference, scenario: toml::from_str(text).unwrap(), words };
+            differs.told(["a", "b"].into_iter(), "how far".into(), "known weights on the stand").unwrap()
+        };
+        let (shown, not) = (told(2.0 * SHOWS), told(0.5 * SHOWS));
+        assert!(shown.excitation == words && shown.why.contains("known weights"));
+        assert_eq!(not.excitation, "known weights on the stand");
+        assert!(not.why.contains(words) && !not.scenario.is_null());
     }
 
     #[test]
