@@ -41,6 +41,8 @@ impl Decision {
 
 /// From this probability on a name is believed.
 const BELIEVED: f64 = 0.7;
+/// No name that only undoes another is likelier than this: what is left of both may be neither.
+const EVEN: f64 = 0.5;
 /// A remainder below this share of what was to be explained is of no practical size.
 const PRACTICAL: f64 = 0.1;
 
@@ -55,6 +57,8 @@ pub struct Circumstances {
     pub unparted: Vec<(&'static str, &'static str)>,
     /// Members of the told set that do the same all the time: of one operating point they tell one number.
     pub steady: Vec<&'static str>,
+    /// Members of the told set that mostly undo each other.
+    pub cancelling: Vec<(&'static str, &'static str)>,
     /// The simulation breaks down on the stated rig.
     pub broke_down: bool,
     /// Share of the squared error above the noise that the told set's names leave.
@@ -70,12 +74,14 @@ pub fn decide(posterior: &Posterior, circumstances: &Circumstances) -> Decision 
     let term = best.iter().copied().find(|id| is_term(id));
     let stands = |id: &&'static str| !is_term(id) && !circumstances.negligible.contains(id);
     let members: Vec<&'static str> = best.iter().copied().filter(stands).collect();
+    let undone = |effect: &str| circumstances.cancelling.iter().any(|(a, b)| *a == effect || *b == effect);
     // How likely a name is, and how likely where the catalogue does not hold all that acts.
     let stated = |effect: &str| {
+        let most = if undone(effect) { EVEN } else { 1.0 };
         if circumstances.more_than_noise {
-            posterior.beside_unknown() * posterior.probability(effect)
+            most.min(posterior.beside_unknown() * posterior.probability(effect))
         } else {
-            posterior.stated(effect)
+            most.min(posterior.stated(effect))
         }
     };
     let mut named: Vec<Named> = Vec::new();
@@ -88,7 +94,7 @@ pub fn decide(posterior: &Posterior, circumstances: &Circumstances) -> Decision 
         let place: Vec<&'static str> = std::iter::once(*member).chain(rivals).collect();
         for effect in &place {
             let rivals: Vec<&'static str> = place.iter().copied().filter(|id| id != effect).collect();
-            let believed = posterior.probability(effect) >= BELIEVED && rivals.is_empty();
+            let believed = posterior.probability(effect) >= BELIEVED && rivals.is_empty() && !undone(effect);
             named.push(Named { effect, probability: stated(effect), rivals, believed });
         }
     }
@@ -247,6 +253,23 @@ mod tests {
         let (once, twice) = (decided(with_term, &usual), decided(with_term, &much));
         assert!((once.named[0].probability - twice.named[0].probability).abs() < 1e-12);
         assert_eq!(beside.verdict, Verdict::PartlyExplained);
+    }
+
+    #[test]
+    fn names_that_only_undo_each_other_are_never_sure() {
+        let costs: &[(&[&'static str], f64)] = &[
+            (&["command_curve", "command_dead_band"], 0.0),
+            (&["command_curve"], 300.0),
+            (&["command_dead_band"], 400.0),
+            (&[], 500.0),
+        ];
+        let usual = Circumstances::default();
+        let undone =
+            Circumstances { cancelling: vec![("command_curve", "command_dead_band")], ..usual.clone() };
+        assert_eq!(decided(costs, &usual).verdict, Verdict::Explained);
+        let decision = decided(costs, &undone);
+        assert_eq!(decision.verdict, Verdict::Unexplained);
+        assert!(decision.named.iter().all(|n| n.probability <= 0.5 && !n.believed), "{:?}", decision.named);
     }
 
     #[test]

@@ -102,6 +102,15 @@ pub fn negligible(id: &str, share: f64) -> String {
     )
 }
 
+/// That two names only undo each other.
+pub fn cancelling(a: &str, b: &str) -> String {
+    let (a, b) = (plain(a), plain(b));
+    format!(
+        "{} and {b} mostly undo each other: what is left of both may be one thing that is neither",
+        capital(&a)
+    )
+}
+
 /// Coefficients that the baseline's fit needs far from what the rig states: a symptom even where the fit
 /// is good.
 pub fn strained(baseline: &Fit) -> Option<String> {

@@ -9,6 +9,7 @@ use kort_identify::thin::Thin;
 use kort_thruster::effects::Path;
 use kort_thruster::rig::Rig;
 
+use crate::cancelling::cancelling;
 use crate::decide::{Circumstances, Decision, Named, decide};
 use crate::diagnose::Options;
 use crate::experiment::{self, Open};
@@ -125,6 +126,7 @@ impl<'a, 'p> Writer<'a, 'p> {
             thin: thin.clone(),
             unparted: crate::unparted::unparted(self.search, &self.best),
             steady: left::steady(problem, &self.last, &actions),
+            cancelling: cancelling(problem, &self.last, &actions),
             broke_down: false,
             left,
             more_than_noise: rest.is_some(),
@@ -231,6 +233,7 @@ impl<'a, 'p> Writer<'a, 'p> {
             notes.insert(0, thin.why.clone());
         }
         notes.extend(negligible.iter().map(|(id, share)| words::negligible(id, *share)));
+        notes.extend(circumstances.cancelling.iter().map(|(a, b)| words::cancelling(a, b)));
         notes.extend(words::strained(self.baseline));
         notes.extend(words::left_aside(self.series, problem, decision.verdict, self.rig));
         let std_baseline = problem.standard_errors(self.baseline);

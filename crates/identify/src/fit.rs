@@ -221,18 +221,20 @@ impl Problem<'_> {
     /// is said of what has no size.
     pub fn actions(&self, fit: &Fit) -> Vec<Vec<f64>> {
         let all = self.members(&fit.hypothesis, &fit.values);
-        (0..all.len())
-            .map(|without| {
-                if !all[without].has_size(&self.scale) {
-                    return vec![0.0; self.spectrum.bands.len()];
-                }
-                let rest: Vec<Member> =
-                    all.iter().enumerate().filter(|(i, _)| *i != without).map(|(_, m)| m.clone()).collect();
-                let (smaller, _) = self.recompose(fit, &rest);
-                let lines = self.residual_lines(&smaller, &smaller.start);
-                self.spectrum.powers(&(lines - &fit.lines))
-            })
-            .collect()
+        let of = |k: usize| match all[k].has_size(&self.scale) {
+            true => self.action_of(fit, &[k]),
+            false => vec![0.0; self.spectrum.bands.len()],
+        };
+        (0..all.len()).map(of).collect()
+    }
+
+    /// What some effects of a fit, by their places in it, do to the response together.
+    pub fn action_of(&self, fit: &Fit, places: &[usize]) -> Vec<f64> {
+        let all = self.members(&fit.hypothesis, &fit.values);
+        let rest = all.into_iter().enumerate().filter(|(i, _)| !places.contains(i)).map(|(_, m)| m);
+        let (smaller, _) = self.recompose(fit, &rest.collect::<Vec<Member>>());
+        let lines = self.residual_lines(&smaller, &smaller.start);
+        self.spectrum.powers(&(lines - &fit.lines))
     }
 
     /// The same baseline, at a fit's values, with other members; derivatives that carry over come with it.
