@@ -2,10 +2,14 @@
 //!
 //! A command that changes often changes within gaps too, and nobody wrote it down: until its trace has died away
 //! the rows after such a gap tell nothing. How long that is the stated rig tells: two simulations, one with the
-//! command straight across the gap and one with it at its far end, and the rows on which they differ.
+//! command straight across the gap and one with it at its far end, and the rows on which they differ. Where a measured
+//! current, speed or power drives, what it did while it had no samples is as unknown: it may have gone straight from
+//! one to the next or have stood and jumped.
 
-use crate::data::{Driving, Prepared};
-use crate::hypothesis::{Hypothesis, Inputs};
+use kort_thruster::plant::Driven;
+
+use crate::data::Prepared;
+use crate::hypothesis::Hypothesis;
 use crate::simulate::Problem;
 use crate::spectrum::median_interval;
 
@@ -16,16 +20,24 @@ const MISSED: f64 = 0.1;
 /// Difference of the two simulations that still counts, over full scale: noise of a good sensor.
 const SHOWS: f64 = 0.01;
 
+/// Rows of samples of a column between which it has none for longer than usual.
+pub fn unsampled(time_s: &[f64], column: &[f64]) -> Vec<(usize, usize)> {
+    let known: Vec<usize> = (0..column.len()).filter(|row| column[*row].is_finite()).collect();
+    let usual_s = median_interval(&known.iter().map(|row| time_s[*row]).collect::<Vec<f64>>());
+    let long = |w: &&[usize]| time_s[w[1]] - time_s[w[0]] > GAP_INTERVALS * usual_s;
+    known.windows(2).filter(long).map(|w| (w[0], w[1])).collect()
+}
+
 impl Prepared {
     /// Whether the log misses rows just before this one.
     fn after_gap(&self, row: usize, usual_s: f64) -> bool {
         row > 0 && self.time_s[row] - self.time_s[row - 1] > GAP_INTERVALS * usual_s
     }
 
-    /// Gaps in which a change of the command may have been missed, by the rows they lie between.
+    /// Gaps in which a change of what drives may have been missed, by the rows they lie between.
     fn silent(&self) -> Vec<(usize, usize)> {
-        if !matches!(self.driving, Driving::Command(_)) {
-            return Vec::new();
+        if self.is_driven_by_a_sensor() {
+            return self.unsampled.iter().copied().filter(|gap| !self.after_pause(gap.1)).collect();
         }
         let usual_s = median_interval(&self.time_s);
         let turns = self.command.windows(3).filter(|w| (w[1] - w[0]) * (w[2] - w[1]) < 0.0).count();
@@ -37,19 +49,31 @@ impl Prepared {
             .collect()
     }
 
-    /// The command, at its far end between these rows.
-    fn otherwise(&self, commands: &[f64], silent: &[(usize, usize)]) -> Vec<f64> {
+    /// What drives, as it may have been between these rows: a command at its far end, what was measured as it was before.
+    /// `commands` are those of the control grid.
+    fn drive_across(&mut self, commands: &mut [f64], silent: &[(usize, usize)]) {
         let (low, high) =
             commands.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), c| (l.min(*c), h.max(*c)));
-        let mut other = commands.to_vec();
+        let measured = self.is_driven_by_a_sensor();
         for (before, after) in silent {
-            let tick = |k: usize| self.stimulus.logs[k].0.min(other.len());
+            let tick = |k: usize| self.stimulus.logs[k].0.min(commands.len());
             let (from, to) = (tick(*before), tick(*after));
-            for command in &mut other[from..to] {
-                *command = if *command - low > high - *command { low } else { high };
+            let Some((first, was)) = commands.get(from).copied().zip(self.stimulus.ticks.get(from)) else {
+                continue;
+            };
+            let was = was.driven;
+            for command in &mut commands[from..to] {
+                let far = if *command - low > high - *command { low } else { high };
+                *command = if measured { first } else { far };
+            }
+            for tick in &mut self.stimulus.ticks[from..to] {
+                tick.driven = match was {
+                    Driven::Speed(a, _) => Driven::Speed(a, a),
+                    Driven::Power(a, _) => Driven::Power(a, a),
+                    by_command => by_command,
+                };
             }
         }
-        other
     }
 }
 
@@ -66,9 +90,14 @@ impl Hidden {
     pub fn words(&self, recordings: &[Prepared]) -> Vec<String> {
         let line = |((recording, rows), gaps): ((&Prepared, &Vec<bool>), &usize)| {
             let left_out = rows.iter().filter(|hidden| **hidden).count();
-            (*gaps > 0).then(|| {
+            let lost = if recording.is_driven_by_a_sensor() {
+                format!("{} has no samples in {gaps} gaps", recording.driving.column())
+            } else {
+                format!("the command changes so often that some of it is lost in {gaps} gaps")
+            };
+            (left_out > 0).then(|| {
                 format!(
-                    "{}: the command changes so often that some of it is lost in {gaps} gaps; {left_out} rows after them, on which that may still show, are left out",
+                    "{}: {lost}; {left_out} rows in and after them, on which that may still show, are left out",
                     recording.name
                 )
             })
@@ -90,11 +119,12 @@ impl Problem<'_> {
         if silent.iter().all(Vec::is_empty) {
             return None;
         }
-        let commands = self.recordings.iter().zip(&stated.inputs.commands).zip(silent);
-        let commands = commands.map(|((r, commands), silent)| r.otherwise(commands, silent)).collect();
-        let inputs = Inputs { edges: stated.inputs.edges.clone(), commands };
+        let (mut otherwise, mut inputs) = (self.clone(), stated.inputs.as_ref().clone());
+        let driven = otherwise.recordings.iter_mut().zip(&mut inputs.commands);
+        driven.zip(silent).for_each(|((recording, commands), gaps)| recording.drive_across(commands, gaps));
         let other = Hypothesis { inputs: inputs.into(), ..stated.clone() };
-        let (straight, other) = (self.respond(stated, &stated.start), self.respond(&other, &stated.start));
+        let straight = self.respond(stated, &stated.start);
+        let other = otherwise.respond(&other, &stated.start);
         let mut rows: Vec<Vec<bool>> = self.recordings.iter().map(|r| vec![false; r.time_s.len()]).collect();
         for (r, recording) in self.recordings.iter().enumerate() {
             for (c, channel) in recording.channels.iter().enumerate() {
@@ -145,6 +175,42 @@ mod tests {
         // The first row after the gap is 501.
         assert_eq!(left_out.first(), Some(&501));
         assert!((3..15).contains(&left_out.len()), "{left_out:?}");
+    }
+
+    /// The same motor under its measured current, which has no samples in these rows; it steps once, at row 520.
+    fn hidden_of_current(without: std::ops::Range<usize>) -> Option<Hidden> {
+        let time_s: Vec<f64> = (0..1000).map(|k| 0.01 * f64::from(k)).collect();
+        let of = |k: usize| {
+            if without.contains(&k) {
+                f64::NAN
+            } else if k < 520 {
+                0.2
+            } else {
+                -0.3
+            }
+        };
+        let speed = (0..1000).map(|k| (f64::from(k) * 0.7).sin()).collect();
+        let columns =
+            vec![("current_a".into(), (0..1000).map(of).collect()), ("shaft_speed_rad_s".into(), speed)];
+        let series = [Series { name: "log".into(), time_s, columns }];
+        let rig = Rig::from_toml(&format!("{RIG}[load]\nkind = \"fan\"\nfan_coefficient_nm_s2 = 0.0005\n"))
+            .unwrap();
+        let criterion =
+            Criterion { form_error: 0.01, own_form_error: 0.1, facts_a_band: 10.0, timing_s: 0.001 };
+        let setup = Setup::new(&series, &rig, ModelName::Model2, criterion).unwrap();
+        setup.problem.hidden_by_gaps(&setup.baseline)
+    }
+
+    #[test]
+    fn what_a_measured_current_did_without_samples_is_left_out_where_it_shows() {
+        let left_out = |without| {
+            let hidden = hidden_of_current(without)?;
+            Some((0..1000).filter(|row| hidden.rows[0][*row]).collect::<Vec<usize>>())
+        };
+        let step = left_out(501..540).expect("samples are missing");
+        assert!((500..545).contains(step.first().unwrap()) && step.len() > 20, "{step:?}");
+        assert_eq!(left_out(401..440), Some(Vec::new()), "it stood throughout");
+        assert_eq!(left_out(519..521), None, "no more than usual");
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use kort_thruster::plant::{Leap, Stimulus};
 use kort_thruster::rig::{AmplifierKind, Rig};
 
+use crate::gaps::unsampled;
 use crate::refuse;
 
 mod channel;
@@ -169,6 +170,8 @@ pub struct Prepared {
     pub pause_s: f64,
     /// Pauses that are passed over without ticks, in order.
     pub leaps: Vec<Leap>,
+    /// Where what drives was measured: rows between which it has no samples for longer than usual.
+    pub unsampled: Vec<(usize, usize)>,
     /// Shaft speed at each row, where it drives.
     pub speed_between: Vec<f64>,
     /// The column that is laid beside the inputs as a possible driver of what is left.
@@ -279,6 +282,11 @@ impl Prepared {
             before: None,
             pause_s: pause_s(&series.time_s),
             leaps: Vec::new(),
+            unsampled: if matches!(driving, Driving::Command(_)) {
+                Vec::new()
+            } else {
+                unsampled(&series.time_s, column)
+            },
             speed_between: Vec::new(),
             extra: None,
             supply_held: Vec::new(),
