@@ -82,8 +82,9 @@ fn while_somebody_holds_the_lease_every_change_needs_it() {
         let (status, answer) = ask(port, "POST", "/v1/stop", &[], "");
         assert_eq!((status, &answer["stopped"]), (200, &json!(["t1"])));
         assert_eq!(stack.state().unwrap()["armed"], false);
-        // One event for all of it, and one of the disarming before.
+        // One event for all of it, and one of the disarming before: the answer does not wait for what is told.
         let told = |kind: &str| told(&stack, kind);
+        common::wait("the disarming is told", || (!told("disarmed").is_empty()).then_some(()));
         assert_eq!((told("stopped").len(), told("disarmed").len()), (1, 1));
         assert_eq!(
             told("stopped")[0]["detail"],
