@@ -221,10 +221,8 @@ impl Problem<'_> {
     /// is said of what has no size.
     pub fn actions(&self, fit: &Fit) -> Vec<Vec<f64>> {
         let all = self.members(&fit.hypothesis, &fit.values);
-        let of = |k: usize| match all[k].has_size(&self.scale) {
-            true => self.action_of(fit, &[k]),
-            false => vec![0.0; self.spectrum.bands.len()],
-        };
+        let none = || vec![0.0; self.spectrum.bands.len()];
+        let of = |k: usize| if all[k].has_size(&self.scale) { self.action_of(fit, &[k]) } else { none() };
         (0..all.len()).map(of).collect()
     }
 

@@ -151,6 +151,17 @@ mod tests {
     const RIG: &str = "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = 0.01\ntorque_constant_nm_a = 1.0\n\
                        winding_resistance_ohm = 1.0\n[amplifier]\nkind = \"voltage\"\n";
 
+    /// Of a log of what drives and of the shaft's speed.
+    fn hidden_in(rig: &str, time_s: Vec<f64>, driving: (&str, Vec<f64>), speed: Vec<f64>) -> Option<Hidden> {
+        let columns = vec![(driving.0.into(), driving.1), ("shaft_speed_rad_s".into(), speed)];
+        let series = [Series { name: "log".into(), time_s, columns }];
+        let rig = Rig::from_toml(rig).unwrap();
+        let criterion =
+            Criterion { form_error: 0.01, own_form_error: 0.1, facts_a_band: 10.0, timing_s: 0.001 };
+        let setup = Setup::new(&series, &rig, ModelName::Model2, criterion).unwrap();
+        setup.problem.hidden_by_gaps(&setup.baseline)
+    }
+
     /// A motor that settles within tens of milliseconds, reversed every `dwell` rows of 10 ms; 9 rows are missing
     /// after row 500.
     fn hidden(dwell: usize) -> Option<Hidden> {
@@ -159,13 +170,7 @@ mod tests {
         let command: Vec<f64> =
             rows.iter().map(|k| if (k / dwell).is_multiple_of(2) { 5.0 } else { -5.0 }).collect();
         let speed = rows.iter().map(|k| (*k as f64 * 0.7).sin()).collect();
-        let columns = vec![("voltage_cmd_v".into(), command), ("shaft_speed_rad_s".into(), speed)];
-        let series = [Series { name: "log".into(), time_s, columns }];
-        let rig = Rig::from_toml(RIG).unwrap();
-        let criterion =
-            Criterion { form_error: 0.01, own_form_error: 0.1, facts_a_band: 10.0, timing_s: 0.001 };
-        let setup = Setup::new(&series, &rig, ModelName::Model2, criterion).unwrap();
-        setup.problem.hidden_by_gaps(&setup.baseline)
+        hidden_in(RIG, time_s, ("voltage_cmd_v", command), speed)
     }
 
     #[test]
@@ -190,15 +195,8 @@ mod tests {
             }
         };
         let speed = (0..1000).map(|k| (f64::from(k) * 0.7).sin()).collect();
-        let columns =
-            vec![("current_a".into(), (0..1000).map(of).collect()), ("shaft_speed_rad_s".into(), speed)];
-        let series = [Series { name: "log".into(), time_s, columns }];
-        let rig = Rig::from_toml(&format!("{RIG}[load]\nkind = \"fan\"\nfan_coefficient_nm_s2 = 0.0005\n"))
-            .unwrap();
-        let criterion =
-            Criterion { form_error: 0.01, own_form_error: 0.1, facts_a_band: 10.0, timing_s: 0.001 };
-        let setup = Setup::new(&series, &rig, ModelName::Model2, criterion).unwrap();
-        setup.problem.hidden_by_gaps(&setup.baseline)
+        let fan = format!("{RIG}[load]\nkind = \"fan\"\nfan_coefficient_nm_s2 = 0.0005\n");
+        hidden_in(&fan, time_s, ("current_a", (0..1000).map(of).collect()), speed)
     }
 
     #[test]

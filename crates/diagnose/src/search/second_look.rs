@@ -5,9 +5,11 @@
 //! that the recordings tell: where a set with more names, held to a quarter of the excuse, costs less than the best one
 //! under all of it, the forms were as exact as that.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use kort_identify::fit::Fit;
 
-use super::{MOST_EFFECTS, Search, Set};
+use super::{MOST_EFFECTS, Search, Set, words};
 
 impl Search<'_, '_> {
     /// Climbs on from a set with less excuse for what explains the mismatch. Where that leads to more names at less cost, every
@@ -16,7 +18,7 @@ impl Search<'_, '_> {
         if best.is_empty() {
             return best;
         }
-        progress(&format!("once more, on top of {}", super::words(&best)));
+        progress(&format!("once more, on top of {}", words(&best)));
         let share = self.constants.closer;
         let mut closer = self.held_closer(&best, share);
         let mut found = best.clone();
@@ -50,12 +52,12 @@ impl Search<'_, '_> {
             problem: self.problem,
             effects: self.effects.clone(),
             fits: kept.map(|(set, fit)| (set.clone(), self.problem.finish(closer_of(fit, share)))).collect(),
-            screens: std::collections::BTreeMap::new(),
-            begun_from: std::collections::BTreeSet::new(),
-            dropped: std::collections::BTreeMap::new(),
-            reshaped: std::collections::BTreeSet::new(),
+            screens: BTreeMap::new(),
+            begun_from: BTreeSet::new(),
+            dropped: BTreeMap::new(),
+            reshaped: BTreeSet::new(),
             barred: Set::new(),
-            exchanged: std::collections::BTreeSet::new(),
+            exchanged: BTreeSet::new(),
             probes: self.probes.clone(),
             ways: self.ways.clone(),
             floors: floors.collect(),
