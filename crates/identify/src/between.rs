@@ -71,8 +71,8 @@ impl Problem<'_> {
 
 impl Prepared {
     /// Ticks before its row at which each step lies halfway between rows.
-    fn halfway(&self) -> Vec<usize> {
-        self.edges.iter().map(|row| self.ticks_before(*row) / 2).collect()
+    fn halfway(&self) -> Vec<f64> {
+        self.edges.iter().map(|row| (self.ticks_before(*row) / 2) as f64).collect()
     }
 
     /// What drives, on another course that its samples allow as well: from sample to sample by a jump at an instant
@@ -94,7 +94,7 @@ impl Prepared {
             let step = self.edges.binary_search(&(row + 1)).ok();
             if let Some(step) = step {
                 // From a step on the command stands, or returns.
-                let remaining = ((self.time_s[row + 1] - tick.time_s) / self.tick_s).round() as usize;
+                let remaining = ((self.time_s[row + 1] - tick.time_s) / self.tick_s).round();
                 if remaining <= halfway[step] {
                     *command = self.command[row + 1];
                 }

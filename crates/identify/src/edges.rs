@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use crate::data::{Channel, Driving, Prepared};
 use crate::fit::Fit;
-use crate::hypothesis::{Hypothesis, Inputs, Target};
+use crate::hypothesis::{Edges, Hypothesis, Inputs, Target};
 use crate::simulate::Problem;
 
 /// Rows after an edge that decide where it was.
@@ -20,6 +20,8 @@ const MOST_PLACES: usize = 24;
 /// Places about its own that are tried for a step that was placed before; its own comes first, and stays where it does
 /// as well.
 const NEAR: [isize; 7] = [0, -1, 1, -2, 2, -4, 4];
+/// By how much less a step must cost between two ticks, in squares of noise: two standard deviations.
+const PARTED: f64 = 4.0;
 /// Least noise of a channel over its full scale: rounding of a log.
 const LEAST: f64 = 1e-4;
 
@@ -42,7 +44,7 @@ impl Problem<'_> {
         let noises = self.noises(fit);
         let before = &fit.hypothesis.inputs.edges;
         // All edges are moved together, each over its own places.
-        let tried: Vec<Vec<Vec<usize>>> = if reach == Reach::All || places <= NEAR.len() {
+        let tried: Vec<Edges> = if reach == Reach::All || places <= NEAR.len() {
             let at = |place| self.recordings.iter().map(|r| r.edges_at(place)).collect();
             (0..places).map(at).collect()
         } else {
@@ -63,8 +65,9 @@ impl Problem<'_> {
         let mut edges = before.clone();
         for (r, _) in self.recordings.iter().enumerate().filter(|(_, r)| movable(r)) {
             for (e, ticks) in edges[r].iter_mut().enumerate() {
-                let best = (0..tried.len()).min_by(|a, b| costs[*a][r][e].total_cmp(&costs[*b][r][e]));
-                *ticks = best.map_or(*ticks, |best| tried[best][r][e]);
+                let places: Vec<(f64, f64)> =
+                    tried.iter().zip(&costs).map(|(at, costs)| (at[r][e], costs[r][e])).collect();
+                *ticks = best_place(&places).unwrap_or(*ticks);
             }
         }
         (edges != *before).then(|| Inputs::new(&self.recordings, edges))
@@ -78,8 +81,8 @@ impl Problem<'_> {
         for (r, recording) in self.recordings.iter().enumerate().filter(|(_, r)| r.driving != Driving::Speed)
         {
             for (row, ticks) in recording.edges.iter().zip(&mut edges[r]) {
-                let moved = if earlier { *ticks + 1 } else { ticks.saturating_sub(1) };
-                *ticks = moved.min(recording.ticks_before(*row) - 1);
+                let moved = if earlier { *ticks + 1.0 } else { *ticks - 1.0 };
+                *ticks = moved.clamp(0.0, recording.ticks_before(*row) as f64 - 1.0);
             }
         }
         if edges == *before {
@@ -172,27 +175,50 @@ impl Prepared {
     }
 
     /// Ticks before its row at which a step lies in one of its places.
-    fn edge_at(&self, edge: usize, place: usize) -> usize {
+    fn edge_at(&self, edge: usize, place: usize) -> f64 {
         let (ticks, places) = (self.ticks_before(self.edges[edge]), self.places());
         let place = place.min(places - 1);
-        if ticks <= places { place.min(ticks - 1) } else { place * (ticks - 1) / (places - 1).max(1) }
+        let ticks =
+            if ticks <= places { place.min(ticks - 1) } else { place * (ticks - 1) / (places - 1).max(1) };
+        ticks as f64
     }
 
     /// All steps so many places further from their rows.
-    fn edges_moved(&self, before: &[usize], by: isize) -> Vec<usize> {
+    fn edges_moved(&self, before: &[f64], by: isize) -> Vec<f64> {
         let last = self.places() - 1;
-        let moved = |(edge, ticks): (usize, &usize)| {
-            let now = (0..=last).min_by_key(|place| self.edge_at(edge, *place).abs_diff(*ticks));
-            let to = now.unwrap_or(0).saturating_add_signed(by).min(last);
-            if by == 0 { *ticks } else { self.edge_at(edge, to) }
+        let moved = |(edge, ticks): (usize, &f64)| {
+            let off = |place: &usize| (self.edge_at(edge, *place) - ticks).abs();
+            let now = (0..=last).min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(0);
+            // A step between two places keeps its part of a tick.
+            let part = ticks - self.edge_at(edge, now);
+            let to = self.edge_at(edge, now.saturating_add_signed(by).min(last)) + part;
+            to.clamp(0.0, self.edge_at(edge, last))
         };
         before.iter().enumerate().map(moved).collect()
     }
 
     /// All steps in one of their places.
-    fn edges_at(&self, place: usize) -> Vec<usize> {
+    fn edges_at(&self, place: usize) -> Vec<f64> {
         (0..self.edges.len()).map(|edge| self.edge_at(edge, place)).collect()
     }
+}
+
+/// The place of a step that costs least, of those that were tried with their costs, the first of equals: between them
+/// where a parabola through it and its neighbours is [`PARTED`] lower. Commands need not come with the control's ticks,
+/// and a bus does not take equally long for each.
+fn best_place(tried: &[(f64, f64)]) -> Option<f64> {
+    let (best, least) = tried.iter().copied().min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let beside = |after: bool| {
+        let there = tried.iter().filter(|(at, _)| if after { *at > best } else { *at < best });
+        there.min_by(|a, b| (a.0 - best).abs().total_cmp(&(b.0 - best).abs()))
+    };
+    let (Some(before), Some(after)) = (beside(false), beside(true)) else { return Some(best) };
+    let slope = |there: &(f64, f64)| (there.1 - least) / (there.0 - best);
+    // The parabola's value is `least + about * x + bend * x^2` at a distance `x`.
+    let bend = (slope(after) - slope(before)) / (after.0 - before.0);
+    let about = slope(after) - bend * (after.0 - best);
+    let lower = 0.25 * about * about / bend;
+    Some(if lower > PARTED { best - 0.5 * about / bend } else { best })
 }
 
 fn edge_costs(recording: &Prepared, residual: &[Vec<f64>], noises: &[Persistent]) -> Vec<f64> {
@@ -215,7 +241,7 @@ mod tests {
 
     use kort_thruster::models::ModelName;
 
-    use super::edge_costs;
+    use super::{best_place, edge_costs};
     use crate::data::{Prepared, Series};
     use crate::edges::Persistent;
     use crate::noise::Criterion;
@@ -241,14 +267,35 @@ mod tests {
         assert_eq!(recording.edges, [50, 150]);
         let hidden = recording.hidden_between_rows().unwrap();
         assert!(hidden.contains("2 of 2 steps") && hidden.contains("0.260 s"), "{hidden}");
-        let places: Vec<Vec<usize>> = (0..recording.places()).map(|p| recording.edges_at(p)).collect();
-        let first: Vec<usize> = places.iter().map(|p| p[0]).collect();
-        let in_gap: Vec<usize> = places.iter().map(|p| p[1]).collect();
+        let places: Vec<Vec<f64>> = (0..recording.places()).map(|p| recording.edges_at(p)).collect();
+        let first: Vec<f64> = places.iter().map(|p| p[0]).collect();
+        let in_gap: Vec<f64> = places.iter().map(|p| p[1]).collect();
         let ticks = recording.ticks_per_row;
-        assert!(first[..ticks].iter().copied().eq(0..ticks), "{first:?}");
-        assert_eq!((first.iter().max(), in_gap[0]), (Some(&(ticks - 1)), 0));
-        assert_eq!(in_gap.last(), Some(&(recording.ticks_before(150) - 1)), "{in_gap:?}");
+        assert!(first[..ticks].iter().copied().eq((0..ticks).map(|k| k as f64)), "{first:?}");
+        assert!(first[ticks..].iter().all(|at| *at == ticks as f64 - 1.0), "{first:?}");
+        assert_eq!(in_gap[0], 0.0);
+        assert_eq!(in_gap.last(), Some(&(recording.ticks_before(150) as f64 - 1.0)), "{in_gap:?}");
         assert!(in_gap.windows(2).all(|w| w[1] > w[0]) && in_gap.len() <= 24);
+    }
+
+    #[test]
+    fn a_step_lies_between_two_ticks_where_that_tells() {
+        let cost = |deep: f64, at: f64| 7.0 + deep * (at - 2.3).powi(2);
+        let tried = |deep| [2.0, 1.0, 3.0, 0.0, 4.0, 4.0].map(|at| (at, cost(deep, at)));
+        assert!((best_place(&tried(100.0)).unwrap() - 2.3).abs() < 1e-9);
+        assert_eq!(best_place(&tried(10.0)), Some(2.0), "0.9 squares of noise are none");
+        assert_eq!(best_place(&[(0.0, 1.0), (1.0, 9.0), (2.0, 30.0)]), Some(0.0), "nothing beside it");
+        assert_eq!(best_place(&[(3.0, 1.0), (2.0, 1.0), (4.0, 1.0)]), Some(3.0), "it stays");
+        assert_eq!(best_place(&[]), None);
+        let recording = prepared();
+        let commands = |before: f64| {
+            let first = recording.stimulus.logs[50].0;
+            recording.commands(&[before, 0.0])[first - 3..first].to_vec()
+        };
+        assert_eq!((commands(0.0), commands(2.0)), (vec![-1.0; 3], vec![-1.0, 1.0, 1.0]));
+        assert_eq!(commands(1.25), [-1.0, -0.5, 1.0]);
+        let moved = recording.edges_moved(&[1.25, 0.0], 1);
+        assert_eq!((moved[0], recording.edges_moved(&[1.25, 0.0], -4)[0]), (2.25, 0.0));
     }
 
     /// A motor under steps at control ticks within the log's intervals, whose angle and filtered speed are read half a
@@ -304,8 +351,11 @@ mod tests {
         let truth: Vec<usize> = changes.map(|k| k.div_ceil(every) * every - k).collect();
         let recording = &problem.recordings[0];
         assert_eq!(recording.edges.len(), truth.len());
-        let off =
-            found.hypothesis.inputs.edges[0].iter().zip(&truth).filter(|(a, b)| a.abs_diff(**b) > 0).count();
+        let off = found.hypothesis.inputs.edges[0]
+            .iter()
+            .zip(&truth)
+            .filter(|(a, b)| (**a - **b as f64).abs() > 0.5);
+        let off = off.count();
         assert!(off * 10 < truth.len(), "{off} of {}", truth.len());
     }
 

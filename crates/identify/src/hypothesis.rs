@@ -151,9 +151,9 @@ impl Member {
     }
 }
 
-/// Where inside its log interval each step of the command happened: control ticks before the row that
-/// first shows it, by recording and edge.
-pub type Edges = Vec<Vec<usize>>;
+/// Where inside its log interval each step of the command happened: control ticks, and parts of one, before the row
+/// that first shows it, by recording and edge.
+pub type Edges = Vec<Vec<f64>>;
 
 /// The command on the control grid, with its steps where `edges` says.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -173,7 +173,7 @@ impl Inputs {
 
     /// Every step at the row that first shows it.
     pub fn late(recordings: &[Prepared]) -> Self {
-        Self::new(recordings, recordings.iter().map(|r| vec![0; r.edges.len()]).collect())
+        Self::new(recordings, recordings.iter().map(|r| vec![0.0; r.edges.len()]).collect())
     }
 }
 

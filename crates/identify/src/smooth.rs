@@ -32,7 +32,7 @@ impl Prepared {
         let [speed, flow, current, angle] = self.start;
         plant.start(self.time_s[0], speed, flow, current, angle);
         let (mut course, mut decay) = (vec![[speed, flow, current]], Vec::new());
-        let commands = self.commands(&vec![0; self.edges.len()]);
+        let commands = self.commands(&vec![0.0; self.edges.len()]);
         let mut leaps = self.leaps.iter().peekable();
         for (i, (tick, command)) in self.stimulus.ticks.iter().zip(&commands).enumerate() {
             if let Some(leap) = leaps.next_if(|leap| leap.tick == i) {

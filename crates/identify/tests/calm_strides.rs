@@ -70,7 +70,7 @@ fn a_step_moved_through_a_gap_acts_as_in_single_ticks() {
     let after_gap = problem.recordings[0].edges.iter().position(|row| kept[*row] == 403).unwrap();
     for ticks in (0..110).step_by(10) {
         let mut edges = baseline.inputs.edges.clone();
-        edges[0][after_gap] = ticks;
+        edges[0][after_gap] = f64::from(ticks);
         let inputs = Arc::new(Inputs::new(&problem.recordings, edges));
         let apart = apart(&problem, &single, &Hypothesis { inputs, ..baseline.clone() });
         assert!(apart < 2e-3, "{ticks} ticks before its row: {apart}");

@@ -6,8 +6,8 @@ use super::fill::catmull_rom;
 
 impl Prepared {
     /// The command, or the measured current that drives in its place, at every control tick, where its edges came so
-    /// many ticks before their rows.
-    pub fn commands(&self, ticks_before: &[usize]) -> Vec<f64> {
+    /// many ticks before their rows. A tick in which one came has the mean of what was before it and after.
+    pub fn commands(&self, ticks_before: &[f64]) -> Vec<f64> {
         let ticks = self.stimulus.ticks.len();
         if matches!(self.driving, Driving::Speed | Driving::Power) {
             return vec![0.0; ticks];
@@ -18,7 +18,7 @@ impl Prepared {
         let n = c.len();
         // What returns from a jump came no further than the drive lets anything come.
         let (least, most) = c.iter().fold((0.0_f64, 0.0_f64), |(low, high), v| (low.min(*v), high.max(*v)));
-        let mut edge_at: Vec<Option<usize>> = vec![None; n + 2];
+        let mut edge_at: Vec<Option<f64>> = vec![None; n + 2];
         self.edges.iter().zip(ticks_before).for_each(|(row, before)| edge_at[*row] = Some(*before));
         let mut row = 0;
         let mut commands = Vec::with_capacity(ticks);
@@ -31,11 +31,13 @@ impl Prepared {
             commands.push(match edge_at[row + 1] {
                 None if self.row_means => b,
                 Some(before) => {
-                    let remaining = ((self.time_s[row + 1] - t) / self.tick_s).round() as usize;
-                    if remaining <= before {
+                    let remaining = ((self.time_s[row + 1] - t) / self.tick_s).round();
+                    let share = (before + 1.0 - remaining).clamp(0.0, 1.0);
+                    if share > 0.0 {
                         let interval_s = self.time_s[row + 1] - self.time_s[row];
                         let rows = (self.time_s[row + 1] - t - at_tick_s) / interval_s;
-                        before_its_row(c, row + 1, rows.max(0.0)).clamp(least, most)
+                        let after = before_its_row(c, row + 1, rows.max(0.0)).clamp(least, most);
+                        a + (after - a) * share
                     } else {
                         a
                     }
