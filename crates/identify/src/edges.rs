@@ -191,8 +191,12 @@ impl Prepared {
             let now = (0..=last).min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(0);
             // A step between two places keeps its part of a tick.
             let part = ticks - self.edge_at(edge, now);
-            let to = self.edge_at(edge, now.saturating_add_signed(by).min(last)) + part;
-            to.clamp(0.0, self.edge_at(edge, last))
+            let (first, end) = (0.0, self.edge_at(edge, last));
+            match now.checked_add_signed(by) {
+                None => first,
+                Some(to) if to > last => end,
+                Some(to) => (self.edge_at(edge, to) + part).clamp(first, end),
+            }
         };
         before.iter().enumerate().map(moved).collect()
     }
@@ -294,8 +298,10 @@ mod tests {
         };
         assert_eq!((commands(0.0), commands(2.0)), (vec![-1.0; 3], vec![-1.0, 1.0, 1.0]));
         assert_eq!(commands(1.25), [-1.0, -0.5, 1.0]);
-        let moved = recording.edges_moved(&[1.25, 0.0], 1);
-        assert_eq!((moved[0], recording.edges_moved(&[1.25, 0.0], -4)[0]), (2.25, 0.0));
+        let last = recording.ticks_per_row as f64 - 1.0;
+        let moved = |from: f64, by| recording.edges_moved(&[from, 0.0], by)[0];
+        assert_eq!((moved(1.25, 1), moved(1.25, 0), moved(1.25, -4)), (2.25, 1.25, 0.0));
+        assert_eq!((moved(last - 0.4, 0), moved(last - 0.4, 1)), (last - 0.4, last));
     }
 
     /// A motor under steps at control ticks within the log's intervals, whose angle and filtered speed are read half a
