@@ -185,8 +185,9 @@ impl Prepared {
 
     /// All steps so many places further from their rows.
     fn edges_moved(&self, before: &[f64], by: isize) -> Vec<f64> {
-        let last = self.places() - 1;
+        let places = self.places();
         let moved = |(edge, ticks): (usize, &f64)| {
+            let last = self.ticks_before(self.edges[edge]).min(places) - 1;
             let off = |place: &usize| (self.edge_at(edge, *place) - ticks).abs();
             let now = (0..=last).min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(0);
             // A step between two places keeps its part of a tick.
