@@ -13,6 +13,7 @@ mod experiment;
 pub mod flexible;
 mod follows;
 mod left;
+mod left_aside;
 mod load_steps;
 mod locate;
 mod nameless;

@@ -2,12 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use kort_identify::data::Series;
 use kort_identify::fit::Fit;
 use kort_identify::scores::{self, ChannelReport, HeldOut, ParameterReport, parameters};
 use kort_identify::simulate::{Problem, Stack};
-use kort_thruster::effects::{Descriptor, speaks_of_a_gear};
-use kort_thruster::rig::Rig;
+use kort_thruster::effects::Descriptor;
 
 use crate::choices::choices;
 use crate::flexible;
@@ -135,59 +133,6 @@ pub fn strained(baseline: &Fit) -> Option<String> {
             far.join(", ")
         )
     })
-}
-
-/// Columns that were not used, and what was not looked for.
-pub fn left_aside(
-    series: &[Series],
-    problem: &Problem,
-    verdict: Verdict,
-    rig: &Rig,
-) -> impl Iterator<Item = String> + use<> {
-    unused(series, problem).into_iter().chain(gearless(verdict, rig)).chain(swinging(verdict, problem))
-}
-
-/// What is not looked for since the shaft made no whole turn, where something is left.
-fn swinging(verdict: Verdict, problem: &Problem) -> Option<String> {
-    let whole = problem.scale.turned_rad >= std::f64::consts::TAU;
-    (!whole && verdict != Verdict::NoMismatch).then(|| {
-        "an eccentric encoder and friction by position are not looked for: the shaft made no whole turn, so nothing tells that what follows its angle comes again. Record one if it may turn. A weight that hangs on it belongs into the rig's [load]".into()
-    })
-}
-
-/// What is not looked for because nobody speaks of it, where a dry shaft leaves something.
-fn gearless(verdict: Verdict, rig: &Rig) -> Option<String> {
-    let dry = rig.propeller.is_none() && verdict != Verdict::NoMismatch;
-    (dry && !speaks_of_a_gear(rig)).then(|| {
-        "play and load-dependent friction of a gear are not looked for: neither name nor class of the rig speaks of a gear, belt or screw. If there is one, say so in rig.class".into()
-    })
-}
-
-/// Columns that were not used.
-fn unused(series: &[Series], problem: &Problem) -> Option<String> {
-    let mut used: Vec<&str> = vec![
-        "time_s",
-        "torque_enable",
-        "ambient_m_s",
-        "shaft_angle_rad",
-        "supply_v",
-        "depth_m",
-        "temperature_c",
-    ];
-    for recording in &problem.recordings {
-        used.push(recording.driving.column());
-        used.extend(recording.channels.iter().map(|c| c.response.name()));
-        used.extend(recording.extra.as_deref());
-        used.extend(recording.is_loaded().then_some("torque_n_m"));
-    }
-    let mut left: Vec<&str> = series
-        .iter()
-        .flat_map(|s| s.columns.iter().map(|c| c.0.as_str()))
-        .filter(|name| !used.contains(name))
-        .collect();
-    left.sort_unstable();
-    left.dedup();
-    (!left.is_empty()).then(|| format!("columns not used: {}", left.join(", ")))
 }
 
 /// What a summary is told from.

@@ -15,6 +15,7 @@ use crate::diagnose::Options;
 use crate::experiment::{self, Open};
 use crate::flexible::is_term;
 use crate::left::{self, Rest};
+use crate::left_aside;
 use crate::load_steps;
 use crate::locate::{self, locate};
 use crate::place;
@@ -235,7 +236,7 @@ impl<'a, 'p> Writer<'a, 'p> {
         notes.extend(negligible.iter().map(|(id, share)| words::negligible(id, *share)));
         notes.extend(circumstances.cancelling.iter().map(|(a, b)| words::cancelling(a, b)));
         notes.extend(words::strained(self.baseline));
-        notes.extend(words::left_aside(self.series, problem, decision.verdict, self.rig));
+        notes.extend(left_aside::left_aside(self.series, problem, decision.verdict, self.rig));
         let std_baseline = problem.standard_errors(self.baseline);
         let baseline = Baseline {
             model: options.model.name().into(),
