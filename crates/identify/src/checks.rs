@@ -48,7 +48,7 @@ pub fn check(series: &Series, rig: &Rig) -> Checked {
             spikes(series, name, column, &mut out);
         }
     }
-    unsigned_speed(series, &mut out);
+    unsigned_speed(series, rig, &mut out);
     rest_bias(series, &mut out);
     gaps(series, &mut out);
     sparse_commands(series, &mut out);
@@ -177,8 +177,9 @@ const ASKED: [&str; 3] = ["voltage_cmd_v", "duty_cmd", "speed_cmd_rad_s"];
 /// Columns whose sign tells the direction, or that something brakes.
 const TAKEN: [&str; 3] = ["current_cmd_a", "current_a", "thrust_n"];
 
-fn unsigned_speed(series: &Series, out: &mut Checked) {
-    if is_unsigned_speed(series) {
+fn unsigned_speed(series: &Series, rig: &Rig, out: &mut Checked) {
+    let stated = rig.effects.iter().any(|known| known.effect == "unsigned_speed_sensor");
+    if is_unsigned_speed(series) && !stated {
         out.notes.push(format!(
             "{}: shaft_speed_rad_s is never negative although the drive reverses: an unsigned speed sensor, whose sign is taken from the model (unsigned_speed_sensor); a column map's sign_of gives it the command's",
             series.name
@@ -310,9 +311,15 @@ mod tests {
         Series { name: "log".into(), time_s, columns }
     }
 
-    fn notes(series: &Series) -> String {
-        let rig = "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = 0.01\ntorque_constant_nm_a = 1.0\n";
+    const RIG: &str =
+        "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = 0.01\ntorque_constant_nm_a = 1.0\n";
+
+    fn notes_on(series: &Series, rig: &str) -> String {
         check(series, &Rig::from_toml(rig).unwrap()).notes.join("\n")
+    }
+
+    fn notes(series: &Series) -> String {
+        notes_on(series, RIG)
     }
 
     #[test]
@@ -322,6 +329,8 @@ mod tests {
         assert!(is_unsigned_speed(&log(|s| if s > 0.0 { s } else { -0.01 }, |_| true)));
         assert!(!is_unsigned_speed(&log(|s| s, |_| true)));
         assert!(notes(&log(f64::abs, |_| true)).contains("unsigned_speed_sensor"));
+        let stated = format!("{RIG}[[effects]]\neffect = \"unsigned_speed_sensor\"\nunsigned = 1\n");
+        assert!(!notes_on(&log(f64::abs, |_| true), &stated).contains("unsigned_speed_sensor"));
         // A current that brakes reverses nothing where a command says which way the drive is to turn.
         let mut braked = log(f64::abs, |_| true);
         braked.columns.push(("voltage_cmd_v".into(), vec![4.0; braked.time_s.len()]));
