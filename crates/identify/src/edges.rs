@@ -6,11 +6,12 @@
 
 use std::sync::Arc;
 
+use kort_thruster::effects::Path;
 use rayon::prelude::*;
 
 use crate::data::{Channel, Driving, Prepared};
 use crate::fit::Fit;
-use crate::hypothesis::{Edges, Hypothesis, Inputs, Target};
+use crate::hypothesis::{Edges, Free, Hypothesis, Inputs, Target};
 use crate::simulate::Problem;
 
 /// Rows after an edge that decide where it was.
@@ -73,8 +74,8 @@ impl Problem<'_> {
         (edges != *before).then(|| Inputs::new(&self.recordings, edges))
     }
 
-    /// A fit's hypothesis with every step of the command a tick earlier or later, and every sensor read as much later or
-    /// earlier; none where no step can move so.
+    /// A fit's hypothesis with every step of the command a tick earlier or later, and its drive's delay as much longer or
+    /// shorter, or every sensor read as much later or earlier where it has none; none where no step can move so.
     pub fn a_tick_off(&self, fit: &Fit, earlier: bool) -> Option<Hypothesis> {
         let before = &fit.hypothesis.inputs.edges;
         let mut edges = before.clone();
@@ -91,8 +92,13 @@ impl Problem<'_> {
         let tick_s = self.scale.tick_s * if earlier { 1.0 } else { -1.0 };
         let mut hypothesis =
             Hypothesis { inputs: Arc::new(Inputs::new(&self.recordings, edges)), ..fit.resume() };
+        let delay = delay_of(&hypothesis);
+        let makes_up = |free: &Free| match delay {
+            Some(effect) => matches!(free.target, Target::Effect(i, _) if i == effect),
+            None => matches!(free.target, Target::Sampling { .. }),
+        };
         for (free, start) in hypothesis.free.iter().zip(&mut hypothesis.start) {
-            if matches!(free.target, Target::Sampling { .. }) {
+            if makes_up(free) {
                 *start = (*start + tick_s).clamp(free.low, free.high);
             }
         }
@@ -108,6 +114,11 @@ impl Problem<'_> {
             .map(|(r, left)| r.channels.iter().zip(left).map(|(c, left)| Persistent::of(c, left)).collect())
             .collect()
     }
+}
+
+/// Which of a hypothesis's effects lets the command come late.
+pub fn delay_of(hypothesis: &Hypothesis) -> Option<usize> {
+    hypothesis.effects.iter().position(|m| m.effect.shifts_time && m.effect.path == Path::Drive)
 }
 
 /// Noise that keeps a share of itself from one sample to the next: what a set without the right physics leaves lasts,

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::edges::Reach;
+use crate::edges::{Reach, delay_of};
 use crate::hypothesis::{Hypothesis, Member, Target};
 use crate::noise::{Floor, Noise};
 use crate::quadratic::Quadratic;
@@ -168,12 +168,23 @@ impl Problem<'_> {
             let Some(inputs) = self.place_edges(&stated, reach) else { break };
             placed.inputs = Arc::new(inputs);
         }
-        let mut best = self.settle(&placed, &Vec::new(), &self.floor, iterations);
-        // Steps are placed one by one for the instants at which the sensors are taken to be read; all of both may
-        // be a tick off together, which would pass for a delay of physics.
+        let best = self.settle_from_here(&placed, &Vec::new(), &self.floor, iterations);
+        self.settle_all_steps(best, iterations)
+    }
+
+    /// A fit to a finish: from its start, with the steps of the command placed for it, and its price known. A delay of the
+    /// drive is fitted to where the steps are, and they are placed for it: both may be off together.
+    pub fn settle(&self, hypothesis: &Hypothesis, known: &Columns, floor: &Floor, iterations: usize) -> Fit {
+        let fit = self.settle_from_here(hypothesis, known, floor, iterations);
+        if delay_of(hypothesis).is_some() { self.settle_all_steps(fit, iterations) } else { fit }
+    }
+
+    /// Steps are placed one by one, for the instants at which the sensors are taken to be read and for a delay; all of
+    /// them may be some ticks off together with those, which would pass for physics.
+    fn settle_all_steps(&self, mut best: Fit, iterations: usize) -> Fit {
         for earlier in [true, false] {
             while let Some(moved) = self.a_tick_off(&best, earlier) {
-                let next = self.settle(&moved, &best.columns, &best.floor, iterations);
+                let next = self.settle_from_here(&moved, &best.columns, &best.floor, iterations);
                 if next.cost() > best.cost() - ENOUGH {
                     break;
                 }
@@ -183,8 +194,13 @@ impl Problem<'_> {
         best
     }
 
-    /// A fit to a finish: from its start, with the steps of the command placed for it, and its price known.
-    pub fn settle(&self, hypothesis: &Hypothesis, known: &Columns, floor: &Floor, iterations: usize) -> Fit {
+    fn settle_from_here(
+        &self,
+        hypothesis: &Hypothesis,
+        known: &Columns,
+        floor: &Floor,
+        iterations: usize,
+    ) -> Fit {
         let mut fit = self.fit(hypothesis, known, floor, iterations);
         for _ in 0..PLACINGS {
             let Some(inputs) = self.place_edges(&fit, Reach::Near) else { break };

@@ -1,5 +1,6 @@
 //! What members of a set are confused with, begun from every start.
 
+use kort_identify::edges::delay_of;
 use kort_identify::fit::{Columns, Fit};
 use kort_identify::hypothesis::{Hypothesis, Member};
 use kort_thruster::effects::Descriptor;
@@ -136,7 +137,11 @@ impl Search<'_, '_> {
             .par_iter()
             .map(|(start, _)| steps(start, FIRST_STEPS))
             .min_by(|a, b| merit(a).total_cmp(&merit(b)))?;
-        let first = self.problem.finish(first);
+        // What a delay is worth is seen where the command's steps are placed for it.
+        let first = match delay_of(&first.hypothesis) {
+            Some(_) => self.problem.settle(&first.resume(), &first.columns, floor, FIRST_STEPS),
+            None => self.problem.finish(first),
+        };
         let reach = self.cost(set) + self.doubt(self.fits.get(rest)?.cost() - first.cost());
         if first.cost() + self.prior(place) > reach {
             return Some(first);
