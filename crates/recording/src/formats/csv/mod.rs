@@ -53,7 +53,7 @@ pub(super) fn decode(name: &str, input: impl Read, map: Option<&ColumnMap>) -> R
             *name = format!("(column {})", place + 1);
         }
     }
-    let width = header.len() as u64;
+    let mut width = header.len() as u64;
     let mut rows = Assembler::new(name, header.clone(), map)?;
     let (mut losses, mut empty) = (Vec::new(), 0_u64);
     let mut next = if nameless { Ok(true) } else { read(&mut reader, &mut record) };
@@ -70,6 +70,14 @@ pub(super) fn decode(name: &str, input: impl Read, map: Option<&ColumnMap>) -> R
             map.iter().flat_map(|map| units::differ(line, &header, &below, map.units_as_they_stand())),
         );
         next = read(&mut reader, &mut record);
+    }
+    let mut shorter = None;
+    if let (Ok(true), Some(_)) = (&next, map)
+        && let Some(note) = beyond_the_rows(&header, record.len(), &wanted)
+    {
+        shorter = Some(Place::Line(lines.at(&record)));
+        width = record.len() as u64;
+        notes.push(note);
     }
     loop {
         match next {
@@ -100,10 +108,16 @@ pub(super) fn decode(name: &str, input: impl Read, map: Option<&ColumnMap>) -> R
                 losses.push(format!("{place} was cut off after {found} of {width} cells and is skipped"));
                 break;
             }
-            return Err(Problem::RowLength { place, found, expected: width });
+            return Err(match shorter {
+                // One row is as long as the names: the first was too short.
+                Some(first) if found == header.len() as u64 => {
+                    Problem::RowLength { place: first, found: width, expected: found }
+                }
+                _ => Problem::RowLength { place, found, expected: width },
+            });
         }
         texts.take(&mut record, line)?;
-        rows.push(Place::Line(line), |i| match text(&record[i]) {
+        rows.push(Place::Line(line), |i| match record.get(i).map_or("", text) {
             "" => Cell::Empty,
             text => Cell::Text(text),
         })?;
@@ -121,6 +135,20 @@ fn read(reader: &mut csv::Reader<impl Read>, record: &mut ByteRecord) -> Result<
     reader.read_byte_record(record).map_err(|e| match e.into_kind() {
         ErrorKind::Io(e) => Problem::Unreadable { message: e.to_string() },
         other => Problem::Unreadable { message: format!("{other:?}") },
+    })
+}
+
+/// Names at the end of a header that no row has cells for, in words; none where there are none or a map wants one of them.
+/// Loggers name what an instrument could have and write what it has.
+fn beyond_the_rows(header: &[String], cells: usize, wanted: &[&str]) -> Option<String> {
+    let beyond = header.get(cells..).filter(|names| !names.is_empty() && cells > 0)?;
+    let unwanted = beyond.iter().all(|name| !wanted.contains(&name.as_str()));
+    unwanted.then(|| {
+        format!(
+            "the header names {} columns, the rows have {cells}: nothing is read of {}",
+            header.len(),
+            beyond.join(", ")
+        )
     })
 }
 
