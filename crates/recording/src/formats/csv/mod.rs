@@ -73,6 +73,7 @@ pub(super) fn decode(name: &str, input: impl Read, map: Option<&ColumnMap>) -> R
     }
     let mut shorter = None;
     if let (Ok(true), Some(_)) = (&next, map)
+        && !is_empty(&record)
         && let Some(note) = beyond_the_rows(&header, record.len(), &wanted)
     {
         shorter = Some(Place::Line(lines.at(&record)));

@@ -30,6 +30,15 @@ fn names_at_the_end_that_no_row_has_cells_for_are_passed_over_where_a_map_wants_
     assert_eq!(read.column("thrust_n").unwrap(), [1.0, 2.0, 3.0]);
     let note = "names 4 columns, the rows have 2: nothing is read of App message, Debug";
     assert!(read.notes.iter().any(|said| said.contains(note)), "{:?}", read.notes);
+    let spaced = through(
+        &text("3").replace("0,1\n", ",\n0,1,,\n").replace("0.5,2", "0.5,2,,").replace("1.0,3", "1.0,3,,"),
+        &map(""),
+    );
+    assert_eq!(
+        spaced.column("thrust_n").unwrap(),
+        [1.0, 2.0, 3.0],
+        "a row of separators says nothing of the others"
+    );
     let refused = |text: &str, map: Option<&str>| {
         let map = map.map(|map| ColumnMap::from_toml("own", map).unwrap());
         Recording::decode("log.csv", text.as_bytes(), map.as_ref()).unwrap_err().problem
