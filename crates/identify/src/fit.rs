@@ -194,6 +194,7 @@ impl Problem<'_> {
         best
     }
 
+    /// The same with each step of the command placed by itself.
     fn settle_from_here(
         &self,
         hypothesis: &Hypothesis,
