@@ -2,7 +2,9 @@
 //!
 //! Through the rows of a sine beyond a quarter of their rate a line shows less than there was, and beyond half of it another
 //! sine, slower (aliasing; Shannon 1949, Proc. IRE 37:10). A chirp that runs past comes back as if it were slow, so what
-//! follows is lost as well until the command stands or has been slow for long. Where each command is logged nothing is.
+//! follows is lost as well until the command stands or has been slow for long. Where each command is logged nothing is. What
+//! turns round as often and by chance, as a stiff loop's answer to its sensor's noise and counts does, has no slower likeness:
+//! that is doubt between samples ([`crate::between`]), and no row is lost for it.
 
 use crate::data::{Driving, Prepared};
 use crate::hypothesis::Hypothesis;
@@ -13,6 +15,9 @@ use crate::thin::Thin;
 const WINDOW: usize = 16;
 /// Share of them at which the command turns round from which on it is faster than a quarter of their rate.
 const TURNS: f64 = 0.5;
+/// Share of its power that a command may differ by from one frequency's course, `x[k+1] + x[k-1] = 2 cos(w) x[k]`, to be one:
+/// a sine's is nothing, noise's is all.
+const STRAYS: f64 = 0.5;
 /// Change from row to row that counts, as a share of the command's range: less is noise of a loop.
 const CHANGE: f64 = 0.1;
 /// For how many times as long a command must be slow, after it was faster, to be taken for slow: past a whole rate a sine that
@@ -36,8 +41,10 @@ impl Prepared {
             let [before, after] = [row, row + 1].map(|k| self.command[k] - self.command[k - 1]);
             before * after < 0.0 && before.abs().min(after.abs()) > large
         };
-        let fast =
-            |row: usize| (row..row + WINDOW).filter(|k| turns(*k)).count() as f64 >= TURNS * WINDOW as f64;
+        let fast = |row: usize| {
+            let often = (row..row + WINDOW).filter(|k| turns(*k)).count() as f64 >= TURNS * WINDOW as f64;
+            often && of_one_frequency(&self.command[row - 1..=row + WINDOW])
+        };
         let stands = |row: usize| {
             let window = &self.command[row..row + WINDOW];
             window.iter().all(|command| *command == window[0])
@@ -63,6 +70,16 @@ impl Prepared {
         }
         lost
     }
+}
+
+/// Whether a course swings about its mean with one frequency, known or not.
+fn of_one_frequency(course: &[f64]) -> bool {
+    let mean = course.iter().sum::<f64>() / course.len() as f64;
+    // Neighbours' sum, and what is between them.
+    let of = |w: &[f64]| (w[0] + w[2] - 2.0 * mean, w[1] - mean);
+    let sum = |of_pair: fn((f64, f64)) -> f64| course.windows(3).map(|w| of_pair(of(w))).sum::<f64>();
+    let (power, both, beside) = (sum(|(_, x)| x * x), sum(|(s, x)| s * x), sum(|(s, _)| s * s));
+    beside - both * both / power.max(f64::MIN_POSITIVE) < STRAYS * 2.0 * power
 }
 
 impl Problem<'_> {
@@ -158,6 +175,9 @@ mod tests {
         assert_eq!(lost(|t| if ((5.0 * t) as usize).is_multiple_of(2) { 5.0 } else { -5.0 }).0, None);
         assert_eq!(lost(|t| 5.0 * (TAU * 8.0 * t).sin()).0, None);
         assert_eq!(lost(|t| 5.0 * (TAU * t).sin() + 0.2 * (TAU * 45.0 * t).sin()).0, None);
+        // Scattered by the digits of the row's number, evenly from -5 to 5.
+        let scattered = |t: f64| 10.0 * ((100.0 * t).round() * 78.233).sin().mul_add(43_758.545, 0.0).rem_euclid(1.0) - 5.0;
+        assert_eq!(lost(scattered).0, None, "what a loop makes of noise has no slower likeness");
     }
 
     #[test]

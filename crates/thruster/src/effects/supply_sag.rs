@@ -52,7 +52,8 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
     vec![
         Spec::strength("source_resistance_ohm", "ohm", share * full, 0.0, 2.0 * full).sigma(0.15 * full),
         Spec::shape("recovery_s", "s", 0.01, 0.0, 20.0).sigma(1.0),
-        Spec::shape("supply_factor", "1", 1.0, 0.4, 1.2).sigma(0.1),
+        // In doubt as the voltage that a limit leaves is: it is one quantity under two names.
+        Spec::shape("supply_factor", "1", 1.0, 0.05, 1.3).sigma(0.3),
     ]
 }
 
@@ -69,7 +70,7 @@ fn starts(scale: &Scale) -> Vec<Vec<f64>> {
     let binding = [0.02, 0.06, 0.12].into_iter().flat_map(move |share| {
         let lost = share * electric_over_shaft_power;
         [0.85, 0.91, 0.95, 0.98, 1.01, 1.05]
-            .map(|k| vec![share * full, 0.01, (k * winding + lost).clamp(0.4, 1.2)])
+            .map(|k| vec![share * full, 0.01, (k * winding + lost).clamp(0.1, 1.25)])
     });
     stated.chain(late).chain(binding).collect()
 }
