@@ -225,6 +225,11 @@ mod tests {
             assert_eq!(at_rest([0.02, 0.3, thrust(0.5)]), Some(true));
         }
         assert_eq!(said(WET, "current_cmd_a", |_| [0.0; 3], [0.0, 0.1, 0.5]), Some(true));
+        assert_eq!(
+            said(WET, "current_cmd_a", |_| [0.0; 3], [0.0; 3]),
+            Some(true),
+            "nor if they show nothing"
+        );
         // The speed is constant, and sensors are off zero by a trifle of what the drive can do.
         assert_eq!(said(WET, "current_a", |_| [0.0; 3], [0.02, 0.0, 0.5]), Some(true));
         assert_eq!(said(WET, "current_a", |_| [0.05, 0.0, -2.0], [0.02, 0.1, 0.5]), Some(true));
@@ -277,5 +282,6 @@ mod tests {
         // Steady work tells one point.
         assert_eq!(said(WET, "current_cmd_a", |_| [5.0, 40.0, 90.0], [0.0, 0.1, 0.5]), Some(false));
         assert_eq!(said(WET, "current_a", |_| [5.0, 40.0, 90.0], noise), Some(false));
+        assert_eq!(said(WET, "current_cmd_a", |_| [5.0, 40.0, 90.0], [0.0; 3]), Some(false));
     }
 }

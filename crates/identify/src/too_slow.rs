@@ -176,7 +176,9 @@ mod tests {
         assert_eq!(lost(|t| 5.0 * (TAU * 8.0 * t).sin()).0, None);
         assert_eq!(lost(|t| 5.0 * (TAU * t).sin() + 0.2 * (TAU * 45.0 * t).sin()).0, None);
         // Scattered by the digits of the row's number, evenly from -5 to 5.
-        let scattered = |t: f64| 10.0 * ((100.0 * t).round() * 78.233).sin().mul_add(43_758.545, 0.0).rem_euclid(1.0) - 5.0;
+        let scattered = |t: f64| {
+            10.0 * ((100.0 * t).round() * 78.233).sin().mul_add(43_758.545, 0.0).rem_euclid(1.0) - 5.0
+        };
         assert_eq!(lost(scattered).0, None, "what a loop makes of noise has no slower likeness");
     }
 

@@ -24,7 +24,8 @@ pub struct Channel {
 }
 
 impl Channel {
-    pub(super) fn new(series: &Series, rig: &Rig, response: Response) -> Option<Self> {
+    /// A column's samples; none where they never change, unless nothing does (`at_rest`): then that is what is to be said.
+    pub(super) fn new(series: &Series, rig: &Rig, response: Response, at_rest: bool) -> Option<Self> {
         let column = series.column(response.name())?;
         let rows: Vec<usize> = (0..column.len()).filter(|k| column[*k].is_finite()).collect();
         let mut values: Vec<f64> = rows.iter().map(|k| column[*k]).collect();
@@ -38,11 +39,12 @@ impl Channel {
         let times: Vec<f64> = rows.iter().map(|row| series.time_s[*row]).collect();
         let interval_s = median_interval(&times);
         let held_s = sensor_s(rig, response).filter(|sensor_s| is_slow(*sensor_s, interval_s));
-        (values.len() >= FEWEST_ROWS && !constant && full_scale > 0.0).then_some(Self {
+        let usable = values.len() >= FEWEST_ROWS && (at_rest || !constant && full_scale > 0.0);
+        usable.then_some(Self {
             response,
             rows,
             values,
-            full_scale,
+            full_scale: if full_scale > 0.0 { full_scale } else { 1.0 },
             slow_s: held_s.or_else(|| {
                 Some(interval_s).filter(|interval_s| is_slow(*interval_s, median_interval(&series.time_s)))
             }),

@@ -6,7 +6,7 @@ use super::fill::filled;
 use super::{Driving, FEWEST_ROWS, Response, Series};
 
 /// The driving column, by preference: a command that fits the drive, then measured current, then speed; and
-/// electrical power where nothing but the speed could answer.
+/// electrical power where nothing but the speed could answer. Where nothing moves at all, the command that says so.
 pub(super) fn choose_driving(series: &Series, rig: &Rig, speed_driven: bool) -> Option<Driving> {
     let varies = |name: &str| {
         series.column(name).is_some_and(|c| {
@@ -46,7 +46,9 @@ pub(super) fn choose_driving(series: &Series, rig: &Rig, speed_driven: bool) -> 
         // shaft's speed as well.
         let told = series.column("shaft_speed_rad_s").is_some()
             || rig.propeller.is_none() && varies("shaft_angle_rad");
-        return commands.iter().find(held).filter(|_| told).map(|command| Driving::Command(command));
+        let recorded = |name: &&&str| series.column(name).is_some_and(|c| c.iter().any(|v| v.is_finite()));
+        let command = commands.iter().find(held).or_else(|| commands.iter().find(recorded));
+        return command.filter(|_| told).map(|command| Driving::Command(command));
     }
     Some(match commands.iter().find(held) {
         _ if answered => Driving::Speed,

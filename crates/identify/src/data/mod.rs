@@ -240,15 +240,20 @@ impl Prepared {
         refuse::implausible(series, row_s)?;
         let driving = choose_driving(series, rig, speed_driven)
             .ok_or(DataError::NoDriving { recording: recording.clone() })?;
-        let channels: Vec<Channel> = Response::ALL
-            .into_iter()
-            .filter(|r| {
-                r.name() != driving.column() && !(driving == Driving::Speed && *r == Response::Current)
-            })
-            .filter(|r| shown(rig, driving, *r))
-            .filter_map(|r| Channel::new(series, rig, r))
-            .collect();
-        if !channels.iter().any(|c| c.response != Response::Current) {
+        let shown = |r: &Response| {
+            let drives = r.name() == driving.column() || driving == Driving::Speed && *r == Response::Current;
+            !drives && shown(rig, driving, *r)
+        };
+        let answering = |at_rest: bool| -> Vec<Channel> {
+            let channel = |r: Response| Channel::new(series, rig, r, at_rest);
+            Response::ALL.into_iter().filter(shown).filter_map(channel).collect()
+        };
+        let answers = |channels: &[Channel]| channels.iter().any(|c| c.response != Response::Current);
+        let mut channels = answering(false);
+        if !answers(&channels) {
+            channels = answering(true);
+        }
+        if !answers(&channels) {
             if let Some((column, kind)) = driving::other_drive(series, rig) {
                 return Err(DataError::OtherDrive { recording, column, kind });
             }
