@@ -16,8 +16,8 @@ const WINDOW: usize = 16;
 /// Share of them at which the command turns round from which on it is faster than a quarter of their rate.
 const TURNS: f64 = 0.5;
 /// Share of its power that a command may differ by from one frequency's course, `x[k+1] + x[k-1] = 2 cos(w) x[k]`, to be one:
-/// a sine's is nothing, noise's is all.
-const STRAYS: f64 = 0.5;
+/// a sine's is nothing, a chirp's a twentieth at most; of white noise one window in a hundred thousand is below 0.12.
+const STRAYS: f64 = 0.1;
 /// Change from row to row that counts, as a share of the command's range: less is noise of a loop.
 const CHANGE: f64 = 0.1;
 /// For how many times as long a command must be slow, after it was faster, to be taken for slow: past a whole rate a sine that

