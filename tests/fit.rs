@@ -183,7 +183,7 @@ fn recordings_that_no_model_can_be_compared_with() {
     let flat = table();
     let rest: Vec<String> = flat.header[1..].to_vec();
     let flat = rest.iter().fold(flat, |t, column| t.map(column, |_, _| "0".into())).save("flat.csv");
-    let told = json(&["diagnose", &flat, "--rig", STAND, "--json"]);
+    let told = json(&kort(&["diagnose", &flat, "--rig", STAND, "--json"]));
     assert_eq!(told["verdict"], "insufficient_data", "at rest is an answer, and no broken log: {told}");
     assert!(told["summary"].as_str().unwrap().contains("nothing moves"), "{told}");
     refused("unknown map", clean(), STAND, &["--columns", "rosa"], &["rosa-rotor-air"]);
