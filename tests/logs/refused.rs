@@ -32,7 +32,7 @@ fn what_cannot_be_read_says_what_can() {
     refused(&["columns", &folder], &["is a folder", "bag-folder/run_0.db3"]);
 
     let vesc = write("vesc-plain.csv", "ms_today;erpm;duty_cycle\n1;2;3\n2;2;3\n");
-    refused(&["fit", &vesc, "--rig", "t200"], &["time_s", "parted by semicolons", "kort columns"]);
+    refused(&["fit", &vesc, "--rig", "t200"], &["time_s", "ms_today, erpm, duty_cycle", "kort columns"]);
 }
 
 /// This firmware logs no speed of the motors: a map without a response is for converting, and no field is what was meant.

@@ -41,6 +41,40 @@ fn a_table_with_decimal_commas_and_units_below_the_names_comes_in_as_proposed() 
     assert!(recording.losses.is_empty(), "{:?}", recording.losses);
 }
 
+#[test]
+fn what_was_written_is_said_as_one_document() {
+    let log = write("written.csv", "Time (s),RPM,Thrust (N),note\n0,1,N/A,a\n1,2,5,b\n2,4,6,c\n");
+    let (map, out) = (lab::path("written.toml"), lab::path("written.out.csv"));
+    let said = kort(&["columns", &log, "-o", &map]);
+    assert_eq!(said.status.code(), Some(3), "a value is lost: {}", stderr(&said));
+    let said = kort(&["convert", &log, "--columns", &map, "-o", &out, "--json"]);
+    assert_eq!(said.status.code(), Some(3), "{}", stderr(&said));
+    let written: serde_json::Value = serde_json::from_slice(&said.stdout).unwrap();
+    assert_eq!(written["schema"], "kort.convert/1");
+    assert_eq!(
+        (&written["rows"], &written["output"], &written["to_s"]),
+        (&3.into(), &out.into(), &2.0.into())
+    );
+    assert_eq!(written["columns"][1], serde_json::json!({ "name": "thrust_n", "unit": "N", "samples": 2 }));
+    assert_eq!(written["unused"], serde_json::json!(["note"]));
+    assert!(written["losses"][0].as_str().unwrap().contains("`Thrust (N)`"), "{written}");
+}
+
+#[test]
+fn what_is_only_an_example_and_what_never_changes_is_said() {
+    let vesc = write(
+        "vesc-example.csv",
+        "ms_today;input_voltage;temp_mos_max;temp_motor;current_motor;current_in;erpm;duty_cycle\n10;24;30;28;1;1;700;0.2\n20;24;31;29;2;2;800;0.3\n",
+    );
+    let words = |log: &str| String::from_utf8_lossy(&kort(&["columns", log]).stdout).into_owned();
+    let said = words(&vesc);
+    assert!(said.contains("pole_pairs=7 below is an example: write yours"), "{said}");
+    let still = words(&write("still.csv", "Time (s),RPM,Thrust (N)\n0,100,5\n1,100,5\n"));
+    assert!(still.contains("RPM, Thrust (N) never change in it"), "{still}");
+    let short = words(&write("short.csv", "Time (s),RPM,Thrust (N)\n0,100,5\n"));
+    assert!(short.contains("1 row(s) in it, and at least 2 are needed"), "{short}");
+}
+
 /// Without the map's word it is refused, by line and cell, and with what to do.
 #[test]
 fn a_decimal_comma_that_nobody_spoke_of_is_refused() {
