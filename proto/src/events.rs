@@ -185,14 +185,15 @@ impl EventLog {
             }
         }
         let mut options = OpenOptions::new();
-        options.create(true).append(true).mode(0o640).custom_flags(NO_LINK);
+        options.create(true).append(true).read(true).mode(0o640).custom_flags(NO_LINK);
         let mut file: File = options.open(self.file(0))?;
-        unwritten.write_to(&mut file)?;
+        let torn = is_torn(&file)?;
+        unwritten.write_to(&mut file, torn)?;
         if unwritten.lost > 0 {
             let words = format!("{} events could not be written down and are lost", unwritten.lost);
             unwritten.lost = 0;
             unwritten.keep(line(&Event::now(EventKind::EventsLost, None, "event log", words))?);
-            unwritten.write_to(&mut file)?;
+            unwritten.write_to(&mut file, false)?;
         }
         Ok(())
     }
@@ -249,6 +250,14 @@ pub struct Mark {
     bytes: u64,
 }
 
+/// Does the file end within a line? A disk that was full took a part of one, whoever wrote it.
+fn is_torn(file: &File) -> io::Result<bool> {
+    use std::os::unix::fs::FileExt;
+    let Some(last) = file.metadata()?.len().checked_sub(1) else { return Ok(false) };
+    let mut byte = [0];
+    Ok(file.read_at(&mut byte, last)? == 1 && byte != *b"\n")
+}
+
 fn line(event: &Event) -> io::Result<Vec<u8>> {
     let mut line = serde_json::to_vec(event)?;
     line.push(b'\n');
@@ -288,6 +297,21 @@ mod tests {
         assert_eq!(log.read_after(mark).len(), 1);
         assert_eq!(log.read_after(Mark::default()).len(), 3);
         assert_eq!(read[1].before, Some(Before { thrust_n: Some(80.0), shaft_speed_rad_s: None }));
+    }
+
+    #[test]
+    fn what_another_process_left_of_a_line_costs_none_of_ours() {
+        let folder = tempfile::tempdir().unwrap();
+        let log = EventLog::open(folder.path()).unwrap();
+        log.append(&event("first")).unwrap();
+        log.append(&event("second")).unwrap();
+        let file = fs::OpenOptions::new().write(true).open(log.file(0)).unwrap();
+        file.set_len(file.metadata().unwrap().len() - 7).unwrap();
+        // Neither of these two wrote what is torn.
+        log.append(&event("third")).unwrap();
+        EventLog::open(folder.path()).unwrap().append(&event("fourth")).unwrap();
+        let read = log.read();
+        assert_eq!(read.iter().map(|e| e.detail.as_str()).collect::<Vec<_>>(), ["first", "third", "fourth"]);
     }
 
     #[test]

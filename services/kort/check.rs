@@ -171,6 +171,11 @@ fn deployment(file: Option<&Path>, into: &mut Found) {
     }
     let absent = config.iter().flat_map(kort_proto::cores::absent);
     into.warnings.extend(absent.map(|words| problem(&name, &words.to_string())));
+    #[cfg(feature = "controller")]
+    if let Some(config) = &config {
+        let doubtful = config.thrusters.keys().filter_map(|id| kort_controller::doubtful(config, id));
+        into.warnings.extend(doubtful.map(|words| problem(&name, &words.to_string())));
+    }
     #[cfg(feature = "gateway")]
     into.warnings.extend(
         config.iter().filter_map(kort_gateway::doubtful).map(|words| problem(&name, &words.to_string())),

@@ -63,6 +63,11 @@ pub fn run(config: &Config, deployment: &Deployment) -> Result<(), UpError> {
             .map_err(system("signals cannot be watched"))?;
     }
     let owner = deployment.own()?;
+    // Its children take their parts themselves; that a lone process plays one is said before any of them starts.
+    deployment.take_part("gateway", None)?;
+    for (id, role) in config.thrusters.keys().flat_map(|id| [(id, "servo"), (id, "controller")]) {
+        deployment.take_part(role, Some(id))?;
+    }
     kort_gateway::check(&gateway)?;
     let log = EventLog::open(&gateway.events).map_err(system("the event log"))?;
     let scribe = Scribe::start(log.clone(), deployment.watched_file()).map_err(system("a thread"))?;
@@ -97,6 +102,8 @@ struct Service {
     written: Watched,
     written_at: Instant,
     generations: u32,
+    /// The present one.
+    generation: Option<u64>,
 }
 
 impl Service {
@@ -120,13 +127,14 @@ impl Service {
             written: Watched::default(),
             written_at: Instant::now(),
             generations: 0,
+            generation: None,
         }
     }
 
     /// Creates the shared memory and starts every process.
     fn begin(&mut self, log: &EventLog) -> Result<(), UpError> {
         let ids: Vec<&str> = self.ids.iter().map(String::as_str).collect();
-        self.owner.create(&ids)?;
+        self.generation = Some(self.owner.create(&ids)?);
         inherited::tell(self.watches.iter().map(|watch| (watch.id(), &watch.stood)), log);
         for watch in &mut self.watches {
             if watch.stood.armed {
@@ -162,7 +170,7 @@ impl Service {
         while !stop.load(Ordering::Relaxed) {
             std::thread::sleep(LOOK_EVERY);
             if looked.elapsed() > STOOD_STILL {
-                self.roles.iter_mut().for_each(|role| role.beat = Instant::now());
+                self.roles.iter_mut().for_each(Role::excuse);
             }
             looked = Instant::now();
             self.hear();
@@ -184,7 +192,6 @@ impl Service {
 
     /// Reads what the processes sent.
     fn hear(&mut self) {
-        let now = Instant::now();
         for watch in &mut self.watches {
             let beats = watch.look(self.owner.deployment());
             for role in &mut self.roles {
@@ -195,7 +202,7 @@ impl Service {
                     _ => beats.gateway,
                 };
                 if mine && beat {
-                    role.beat = now;
+                    role.heard();
                 }
             }
         }
@@ -203,8 +210,9 @@ impl Service {
 
     /// A process that does not beat any more is ended; it is replaced like any other that ended.
     fn end_the_hung(&mut self) {
-        for role in self.roles.iter_mut().filter(|role| role.hangs()) {
-            let words = format!("{} did not beat for {} s, ended", role.name, role::HUNG_AFTER.as_secs());
+        for role in &mut self.roles {
+            let Some(silent) = role.hangs() else { continue };
+            let words = format!("{} did not beat for {} s, ended", role.name, silent.as_secs());
             warn!(thruster = role.thruster, "{words}");
             self.scribe.event(Event::now(
                 EventKind::ProcessHung,
@@ -214,7 +222,7 @@ impl Service {
             ));
             role.kill();
             // Told once: it is gone at one of the next looks.
-            role.beat = Instant::now();
+            role.excuse();
         }
     }
 
@@ -273,7 +281,7 @@ impl Service {
                 role.restarts += 1;
             }
             let ids: Vec<&str> = self.ids.iter().map(String::as_str).collect();
-            self.owner.create(&ids)?;
+            self.generation = Some(self.owner.create(&ids)?);
             return (0..self.roles.len()).try_for_each(|at| self.start(at));
         }
         for at in 0..self.roles.len() {
@@ -295,7 +303,8 @@ impl Service {
             pid: role.child.as_ref().map(std::process::Child::id),
         });
         let stood = self.watches.iter().map(|watch| (watch.id().to_owned(), watch.stood.clone()));
-        let now = Watched { restarts: restarts.collect(), thrusters: stood.collect() };
+        let now =
+            Watched { generation: self.generation, restarts: restarts.collect(), thrusters: stood.collect() };
         let key = |watched: &Watched| -> Vec<(bool, u64, u64)> {
             watched.thrusters.values().map(|s| (s.armed, s.servo_faults, s.controller_faults)).collect()
         };

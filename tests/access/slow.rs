@@ -119,7 +119,11 @@ fn idle_connections_among_them_do_not_raise_the_cap_on_streams() {
         tungstenite::connect(format!("ws://127.0.0.1:{port}{T1}/stream?hz=1")).ok()
     });
     let streams: Vec<_> = streams.collect();
-    assert!((32..=64).contains(&streams.len()), "{} streams of one peer", streams.len());
+    // A quarter of its 64 is left to its requests.
+    assert!((24..=48).contains(&streams.len()), "{} streams of one peer", streams.len());
+    drop(idle);
+    assert_eq!(ask(port, "GET", T1, &[], "").0, 200);
+    assert_eq!(take(port, &json!({"holder": "bench"})).0, 201, "commands of the same address pass");
     assert_eq!(ask(port, "POST", "/v1/stop", &[], "").0, 200);
 }
 

@@ -1,11 +1,13 @@
 //! The whole service as real processes: it starts and thrusts, and whatever is killed, frozen or
 //! lost ends at zero thrust, is replaced, and never resumes what it was told before.
 
+mod checked;
 #[path = "../common/mod.rs"]
 mod common;
 mod inherited;
 mod lone;
 mod refusals;
+mod rivals;
 mod shown;
 mod stated;
 mod strangers;

@@ -26,8 +26,14 @@ fn shared(site: &Site) {
     fs::set_permissions(site.folder.path(), Permissions::from_mode(0o1777)).unwrap();
 }
 
-const BESIDE: [&str; 5] =
-    ["shm.lock", "shm.generation", "shm.generation.new", "shm.watched", "shm.watched.new"];
+const BESIDE: [&str; 6] = [
+    "shm.lock",
+    "shm.gateway.lock",
+    "shm.generation",
+    "shm.generation.new",
+    "shm.watched",
+    "shm.watched.new",
+];
 
 #[test]
 fn what_another_user_laid_where_we_begin_is_refused_in_words() {

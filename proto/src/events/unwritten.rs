@@ -12,8 +12,6 @@ pub(super) struct Unwritten {
     lines: VecDeque<Vec<u8>>,
     /// How many were dropped for want of room.
     pub(super) lost: u64,
-    /// The disk took a part of a line.
-    torn: bool,
 }
 
 impl Unwritten {
@@ -31,13 +29,13 @@ impl Unwritten {
         self.lines.is_empty()
     }
 
-    /// Writes what waits, as far as it goes.
-    pub(super) fn write_to(&mut self, file: &mut impl Write) -> io::Result<()> {
+    /// Writes what waits, as far as it goes, to a file that ends within a line where `torn`.
+    pub(super) fn write_to(&mut self, file: &mut impl Write, mut torn: bool) -> io::Result<()> {
         while let Some(line) = self.lines.front() {
             // In one piece: somebody else may append too.
-            let whole = if self.torn { [b"\n", line.as_slice()].concat() } else { line.clone() };
-            file.write_all(&whole).inspect_err(|_| self.torn = true)?;
-            self.torn = false;
+            let whole = if torn { [b"\n", line.as_slice()].concat() } else { line.clone() };
+            file.write_all(&whole)?;
+            torn = false;
             self.lines.pop_front();
         }
         Ok(())
@@ -68,10 +66,10 @@ mod tests {
         for line in ["first\n", "second\n", "third\n"] {
             waiting.keep(line.into());
         }
-        assert!(waiting.write_to(&mut disk).is_err());
+        assert!(waiting.write_to(&mut disk, false).is_err());
         assert!(!waiting.is_empty());
         disk.1 = 1000;
-        waiting.write_to(&mut disk).unwrap();
+        waiting.write_to(&mut disk, true).unwrap();
         assert!(waiting.is_empty());
         assert_eq!(String::from_utf8(disk.0).unwrap(), "first\nseco\nsecond\nthird\n");
     }
@@ -83,7 +81,7 @@ mod tests {
             waiting.keep(format!("{n}\n").into());
         }
         let mut disk = Disk(Vec::new(), usize::MAX);
-        waiting.write_to(&mut disk).unwrap();
+        waiting.write_to(&mut disk, false).unwrap();
         assert!(disk.0.starts_with(b"3\n"));
         assert_eq!(waiting.lost, 3);
     }

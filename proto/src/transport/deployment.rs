@@ -8,20 +8,21 @@
 //! the previous one cannot put anything in the way of the next.
 
 use std::fs;
-use std::os::unix::fs::{DirBuilderExt, OpenOptionsExt};
+use std::os::unix::fs::DirBuilderExt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use iceoryx2::prelude::*;
-use rustix::fs::{FlockOperation, flock};
 
 use super::clock::monotonic_ns;
 use super::error::TransportError;
 use super::files::{allow_files, none_left};
 use super::ours::{nobody_else_may_replace, ours_alone, owner_only, owner_only_from_the_start, write_whole};
+use super::part::locked;
 use super::ports::{Services, create_services};
 use super::room;
 use super::stillborn::Remover;
+use super::watched::Watched;
 use crate::names::MESSAGES_VERSION;
 
 /// Longest root: the sockets by which iceoryx2 wakes a process lie under it, and a socket path has 107 bytes.
@@ -82,14 +83,14 @@ impl Deployment {
         }
     }
 
-    /// Waits for an owner to have created a generation.
+    /// Waits for an owner to have created a generation; what one that is gone left is none.
     ///
     /// # Errors
     /// [`TransportError::NoGeneration`] if there is none after `timeout`.
     pub fn wait_for_generation(&self, timeout: Duration) -> Result<u64, TransportError> {
         let end = std::time::Instant::now() + timeout;
         loop {
-            if let Some(generation) = self.generation() {
+            if let Some(generation) = self.generation().filter(|_| self.owner_lives()) {
                 return Ok(generation);
             }
             if std::time::Instant::now() >= end {
@@ -115,31 +116,9 @@ impl Deployment {
             move |error| TransportError::File { path, error }
         };
         allow_files(1)?;
-        if let Some(parent) = self.root.parent() {
-            fs::create_dir_all(parent).map_err(file_error(parent))?;
-            nobody_else_may_replace(parent)?;
-        }
-        ours_alone(&self.root)?;
-        for extension in BESIDE {
-            ours_alone(&self.beside(extension))?;
-        }
-        let lock_path = self.beside("lock");
-        let lock = fs::OpenOptions::new()
-            .create(true)
-            .truncate(false)
-            .write(true)
-            .read(true)
-            .mode(0o600)
-            // A link that somebody laid here would have us write elsewhere.
-            .custom_flags(libc::O_NOFOLLOW)
-            .open(&lock_path)
-            .map_err(file_error(&lock_path))?;
-        if flock(&lock, FlockOperation::NonBlockingLockExclusive).is_err() {
-            let holder = fs::read_to_string(&lock_path).unwrap_or_default();
-            let holder = if holder.is_empty() { "process unknown".into() } else { holder };
-            return Err(TransportError::Locked { root: self.root.clone(), holder });
-        }
-        let _ = fs::write(&lock_path, format!("process {}", std::process::id()));
+        self.in_our_hands()?;
+        let lock = locked(&self.beside("lock"))?
+            .map_err(|holder| TransportError::Locked { root: self.root.clone(), holder })?;
         let stillborn = Remover::start(self.prefix())?;
         let owner = Owner {
             deployment: self.clone(),
@@ -152,6 +131,17 @@ impl Deployment {
         let mut folder = fs::DirBuilder::new();
         folder.recursive(true).mode(0o700).create(&self.root).map_err(file_error(&self.root))?;
         Ok(owner)
+    }
+
+    /// Makes the folder that the root lies in, and sees to it that nobody else laid what is believed there.
+    pub(super) fn in_our_hands(&self) -> Result<(), TransportError> {
+        if let Some(parent) = self.root.parent() {
+            let failed = |error| TransportError::File { path: parent.to_owned(), error };
+            fs::create_dir_all(parent).map_err(failed)?;
+            nobody_else_may_replace(parent)?;
+        }
+        ours_alone(&self.root)?;
+        BESIDE.iter().try_for_each(|extension| ours_alone(&self.beside(extension)))
     }
 
     /// A node (iceoryx2's word for a participant) of one generation of this deployment.
@@ -232,6 +222,17 @@ impl Deployment {
     /// The file in which the supervisor notes what it watches, see [`super::Watched`].
     pub fn watched_file(&self) -> PathBuf {
         self.beside("watched")
+    }
+
+    /// What the supervisor noted of the generation that is here now: what stands there of an earlier one, whose supervisor is
+    /// gone, says nothing of it.
+    pub fn watched(&self) -> Watched {
+        let watched = Watched::read(&self.watched_file());
+        if watched.generation.is_some() && watched.generation == self.generation() {
+            watched
+        } else {
+            Watched::default()
+        }
     }
 
     fn generation_file(&self) -> PathBuf {

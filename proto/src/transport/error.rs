@@ -20,6 +20,19 @@ pub enum TransportError {
         /// What the lock file says of its holder.
         holder: String,
     },
+    /// Another process plays this part in the deployment.
+    #[error(
+        "{}: the {part} already runs here ({holder})\nhint: stop it, or give this one a root of its own with --root DIR or transport.root in kort.toml",
+        root.display()
+    )]
+    Taken {
+        /// The root folder.
+        root: PathBuf,
+        /// Which part.
+        part: String,
+        /// What the lock file says of its holder.
+        holder: String,
+    },
     /// A file of the deployment cannot be used.
     #[error("{}: {error}\nhint: choose another folder with --root DIR or transport.root in kort.toml", path.display())]
     File {

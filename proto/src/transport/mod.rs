@@ -6,6 +6,7 @@ mod deployment;
 mod error;
 mod files;
 mod ours;
+mod part;
 mod ports;
 mod rig;
 mod room;
@@ -15,6 +16,7 @@ mod watched;
 pub use clock::{Ticker, idle, keep_on, monotonic_ns, ordinary, realtime};
 pub use deployment::{Deployment, Owner};
 pub use error::TransportError;
+pub use part::Part;
 pub use ports::{
     ControllerPorts, GatewayPorts, Inbox, Outbox, ServoPorts, SupervisorPorts, Ticks, Waker, create_services,
 };

@@ -15,6 +15,8 @@ use crate::events::Before;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Watched {
+    /// The shared memory that all of this was seen in.
+    pub generation: Option<u64>,
     /// Starts beyond the first, by process and thruster.
     pub restarts: Vec<Restarts>,
     /// What stood last, by thruster.

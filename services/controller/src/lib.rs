@@ -4,6 +4,7 @@
 //! `kort-control` under it. The process (feature `process`) adds clock and shared memory; it wakes
 //! when the servo has sent telemetry.
 
+pub mod pace;
 #[cfg(feature = "process")]
 mod process;
 pub mod slew;
@@ -14,4 +15,4 @@ pub mod tick;
 mod workshop;
 
 #[cfg(feature = "process")]
-pub use process::{ControllerError, check, problems, run};
+pub use process::{ControllerError, check, doubtful, problems, run};

@@ -14,6 +14,7 @@ use kort_thruster::rig::Rig;
 use thiserror::Error;
 use tracing::{info, warn};
 
+use crate::pace::too_slow;
 use crate::tick::Tick;
 use crate::workshop::Workshop;
 
@@ -104,6 +105,15 @@ pub fn problems(config: &Config, id: &str) -> Vec<ControllerError> {
     wrong
 }
 
+/// What is no mistake of this thruster's controller, and hardly as it is meant: it starts, and says so.
+pub fn doubtful(config: &Config, id: &str) -> Option<ConfigError> {
+    let thruster = config.thruster(id).ok()?;
+    let (file, text) = config.rig_text(id, thruster).ok()?;
+    let rig = Rig::from_toml(&text).ok()?;
+    let law = law(config, id, thruster, Some((&file, &rig))).ok()?;
+    too_slow(id, thruster, &rig, &law).map(|words| config.error(words))
+}
+
 /// Runs the controller of one thruster until SIGTERM, SIGINT or SIGHUP. `latched` are faults that its predecessor had latched: they outlive it until somebody clears them.
 ///
 /// # Errors
@@ -117,11 +127,15 @@ pub fn run(config: &Config, deployment: &Deployment, id: &str, latched: u64) -> 
         // There is at least one.
         Err(wrong) => return wrong.into_iter().next().map_or(Ok(()), Err),
     };
+    if let Some(words) = too_slow(id, thruster, &rig, &law) {
+        warn!(thruster = id, "{words}");
+    }
     let period_ns = thruster.controller_period_ns();
     let stop = Arc::new(AtomicBool::new(false));
     for signal in END_SIGNALS {
         signal_hook::flag::register(signal, Arc::clone(&stop))?;
     }
+    let _part = deployment.take_part("controller", Some(id))?;
     // Before this thread becomes a real-time one: designing a controller must not keep a tick waiting.
     let workshop = Workshop::start(deployment, id, period_ns).map_err(ControllerError::Thread)?;
     // Behind it too: the workshop runs wherever there is room.
@@ -136,14 +150,17 @@ pub fn run(config: &Config, deployment: &Deployment, id: &str, latched: u64) -> 
     let (mut told, mut latched) = (false, latched);
     // Outer loop: a new owner of the shared memory begins a new generation; start afresh in it.
     while !stop.load(Ordering::Relaxed) {
-        if let Err(nothing) = deployment.wait_for_generation(Duration::from_secs(1)) {
-            if !std::mem::replace(&mut told, true) {
-                warn!(thruster = id, "waiting: {nothing}");
+        let generation = match deployment.wait_for_generation(Duration::from_secs(1)) {
+            Ok(generation) => generation,
+            Err(nothing) => {
+                if !std::mem::replace(&mut told, true) {
+                    warn!(thruster = id, "waiting: {nothing}");
+                }
+                continue;
             }
-            continue;
-        }
+        };
+        let Some(mut ports) = join(deployment, id, generation)? else { continue };
         told = false;
-        let mut ports = ControllerPorts::open(deployment, id)?;
         let mut tick = Tick::new(&rig, &law, period_ns, monotonic_ns())
             .map_err(|error| ControllerError::Model { file: file.clone(), error })?
             .with_rise(thruster.controller.setpoint_rise_s)
@@ -158,13 +175,27 @@ pub fn run(config: &Config, deployment: &Deployment, id: &str, latched: u64) -> 
         while serve(&mut tick, &mut ports, &workshop, thruster, deployment, &stop) == Left::Aside {
             // Whoever took its place was a younger sender; the servo hears no older one any more.
             drop(ports);
-            ports = ControllerPorts::open(deployment, id)?;
+            let Some(again) = join(deployment, id, generation)? else { break };
+            ports = again;
             info!(thruster = id, "controller takes its place again, at zero");
         }
         latched = tick.leaves_behind();
     }
     info!(thruster = id, "controller ends, servo stopped");
     Ok(())
+}
+
+/// The ports of this generation; none where it is over by now: its owner is gone, or clears it away for the next one.
+fn join(
+    deployment: &Deployment,
+    id: &str,
+    generation: u64,
+) -> Result<Option<ControllerPorts>, TransportError> {
+    match ControllerPorts::open(deployment, id) {
+        Ok(ports) => Ok(Some(ports)),
+        Err(_) if !deployment.stands(generation) => Ok(None),
+        Err(error) => Err(error),
+    }
 }
 
 /// Law, observer, estimator and options as the deployment says, or everything that is wrong with them; where it takes the

@@ -6,7 +6,7 @@ use std::sync::{Arc, OnceLock};
 
 use axum::body::Bytes;
 use kort_control::ControllerConfig;
-use kort_proto::transport::Watched;
+use kort_proto::transport::{Deployment, Watched};
 use tokio::sync::watch;
 use utoipa::openapi::OpenApi;
 
@@ -41,7 +41,7 @@ pub(crate) struct App {
     pub(crate) streams: Streams,
     pub(crate) address: String,
     pub(crate) disks: [PathBuf; 2],
-    pub(crate) watched: PathBuf,
+    pub(crate) deployment: Deployment,
     pub(crate) answers: [AtomicU64; 4],
     pub(crate) durations: Durations,
     pub(crate) stopping: watch::Receiver<bool>,
@@ -156,7 +156,7 @@ impl App {
 
     /// What the supervisor notes beside the shared memory.
     pub(crate) fn watched(&self) -> Watched {
-        Watched::read(&self.watched)
+        self.deployment.watched()
     }
 
     pub(crate) fn stopping(&self) -> watch::Receiver<bool> {

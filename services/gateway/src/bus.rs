@@ -9,7 +9,6 @@ mod pending;
 mod pulse;
 mod told;
 
-use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, mpsc};
 use std::time::{Duration, Instant};
@@ -17,10 +16,11 @@ use std::time::{Duration, Instant};
 use kort_proto::events::{Before, EventKind};
 use kort_proto::faults::Fault;
 use kort_proto::limits::Limit;
-use kort_proto::messages::{RequestKind, Setpoint as SetpointMessage, SetpointKind, Telemetry};
+use kort_proto::messages::{RequestKind, Setpoint as SetpointMessage, SetpointKind, Telemetry, Trip};
 use kort_proto::transport::{Deployment, GatewayPorts, Ticker, TransportError, monotonic_ns, realtime};
 
 use crate::events::Events;
+use crate::heard::AWAY_AFTER;
 use crate::record::Recorder;
 use crate::ring::Feed;
 use crate::tally::Tally;
@@ -103,8 +103,7 @@ fn run_errands(bridges: &mut [Bridge], recorder: &Recorder, until_ns: u64) {
 
 struct Bridge {
     link: Link,
-    /// What the supervisor writes down.
-    watched: PathBuf,
+    deployment: Deployment,
     ports: Option<GatewayPorts>,
     checked: Option<Instant>,
     complaint: String,
@@ -114,6 +113,8 @@ struct Bridge {
     held: Held,
     /// Latched faults of servo and controller as last heard; none before the first word.
     latched: [Option<u64>; 2],
+    /// The last stop that nobody asked for, by the servo's word.
+    tripped: Trip,
     mismatch_path: u32,
     /// What the thruster did when it was last heard armed.
     before: Option<Before>,
@@ -131,7 +132,7 @@ impl Bridge {
     fn new(link: Link, deployment: &Deployment) -> Bridge {
         Bridge {
             link,
-            watched: deployment.watched_file(),
+            deployment: deployment.clone(),
             ports: None,
             checked: None,
             complaint: String::new(),
@@ -140,6 +141,7 @@ impl Bridge {
             last_servo_sequence: (0, 0),
             held: Held::default(),
             latched: [None; 2],
+            tripped: Trip::default(),
             mismatch_path: 0,
             before: None,
             before_ramp: None,
@@ -253,14 +255,17 @@ impl Bridge {
                 self.before = Some(Before::of(shown.thrust_n, shown.shaft_speed_rad_s));
                 self.before_ramp = self.before_ramp.filter(|_| self.ramping).or(self.before);
             }
-            self.tell_tripped(0, telemetry.faults, Some(&telemetry.tripped));
+            self.tripped = telemetry.tripped;
+            self.tell_tripped(0, telemetry.faults);
             last = Some(telemetry);
         }
-        let state = ports.state.latest();
+        // The servo's word dates what the controller has latched: it comes first, if it comes at all.
+        let dated = self.latched[0].is_some() || self.link.thruster.heard().silence(now) >= AWAY_AFTER;
+        let state = ports.state.latest().filter(|_| dated);
         if let Some(state) = &state {
             self.link.tally.controller(state);
             self.ramping = state.limits & Limit::LeaseRamp.bit() != 0;
-            self.tell_tripped(1, state.faults, None);
+            self.tell_tripped(1, state.faults);
             self.tell_mismatch(state);
             if let Some(telemetry) = &last {
                 self.link.ring.believe(telemetry.time_ns, state);

@@ -1,10 +1,11 @@
 //! Who is connected: caps by peer and in all. A slow or silent peer costs connections, never the stop: where a
-//! cap is reached the connection that has been idle longest makes room, and some are kept back that only stop.
+//! cap is reached the connection that has been idle longest makes room, and some are kept back that only stop. A stream is
+//! never idle: only so many connections may become one, and the rest is left to requests.
 
 use std::future::Future;
 use std::net::IpAddr;
 use std::pin::Pin;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::task::{Context, Poll};
 use std::time::{Duration, Instant};
@@ -37,6 +38,13 @@ pub struct Caps {
     pub reserve: usize,
 }
 
+impl Caps {
+    /// How many of so many connections may be streams: a quarter is left to requests.
+    fn streams(of: usize) -> usize {
+        of - of / 4
+    }
+}
+
 /// One connection.
 #[derive(Debug)]
 pub struct Slot {
@@ -49,6 +57,8 @@ pub struct Slot {
     /// room for another.
     idle_since_ms: AtomicU64,
     began: Instant,
+    /// It became a stream, and is one until it ends.
+    streams: AtomicBool,
     /// Told to end and make room.
     pub evicted: Notify,
 }
@@ -146,11 +156,30 @@ impl Connections {
             reserved,
             idle_since_ms: AtomicU64::new(0),
             began: self.began,
+            streams: AtomicBool::new(false),
             evicted: Notify::new(),
         });
         slot.idle();
         open.push(Arc::clone(&slot));
         Some(slot)
+    }
+
+    /// May this connection become a stream? It is counted as one from here on then; else how many its peer, or all together,
+    /// may have.
+    ///
+    /// # Errors
+    /// The cap that is reached.
+    pub fn stream(&self, slot: &Slot) -> Result<(), usize> {
+        let open = lock(&self.open);
+        let streams = || open.iter().filter(|other| other.streams.load(Ordering::Relaxed));
+        let of_peer = streams().filter(|other| subnet(other.peer) == subnet(slot.peer)).count();
+        for (there, cap) in [(of_peer, self.caps.per_peer), (streams().count(), self.caps.total)] {
+            if there >= Caps::streams(cap) {
+                return Err(Caps::streams(cap));
+            }
+        }
+        slot.streams.store(true, Ordering::Relaxed);
+        Ok(())
     }
 
     fn leave(&self, slot: &Slot) {
@@ -267,6 +296,26 @@ mod tests {
         }
         assert!(table.admit(PEERS[0]).is_none());
         assert_eq!(table.counts(), (6, 1, 0));
+    }
+
+    /// Streams are at work for as long as they are open: were every connection one, no command of that peer would pass.
+    #[test]
+    fn streams_leave_room_for_requests_of_the_same_peer() {
+        let table = table();
+        let streams: Vec<_> = (0..4).map(|_| table.admit(PEERS[0]).unwrap()).collect();
+        let granted = streams.iter().map(|slot| {
+            slot.busy();
+            table.stream(slot)
+        });
+        assert_eq!(granted.collect::<Vec<_>>(), [Ok(()), Ok(()), Ok(()), Err(3)]);
+        streams[3].idle();
+        assert!(!table.admit(PEERS[0]).unwrap().reserved, "a request of theirs passes");
+        let others: Vec<_> = (0..2).map(|_| table.admit(PEERS[1]).unwrap()).collect();
+        let granted: Vec<_> = others.iter().map(|slot| table.stream(slot)).collect();
+        assert_eq!(granted, [Ok(()), Ok(())], "five of all six");
+        assert_eq!(table.stream(&table.admit(PEERS[1]).unwrap()), Err(5));
+        table.leave(&streams[0]);
+        assert_eq!(table.stream(&table.admit(PEERS[1]).unwrap()), Ok(()), "one ended");
     }
 
     #[test]

@@ -4,6 +4,7 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use kort_proto::config::ConfigError;
+use kort_proto::transport::TransportError;
 use thiserror::Error;
 
 use crate::{tls, token};
@@ -99,6 +100,9 @@ pub enum GatewayError {
     /// Certificate or key cannot be used.
     #[error(transparent)]
     Tls(#[from] tls::TlsError),
+    /// Another gateway runs here.
+    #[error(transparent)]
+    Transport(#[from] TransportError),
     /// The configuration cannot be used.
     #[error(transparent)]
     Config(#[from] ConfigError),

@@ -39,7 +39,7 @@ impl Heard {
     }
 
     /// How long the servo is silent, of the time that somebody listened.
-    fn silence(&self, now: Instant) -> Duration {
+    pub fn silence(&self, now: Instant) -> Duration {
         let (before, looked) = self.silent;
         before + looked.map_or(Duration::ZERO, |at| now.saturating_duration_since(at).min(self.turn))
     }
@@ -81,12 +81,14 @@ impl Heard {
         self.servo.is_none() || self.silence(now) > self.servo_silence
     }
 
-    /// Faults as shown: the gateway's own too, which stop nothing, and a servo that fell silent while armed, before its
-    /// successor can say so.
+    /// Faults as shown: the gateway's own too, which stop nothing, and a servo that is gone and takes an armed drive or latched
+    /// faults along, its own end among them, before its successor can say so.
     pub fn shown_faults(&self, now: Instant) -> u64 {
-        let armed_last = self.servo.as_ref().is_some_and(|(_, telemetry)| telemetry.armed != 0);
-        let lost = if armed_last && self.servo_silent(now) { Fault::ServoLost.bit() } else { 0 };
-        self.faults(now) | self.own_faults | lost
+        let lost = self.servo.as_ref().is_some_and(|(_, last)| {
+            let latched = last.faults != 0 && self.telemetry(now).is_none();
+            (last.armed != 0 || latched) && self.servo_silent(now)
+        });
+        self.faults(now) | self.own_faults | if lost { Fault::ServoLost.bit() } else { 0 }
     }
 
     /// Was the drive armed when the servo was last heard, not long ago? A hiccup of this process is no reason to
@@ -131,5 +133,23 @@ mod tests {
         }
         assert!(!heard.shown_armed(ms(69)), "three turns in time and nothing came");
         assert_eq!(heard.shown_faults(ms(69)), Fault::ServoLost.bit());
+    }
+
+    /// Its last word is that it is disarmed, and of what; who looks later still sees that it did not end as asked.
+    #[test]
+    fn a_servo_that_was_told_to_end_while_armed_is_lost_too() {
+        let t0 = Instant::now();
+        let ms = |n| t0 + Duration::from_millis(n);
+        let gone = |faults, now| {
+            let last = Telemetry { armed: 0, faults, ..Telemetry::default() };
+            let mut heard = Heard { servo: Some((t0, last)), ..Heard::new(SILENCE, TURN) };
+            heard.looked(t0, true);
+            (1..=120).for_each(|turn| heard.looked(ms(4 * turn), false));
+            heard.shown_faults(now)
+        };
+        let restarted = Fault::ServoRestarted.bit();
+        assert_eq!(gone(restarted, ms(100)), restarted, "it has just said so itself");
+        assert_eq!(gone(restarted, ms(400)), Fault::ServoLost.bit());
+        assert_eq!(gone(0, ms(400)), 0, "at rest and without a fault nothing is lost");
     }
 }

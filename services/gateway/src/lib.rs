@@ -86,6 +86,7 @@ const RAMPED_WITHIN: Duration = Duration::from_secs(1);
 pub fn run(config: &Config, deployment: &Deployment) -> Result<(), GatewayError> {
     let settings = Settings::new(config)?;
     let thrusters = settings::thrusters(config)?;
+    let _part = deployment.take_part("gateway", None)?;
     if let Some(words) = doubtful(config) {
         tracing::warn!("{words}");
     }
@@ -160,7 +161,7 @@ async fn serve(
         streams: Streams::default(),
         address: settings.address(),
         disks: [settings.recordings.clone(), settings.events.clone()],
-        watched: deployment.watched_file(),
+        deployment: deployment.clone(),
         answers: Default::default(),
         durations: Durations::default(),
         stopping: stopping.clone(),

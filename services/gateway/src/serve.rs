@@ -43,6 +43,10 @@ pub struct Reserved;
 #[derive(Clone, Copy, Debug)]
 pub struct Peer(pub IpAddr);
 
+/// The connection that a request came on.
+#[derive(Clone, Debug)]
+pub struct Seat(pub Arc<Slot>);
+
 /// What the port needs.
 pub struct Port {
     /// Where requests go.
@@ -151,6 +155,7 @@ where
             let arriving = Arc::clone(&slot);
             let mut request = request.map(|body| Body::new(Arriving { body, slot: arriving }));
             request.extensions_mut().insert(Peer(slot.peer));
+            request.extensions_mut().insert(Seat(Arc::clone(&slot)));
             if slot.reserved {
                 request.extensions_mut().insert(Reserved);
             }

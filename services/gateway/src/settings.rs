@@ -175,7 +175,7 @@ impl Settings {
         if self.bind.port() == 0 {
             wrong.push("`gateway.bind` has port 0; allowed are 1 to 65535\nhint: \"127.0.0.1:8080\"".into());
         }
-        if let Some(odd) = self.hosts.iter().find(|host| !hosts::is_host(host)) {
+        for odd in self.hosts.iter().filter(|host| !hosts::is_host(host)) {
             wrong.push(format!(
                 "`gateway.hosts` holds {odd:?}; allowed are names and addresses without scheme, port or path\nhint: \"thruster.example.org\""
             ));

@@ -15,8 +15,8 @@ use super::{STOP_WITHIN, UpError};
 const START: Duration = Duration::from_secs(3);
 /// A child beats this long after its start at the latest, busy machines included.
 const FIRST_BEAT: Duration = Duration::from_secs(6);
-/// A child that did not beat for this long hangs: it is ended and replaced.
-pub const HUNG_AFTER: Duration = Duration::from_secs(2);
+/// One that has beaten and did not for this long hangs: it is ended and replaced.
+const HUNG_AFTER: Duration = Duration::from_secs(2);
 /// Ends in quick succession that are followed by a start at once; after them starts come slower and slower.
 const AT_ONCE: u32 = 5;
 const SLOWEST: Duration = Duration::from_secs(2);
@@ -39,8 +39,10 @@ pub struct Role {
     /// The process, while it lives.
     pub child: Option<Child>,
     started: Instant,
-    /// When it was last heard.
-    pub beat: Instant,
+    /// When it was last heard, started, or excused.
+    beat: Instant,
+    /// Has it beaten since its start?
+    beats: bool,
     /// Starts in a row that failed.
     pub failed_starts: u32,
     /// It cannot use the configuration.
@@ -67,6 +69,7 @@ impl Role {
             child: None,
             started: now,
             beat: now,
+            beats: false,
             failed_starts: 0,
             refused: false,
             restarts: 0,
@@ -128,7 +131,7 @@ impl Role {
         info!(thruster = self.thruster, process = child.id(), "{} started", self.name);
         self.child = Some(child);
         self.started = Instant::now();
-        self.beat = self.started;
+        (self.beat, self.beats) = (self.started, false);
         Ok(())
     }
 
@@ -137,9 +140,20 @@ impl Role {
         self.child.is_some() && self.started.elapsed() >= START
     }
 
-    /// Does it live without a sign of life?
-    pub fn hangs(&self) -> bool {
-        self.child.is_some() && self.started.elapsed() > FIRST_BEAT && self.beat.elapsed() > HUNG_AFTER
+    /// It was heard.
+    pub fn heard(&mut self) {
+        (self.beat, self.beats) = (Instant::now(), true);
+    }
+
+    /// Its silence up to now is not its own doing.
+    pub fn excuse(&mut self) {
+        self.beat = Instant::now();
+    }
+
+    /// Does it live without a sign of life? For how long then.
+    pub fn hangs(&self) -> Option<Duration> {
+        let patience = if self.beats { HUNG_AFTER } else { FIRST_BEAT };
+        (self.child.is_some() && self.beat.elapsed() > patience).then_some(patience)
     }
 
     /// Ends a child that does not listen any more.
@@ -199,5 +213,29 @@ impl Role {
         let _ = child.kill();
         let _ = child.wait();
         false
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_that_has_beaten_hangs_after_two_seconds_however_young_it_is() {
+        let mut role = Role::new("servo", None);
+        role.child = Some(Command::new("sleep").arg("60").spawn().unwrap());
+        let ago = |ms| Instant::now() - Duration::from_millis(ms);
+        (role.started, role.beat) = (ago(2500), ago(2500));
+        assert_eq!(role.hangs(), None, "it is starting");
+        role.heard();
+        assert_eq!(role.hangs(), None);
+        role.beat = ago(2100);
+        assert_eq!(role.hangs(), Some(HUNG_AFTER));
+        role.excuse();
+        assert_eq!(role.hangs(), None, "the machine stood still");
+        (role.beat, role.beats) = (ago(6100), false);
+        assert_eq!(role.hangs(), Some(FIRST_BEAT), "it never came up");
+        role.kill();
+        let _ = role.child.take().unwrap().wait();
     }
 }

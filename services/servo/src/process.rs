@@ -92,9 +92,10 @@ fn of_one(config: &Config, id: &str, taken: &mut Vec<Taken>) -> Vec<ServoError> 
     };
     let mut wrong = Vec::new();
     let settings = Settings::read(config, id, thruster, &rig, &mut wrong);
-    // Bounds that are crossed by a value that is wrong already are told by that one.
-    let settings = settings.err().filter(|_| wrong.is_empty());
-    wrong.extend(settings);
+    // A value that is told already is not told again as missing.
+    if let Some(error) = settings.err().filter(|error| !wrong.contains(error)) {
+        wrong.push(error);
+    }
     let drive = drives::choose(config, id, thruster, &rig);
     let sensors = sensors::choose(config, id, thruster, &rig);
     takes(id, drive.as_ref().ok(), sensors.as_deref().unwrap_or_default(), taken);
@@ -158,7 +159,7 @@ fn takes_its_own(
 }
 
 /// Runs the servo of one thruster until SIGTERM, SIGINT or SIGHUP. With `join` another process owns the
-/// shared memory; without, this one creates it.
+/// shared memory, the supervisor that started this one; without, this one creates it.
 ///
 /// # Errors
 /// [`ServoError`] before the loop starts; the loop itself only ends by a signal.
@@ -176,6 +177,8 @@ pub fn run(
     for signal in END_SIGNALS {
         signal_hook::flag::register(signal, Arc::clone(&stop))?;
     }
+    // Held by the kernel for as long as this process lives: nothing of the loop knows of it.
+    let _part = deployment.take_part("servo", Some(id))?;
     let owner = if join { None } else { Some(own(config, deployment, &stop)?) };
     deployment.wait_for_generation(Duration::from_secs(10))?;
     let mut ports = ServoPorts::open(deployment, id)?;

@@ -28,6 +28,48 @@ struct LimitKeys {
     temperature_c: Option<f64>,
 }
 
+impl LimitKeys {
+    /// Bounds that contradict each other: which keys, and the words from the first one on. What is not written is named as
+    /// what stands in its place.
+    fn crossed(&self, rig_current_a: f64) -> Vec<([&'static str; 2], String)> {
+        let mut crossed = Vec::new();
+        let current_a = self.current_a.unwrap_or(rig_current_a);
+        if let Some(trip) = self.trip_current_a.filter(|trip| *trip < current_a) {
+            let whose =
+                if self.current_a.is_none() { ", which is amplifier.current_limit_a of the rig" } else { "" };
+            crossed.push((
+                ["limits.trip_current_a", "limits.current_a"],
+                format!(
+                    "limits.trip_current_a` = {trip} is below current_a = {current_a}{whose}\nhint: 1.25 times current_a"
+                ),
+            ));
+        }
+        if let Some(trip) = self.trip_speed_rad_s {
+            let words = match self.speed_rad_s {
+                Some(speed) if trip < speed => Some(format!(
+                    "limits.trip_speed_rad_s` = {trip} is below speed_rad_s = {speed}\nhint: 1.15 times speed_rad_s"
+                )),
+                None => Some(format!(
+                    "limits.trip_speed_rad_s` = {trip}, but speed_rad_s is not stated, and by default no speed is its largest: it would trip before any drive is taken away\nhint: state speed_rad_s too, at most {trip}; 1.15 times that is trip_speed_rad_s where it is left out"
+                )),
+                _ => None,
+            };
+            crossed.extend(words.map(|words| (["limits.trip_speed_rad_s", "limits.speed_rad_s"], words)));
+        }
+        if let (Some(low), Some(high)) = (self.supply_low_v, self.supply_high_v)
+            && low >= high
+        {
+            crossed.push((
+                ["limits.supply_low_v", "limits.supply_high_v"],
+                format!(
+                    "limits.supply_low_v` = {low} is not below supply_high_v = {high}\nhint: the band around the supply's nominal voltage"
+                ),
+            ));
+        }
+        crossed
+    }
+}
+
 /// Section `checks` as written.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -228,22 +270,29 @@ impl Settings {
                 "leave the key out: it follows from the rig",
             ),
         ];
+        let mut told = Vec::new();
         for (key, value, low, high, hint) in bounds {
             if let Some(value) = value.filter(|v| !(low..=high).contains(v)) {
+                told.push(key);
                 wrong.push(config.error(format!(
                     "`thrusters.{id}.{key}` = {value} is outside {low} to {high}\nhint: {hint}"
                 )));
             }
         }
         if let Some(inflow) = checks.inflow_m_s.filter(|_| rig.propeller.is_none()) {
-            return Err(config.error(format!(
+            wrong.push(config.error(format!(
                 "`thrusters.{id}.checks.inflow_m_s` = {inflow}, and the rig has no propeller that a stream could turn\nhint: leave the key out: on a dry shaft only what hangs on it gives back"
             )));
         }
+        let crossed = keys.crossed(rig.amplifier.current_limit_a);
+        // Bounds that are crossed by a value that is wrong already are told by that one.
+        let crossed = crossed.into_iter().filter(|(of, _)| !told.iter().any(|key| of.contains(key)));
+        wrong.extend(crossed.map(|(_, words)| config.error(format!("`thrusters.{id}.{words}"))));
         let need = |key: &str, value: f64, instead: &str| {
-            Some(value)
-                .filter(|v| v.is_finite())
-                .ok_or_else(|| config.error(format!("`thrusters.{id}.{key}` is missing\nhint: {instead}")))
+            // One that stands there and is none is told already.
+            let refused = || wrong.first().filter(|_| told.contains(&key)).cloned();
+            let missing = || config.error(format!("`thrusters.{id}.{key}` is missing\nhint: {instead}"));
+            Some(value).filter(|v| v.is_finite()).ok_or_else(|| refused().unwrap_or_else(missing))
         };
         let current_a = need(
             "limits.current_a",
@@ -284,24 +333,6 @@ impl Settings {
             water,
             ..usual
         };
-        if limits.trip_current_a < current_a {
-            return Err(config.error(format!(
-                "`thrusters.{id}.limits.trip_current_a` = {} is below current_a = {current_a}\nhint: 1.25 times current_a",
-                limits.trip_current_a
-            )));
-        }
-        if limits.trip_speed_rad_s < speed_rad_s {
-            return Err(config.error(format!(
-                "`thrusters.{id}.limits.trip_speed_rad_s` = {} is below speed_rad_s = {speed_rad_s}\nhint: 1.15 times speed_rad_s",
-                limits.trip_speed_rad_s
-            )));
-        }
-        let (low, high) = limits.supply_v;
-        if low >= high {
-            return Err(config.error(format!(
-                "`thrusters.{id}.limits.supply_low_v` = {low} is not below supply_high_v = {high}\nhint: the band around the supply's nominal voltage"
-            )));
-        }
         // 3.5 of the controller's periods, so that zero torque is reached within five.
         let command_timeout_ns = thruster.controller_period_ns() * 7 / 2;
         Ok(Self { period_ns: thruster.servo_period_ns(), command_timeout_ns, limits })

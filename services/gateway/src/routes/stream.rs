@@ -17,6 +17,7 @@ use super::thrusters::json;
 use crate::App;
 use crate::extract::{Object, Path, Query};
 use crate::problem::{Kind, Problem};
+use crate::serve::Seat;
 use crate::thruster::Thruster;
 use crate::token::{Identity, Role};
 use crate::view::{Setpoint, ThrusterState};
@@ -88,12 +89,14 @@ pub struct Incoming {
         (status = 400, description = "`malformed-query`, `malformed-header`: the handshake is broken", body = Problem, content_type = "application/problem+json"),
         (status = 404, description = "`unknown-thruster`", body = Problem, content_type = "application/problem+json"),
         (status = 422, description = "`out-of-range`: hz", body = Problem, content_type = "application/problem+json"),
+        (status = 503, description = "`overloaded`: this address, or all together, have as many streams as there may be; the rest of their connections is left to requests", body = Problem, content_type = "application/problem+json"),
         (status = 426, description = "`upgrade-required`: this connection cannot be upgraded", body = Problem, content_type = "application/problem+json")))]
 async fn stream(
     State(app): State<Arc<App>>,
     Path(id): Path<String>,
     Query(Rate { hz }): Query<Rate>,
     Extension(who): Extension<Identity>,
+    seat: Option<Extension<Seat>>,
     upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,
 ) -> Result<Response, Problem> {
     use WebSocketUpgradeRejection as Rejection;
@@ -103,15 +106,23 @@ async fn stream(
             .hint("50 is plenty for eyes"));
     }
     match upgrade {
-        Ok(upgrade) => Ok(upgrade
-            .max_message_size(MESSAGE_BYTES_READ)
-            .max_frame_size(MESSAGE_BYTES_READ)
-            .protocols([PROTOCOL])
-            .on_upgrade(move |socket| {
+        Ok(upgrade) => {
+            if let Some(Extension(Seat(slot))) = seat {
+                app.connections().stream(&slot).map_err(|cap| {
+                    Problem::new(
+                        Kind::Overloaded,
+                        format!("{cap} streams are open, which is all there may be"),
+                    )
+                    .hint("close streams that nobody reads; requests pass all the same")
+                })?;
+            }
+            let upgrade = upgrade.max_message_size(MESSAGE_BYTES_READ).max_frame_size(MESSAGE_BYTES_READ);
+            let session = move |socket| {
                 let period = Duration::from_secs_f64(1.0 / hz);
                 Session { app, thruster, who, lease: None, asked_at: None, away: None }.serve(socket, period)
-            })
-            .into_response()),
+            };
+            Ok(upgrade.protocols([PROTOCOL]).on_upgrade(session).into_response())
+        }
         Err(Rejection::InvalidConnectionHeader(_) | Rejection::InvalidUpgradeHeader(_)) => {
             Ok(json(thruster.state_json()))
         }
