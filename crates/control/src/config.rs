@@ -22,12 +22,12 @@ use crate::observers::{ObserverKind, ObserverOptions};
 #[derive(Debug, Error, Clone, PartialEq)]
 pub enum ConfigError {
     /// Not TOML, an unknown key or a value of the wrong kind; the words name line or key.
-    #[error("{message}\nhint: kinds of law: {laws}")]
+    #[error("{message}\nhint: {hint}")]
     Syntax {
         /// The parser's words.
         message: String,
-        /// Known laws.
-        laws: String,
+        /// The kinds there are of what was meant, or where the keys stand.
+        hint: String,
     },
     /// A parameter that is not tunable.
     #[error("`{name}` is not a parameter of a controller\nhint: {hint}")]
@@ -56,7 +56,17 @@ pub enum ConfigError {
 }
 
 fn syntax(message: String) -> ConfigError {
-    ConfigError::Syntax { message, laws: LawKind::ALL.map(LawKind::name).join(", ") }
+    let of = |kind: &str, names: &[&str]| {
+        let found = message.strip_prefix(&format!("`{kind}` = \""))?.split('"').next()?;
+        let near = place::near(found, names.iter().copied());
+        let near = near.map(|near| format!("did you mean `{near}`? ")).unwrap_or_default();
+        Some(format!("{near}kinds of {kind}: {}", names.join(", ")))
+    };
+    let hint = of("law", &LawKind::ALL.map(LawKind::name))
+        .or_else(|| of("observer", &ObserverKind::ALL.map(ObserverKind::name)))
+        .or_else(|| of("estimator", &EstimatorKind::ALL.map(EstimatorKind::name)))
+        .unwrap_or_else(|| "config/controllers/ has examples; docs/control.md tells the keys".into());
+    ConfigError::Syntax { message, hint }
 }
 
 /// Limits a controller keeps besides the rig's own.
@@ -135,7 +145,7 @@ impl ControllerConfig {
     /// # Errors
     /// [`ConfigError::Syntax`] if a value has no form in TOML; no configuration that was read or set has one.
     pub fn to_toml(&self) -> Result<String, ConfigError> {
-        toml::to_string(self).map_err(|e| ConfigError::Syntax { message: e.to_string(), laws: String::new() })
+        toml::to_string(self).map_err(|e| syntax(e.to_string()))
     }
 
     /// The same with every [`Tunable`] of another configuration: what is left differs in what cannot change while
@@ -286,7 +296,13 @@ mod tests {
     #[test]
     fn errors_name_what_is_allowed() {
         let err = ControllerConfig::from_toml("law = \"velocity_srevo\"").unwrap_err().to_string();
-        assert!(err.contains("velocity_servo"), "{err}");
+        assert!(err.contains("did you mean `velocity_servo`? kinds of law: "), "{err}");
+        for (key, hint) in
+            [("observer", "kinds of observer: open_loop, "), ("estimator", "kinds of estimator: off, ")]
+        {
+            let err = ControllerConfig::from_toml(&format!("{key} = \"kalmann\"")).unwrap_err().to_string();
+            assert!(err.contains(hint) && !err.contains("kinds of law"), "{err}");
+        }
         let mut config = ControllerConfig::default();
         let err = config.set("phase_margin_deg", f64::NAN).unwrap_err().to_string();
         assert!(err.contains("30 to 85"), "{err}");

@@ -39,7 +39,7 @@ use crate::signals::Measurement;
 
 use channels::{Block, CHANNELS, Channels, DRIVE, GAIN, SIGNS, THRUST, TORQUE, WATER, WAYS, ZERO, sign};
 pub use cusum::threshold;
-use cusum::{Cusum, LEAST, Lately, Usual};
+use cusum::{Cusum, LEAST, Lately, Onset, Usual};
 use faults::{FAULTS, Sides, rehearsed};
 
 /// Where a mismatch is.
@@ -101,7 +101,7 @@ pub struct Mismatch {
     pub level: [f64; 5],
     /// The path that went off last, of those that still are.
     pub alarm: Option<Path>,
-    /// Time since its onset, s; zero without an alarm.
+    /// Time since its onset, s, driven or not; zero without an alarm.
     pub since_s: f64,
     /// Mean and spread are still being learnt.
     pub learning: bool,
@@ -114,6 +114,9 @@ pub struct Mismatch {
 #[derive(Clone, Copy, Debug)]
 pub struct Monitor {
     threshold: f64,
+    /// Time that passed since it was made, driven or not, s, and what it was when the block began to be driven.
+    clock_s: f64,
+    began_s: f64,
     channels: Channels,
     usual: [Usual; SIGNS],
     lately: [Lately; RESIDUALS],
@@ -140,7 +143,7 @@ pub struct Seen<'a> {
     pub drive_a: Option<(f64, f64)>,
     /// The thruster is driven: a drive at rest or disarmed says nothing.
     pub driving: bool,
-    /// Time since the last tick, s.
+    /// Time since the last tick, s, as the statistics take it.
     pub dt_s: f64,
 }
 
@@ -149,6 +152,8 @@ impl Monitor {
     pub fn new(model: &ControlModel, alarms_per_day: f64) -> Self {
         Self {
             threshold: threshold(alarms_per_day, FAULTS),
+            clock_s: 0.0,
+            began_s: 0.0,
             channels: Channels::default(),
             usual: [Usual::default(); SIGNS],
             lately: [Lately::default(); RESIDUALS],
@@ -167,9 +172,18 @@ impl Monitor {
         self.off = [0; FAULTS];
     }
 
+    /// Time passes, s, driven or not and however long: onsets are told by it, and nothing else counts it.
+    pub fn passes(&mut self, time_s: f64) {
+        self.clock_s += time_s;
+    }
+
     /// One tick.
     pub fn tick(&mut self, seen: &Seen) {
+        let before_s = self.channels.time_s;
         self.channels.tick(seen);
+        if before_s == 0.0 && self.channels.time_s > 0.0 {
+            self.began_s = self.clock_s - seen.dt_s;
+        }
         if self.channels.time_s >= BLOCK_S {
             self.end_block();
         }
@@ -199,7 +213,7 @@ impl Monitor {
         for ((cusum, view), (_, sides, _)) in self.cusums.iter_mut().zip(&views).zip(&self.faults) {
             let (along, length) = projected(view, &z);
             if length > ENOUGH {
-                cusum.take(along / length.sqrt(), *sides, self.threshold);
+                cusum.take(along / length.sqrt(), *sides, self.threshold, self.began_s);
             }
         }
         self.judge(&views);
@@ -248,8 +262,8 @@ impl Monitor {
     }
 
     /// What the blocks since an onset say along a fault, standard deviations: the square is twice the logarithm of its likelihood.
-    fn likely(&self, view: &[f64; SIGNS], sides: Sides, since_s: f64) -> f64 {
-        let blocks = ((since_s / BLOCK_S).round() as usize).clamp(1, KEPT);
+    fn likely(&self, view: &[f64; SIGNS], sides: Sides, driven_s: f64) -> f64 {
+        let blocks = ((driven_s / BLOCK_S).round() as usize).clamp(1, KEPT);
         let (mut along, mut length) = (0.0, 0.0);
         for back in 1..=blocks {
             let (a, l) = projected(view, &self.kept[(self.oldest + KEPT - back) % KEPT]);
@@ -272,9 +286,9 @@ impl Monitor {
         // What else is seen of a path that is off already is no news.
         let full = |k: &usize| sums[*k] >= self.threshold && !self.is_off(self.faults[*k].0);
         let onsets = (0..FAULTS).filter(full).map(|k| self.cusums[k].level().1);
-        let Some(since_s) = onsets.min_by(f64::total_cmp) else { return };
-        if let Some((fault, side)) = self.likeliest(views, since_s) {
-            self.goes_off(fault, side, since_s);
+        let Some(onset) = onsets.min_by(|a, b| a.driven_s.total_cmp(&b.driven_s)) else { return };
+        if let Some((fault, side)) = self.likeliest(views, onset.driven_s) {
+            self.goes_off(fault, side, onset);
         }
     }
 
@@ -284,10 +298,10 @@ impl Monitor {
     }
 
     /// The likeliest of the faults on paths that are not off, and its side: of those that are as good as likeliest the commonest.
-    fn likeliest(&self, views: &[[f64; SIGNS]; FAULTS], since_s: f64) -> Option<(usize, usize)> {
+    fn likeliest(&self, views: &[[f64; SIGNS]; FAULTS], driven_s: f64) -> Option<(usize, usize)> {
         let along: [f64; FAULTS] = std::array::from_fn(|k| {
             let (path, sides, _) = self.faults[k];
-            if self.is_off(path) { 0.0 } else { self.likely(&views[k], sides, since_s) }
+            if self.is_off(path) { 0.0 } else { self.likely(&views[k], sides, driven_s) }
         });
         let most = along.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
         let fault = along.iter().position(|x| most > 0.0 && x.abs() >= AS_GOOD * most)?;
@@ -295,8 +309,8 @@ impl Monitor {
     }
 
     /// A fault goes off; the other paths begin anew.
-    fn goes_off(&mut self, fault: usize, side: usize, since_s: f64) {
-        self.cusums[fault].fill(side, self.threshold, since_s);
+    fn goes_off(&mut self, fault: usize, side: usize, onset: Onset) {
+        self.cusums[fault].fill(side, self.threshold, onset);
         self.off[fault] = 1 + self.off.iter().max().copied().unwrap_or(0);
         for k in 0..FAULTS {
             if self.off[k] == 0 && self.faults[k].0 != self.faults[fault].0 {
@@ -325,7 +339,7 @@ impl Monitor {
         }
         let last = self.last_off();
         let alarm = last.map(|k| self.faults[k].0);
-        let since_s = last.map_or(0.0, |k| self.cusums[k].level().1 + self.channels.time_s);
+        let since_s = last.map_or(0.0, |k| self.clock_s - self.cusums[k].level().1.at_s);
         let lately = self.lately.map(|lately| lately.mean());
         Mismatch { level, alarm, since_s, learning: self.learning(), lately }
     }
@@ -338,30 +352,4 @@ fn projected(view: &[f64; SIGNS], z: &[Option<f64>; SIGNS]) -> (f64, f64) {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::channels::Sign;
-    use super::*;
-    use crate::model::tests::stand;
-
-    /// Standard deviations in which a sign of 0.25 is told once a minute more of it has come, of a mean and spread of zero and
-    /// 0.1 that the first blocks had.
-    fn after_a_minute_more(off: bool) -> f64 {
-        let mut monitor = Monitor::new(&stand(), 1.0);
-        let sign = |value| Sign { value, excitation: 1.0 };
-        (0..LEARNT).for_each(|k| monitor.usual[0].take(sign(if k % 2 == 0 { 0.1 } else { -0.1 })));
-        let shown = std::array::from_fn(|i| (i == 0).then(|| sign(0.25)));
-        monitor.to_learn = [shown; KEPT];
-        monitor.off[0] = u32::from(off);
-        for oldest in 0..KEPT {
-            monitor.oldest = oldest;
-            monitor.learn_oldest();
-        }
-        monitor.usual[0].standardised(sign(0.25), 0.0)
-    }
-
-    #[test]
-    fn what_a_minute_showed_becomes_usual_unless_something_is_off() {
-        assert!((after_a_minute_more(true) - 2.5).abs() < 0.02);
-        assert!(after_a_minute_more(false) < 1.7, "{}", after_a_minute_more(false));
-    }
-}
+mod tests;

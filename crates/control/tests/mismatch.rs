@@ -4,6 +4,7 @@
 mod common;
 
 use common::watched::{DT, Watched, learnt, reference};
+use kort_control::Reference;
 use kort_control::mismatch::{BLOCK_S, LEARNT, Mismatch, Path};
 use kort_thruster::parameters::Parameter;
 
@@ -58,19 +59,25 @@ fn an_effect_of_a_few_percent_is_found_on_its_path() {
                         watched.time_s += DT;
                         settled = watched.l.controller.mismatch();
                     }
-                    (*name, *path, alarm, after, settled)
+                    let measured = watched.l.measured();
+                    for _ in 0..(30.0 / DT) as usize {
+                        watched.l.tick_with(&measured, Reference::Off);
+                    }
+                    let rested_s = watched.l.controller.mismatch().since_s - settled.since_s;
+                    (*name, *path, alarm, after, settled, rested_s)
                 })
             })
             .collect();
         running.into_iter().map(|t| t.join().unwrap()).collect::<Vec<_>>()
     });
-    for (name, path, alarm, after, settled) in &found {
+    for (name, path, alarm, after, settled, rested_s) in &found {
         println!("{name}: {alarm:?} after {after:.0} s, then {:?} {:?}", settled.alarm, settled.level);
         assert!(alarm.is_some(), "{name}: no alarm within {WITHIN_S} s: {settled:?}");
         assert_eq!((*alarm, settled.alarm), (Some(*path), Some(*path)), "{name}: {settled:?}");
         // The onset is known to within a few blocks.
         let onset_s = after + 30.0 - settled.since_s;
         assert!(onset_s.abs() < 10.0 * BLOCK_S, "{name}: onset off by {onset_s} s: {settled:?}");
+        assert!((rested_s - 30.0).abs() < 0.1, "{name}: at rest it went on by {rested_s} s of 30");
     }
 }
 

@@ -143,6 +143,9 @@ pub fn of_rig(rig: &Rig, period_s: f64) -> Result<Vec<Usage>, ModelError> {
 /// All that is ever used, and why nothing is where nothing is.
 pub fn of_effect(effect: &'static Descriptor) -> Usage {
     let mut usage = Usage { effect: effect.id, uses: Vec::new(), left: None };
+    if effect.nonparametric {
+        return Usage { left: Some(NO_LASTING_SIZES), ..usage };
+    }
     for text in [
         include_str!("../../../../config/thrusters/whitcomb-yoerger-1999.toml"),
         include_str!("../../../../config/thrusters/t200.toml"),
@@ -306,13 +309,16 @@ fn shown(effect: &mut dyn Effect, model: &ControlModel) -> bool {
         })
 }
 
+/// Why nothing reaches one that changes freely with time, whatever use its value of any moment would have.
+const NO_LASTING_SIZES: &str = "it changes freely with time and has no lasting sizes: a rig cannot state it; what it does is left to the observer's ambient flow and unexplained load";
+
 /// Why nothing reaches an effect.
 fn why(rig: &Rig) -> &'static str {
     let effects = built(rig, 1e-3);
     let Some((descriptor, effect)) = effects.first() else { return "the rig states none" };
     let hooks = effect.hooks();
     if descriptor.nonparametric {
-        "it changes freely with time and has no lasting sizes: a rig cannot state it; what it does is left to the observer's ambient flow and unexplained load"
+        NO_LASTING_SIZES
     } else if effect.states() > 0 && !effect.slow() {
         "it has states of its own that no observer carries: what it does to the shaft is left to the observer's unexplained load, what it does to the water to its ambient flow"
     } else if hooks.foil {
@@ -340,6 +346,7 @@ mod tests {
         for effect in ALL {
             let usage = of_effect(effect);
             assert!(!usage.uses.is_empty() || usage.left.is_some(), "{usage:?}");
+            assert!(usage.uses.is_empty() || !effect.nonparametric, "no rig can state it: {usage:?}");
         }
     }
 

@@ -101,6 +101,10 @@ impl Lead {
         meets: &Meets,
         dt_s: f64,
     ) -> Led {
+        // A model that ran away, as under a loop slower than its shaft, begins again from rest: no number has no bounds.
+        if ![self.speed_rad_s, self.current_a, self.command_a].iter().all(|state| state.is_finite()) {
+            self.reset(0.0, 0.0);
+        }
         let (kt, inertia, limit) = (model.torque_constant_nm_a, model.inertia_kg_m2, model.current_limit_a);
         let speed = self.speed_rad_s;
         let load = model.load(speed, meets.flow_m_s, meets.swirl_m_s).torque_n_m
@@ -138,6 +142,28 @@ impl Lead {
             torque_n_m: kt * self.command_a,
             speed_command_rad_s: self.speed_rad_s,
             speed_rad_s: self.speed_rad_s,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use kort_thruster::rig::Rig;
+
+    use super::{Lead, Meets};
+    use crate::model::ControlModel;
+
+    #[test]
+    fn a_model_that_ran_away_begins_again_from_rest() {
+        let rig =
+            Rig::from_toml(include_str!("../../../../config/thrusters/whitcomb-yoerger-1999.toml")).unwrap();
+        let model = ControlModel::from_rig(&rig, 0.002).unwrap();
+        let meets = Meets { flow_m_s: 0.0, swirl_m_s: 0.0, load_n_m: 0.0, supply_v: None };
+        for lost in [f64::NAN, f64::INFINITY] {
+            let mut lead = Lead::new(&model);
+            lead.reset(lost, lost);
+            let led = lead.step(&model, 10.0, 0.0, &meets, 0.002);
+            assert!(led.torque_n_m > 0.0 && led.speed_rad_s.is_finite(), "{led:?}");
         }
     }
 }

@@ -65,32 +65,49 @@ impl Lately {
     }
 }
 
+/// When a sum last stood at zero.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Onset {
+    /// Driven time since then, s: what the statistics count.
+    pub(super) driven_s: f64,
+    /// The monitor's clock then, s: what is told, for it goes on while nothing is driven.
+    pub(super) at_s: f64,
+}
+
 /// Two-sided CUSUM with the time since it last stood at zero.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Cusum {
     sums: [f64; 2],
-    since_s: [f64; 2],
+    onsets: [Onset; 2],
 }
 
 impl Cusum {
-    pub(super) fn take(&mut self, z: f64, sides: Sides, most: f64) {
+    /// Takes a block that began at `began_s` of the monitor's clock.
+    pub(super) fn take(&mut self, z: f64, sides: Sides, most: f64, began_s: f64) {
         let both = [(0, 1.0), (1, -1.0)];
         for (side, sign) in both.into_iter().take(if sides == Sides::Both { 2 } else { 1 }) {
             let sum = self.sums[side] + sign * z.clamp(-CLIP, CLIP) - REFERENCE;
             self.sums[side] = sum.clamp(0.0, most);
-            self.since_s[side] = if sum <= 0.0 { 0.0 } else { self.since_s[side] + BLOCK_S };
+            let onset = &mut self.onsets[side];
+            if sum <= 0.0 {
+                *onset = Onset::default();
+            } else {
+                // It stood at zero until this block was driven, however long nothing was before.
+                onset.at_s = if onset.driven_s > 0.0 { onset.at_s } else { began_s };
+                onset.driven_s += BLOCK_S;
+            }
         }
     }
 
     /// An alarm on one side, since an onset that another sum has found.
-    pub(super) fn fill(&mut self, side: usize, most: f64, since_s: f64) {
+    pub(super) fn fill(&mut self, side: usize, most: f64, onset: Onset) {
         *self = Self::default();
-        (self.sums[side], self.since_s[side]) = (most, since_s);
+        (self.sums[side], self.onsets[side]) = (most, onset);
     }
 
-    pub(super) fn level(&self) -> (f64, f64) {
+    pub(super) fn level(&self) -> (f64, Onset) {
         let side = usize::from(self.sums[1] > self.sums[0]);
-        (self.sums[side], self.since_s[side])
+        (self.sums[side], self.onsets[side])
     }
 }
 
@@ -132,6 +149,20 @@ mod tests {
             (off(0.05) - 2.5).abs() < 0.05,
             "a quarter of the excitation, twice the spread: {}",
             off(0.05)
+        );
+    }
+
+    #[test]
+    fn an_onset_is_the_clock_when_the_block_began_that_the_sum_rose_in() {
+        let mut cusum = Cusum::default();
+        for (z, began_s) in [(2.0, 10.0), (0.0, 12.0), (0.0, 14.0), (2.0, 500.0), (2.0, 900.0)] {
+            cusum.take(z, Sides::One, 9.0, began_s);
+        }
+        let onset = Onset { driven_s: 2.0 * BLOCK_S, at_s: 500.0 };
+        assert_eq!(
+            cusum.level(),
+            (2.5, onset),
+            "it fell to zero in between, and nothing was driven for 400 s since"
         );
     }
 
