@@ -49,6 +49,9 @@ fn a_reversed_encoder_is_named_and_no_rig_is_written() {
     // Said before it was done; nothing after it was begun.
     assert!(talk.contains("first_movement: ") && !talk.contains("working_range: "), "{talk}");
     assert!(!site.folder.path().join("new.toml").exists());
+    // What it was seen by is kept.
+    assert_eq!(report["recording"], "new.csv.gz", "{report}");
+    assert!(std::fs::metadata(site.folder.path().join("new.csv.gz")).unwrap().len() > 1000);
 }
 
 #[test]
@@ -147,9 +150,18 @@ fn a_running_service_calibrates_under_the_lease_and_drives_on_after_it() {
         assert_eq!((&info["state"], &info["cause"]), (&json!("aborted"), &json!("local aborted it")));
         assert_eq!(info["report"]["steps"][0]["name"], "zeros", "what was found is told: {info}");
         assert_eq!(kind(stack.http("GET", &format!("/calibrations/{id}/rig"), None)).0, 409);
+        assert!(info["report"]["recording"].as_str().is_some_and(|file| file.ends_with("recording.mcap")));
         Some(id)
     });
     let aborted = aborted.expect("a session that was not held up");
+
+    // Who takes command is named.
+    let begun = stack.expect("POST", "/calibrations", None);
+    let wanted = json!({"holder": "bridge", "ttl_ms": 60_000, "takeover": true});
+    let lease = stack.expect("POST", "/lease", Some(wanted));
+    let info = over(&stack, begun["id"].as_str().unwrap());
+    assert_eq!((&info["state"], &info["cause"]), (&json!("aborted"), &json!("bridge took command")));
+    stack.leases.insert("t1", lease["lease_id"].as_str().unwrap().to_owned());
 
     // It lives under its lease.
     let begun = stack.expect("POST", "/calibrations", None);

@@ -13,11 +13,13 @@ mod report;
 mod session;
 pub mod stages;
 mod stop;
+mod zeros;
 
-pub use estimate::{Estimate, estimate, loosened};
+pub use estimate::{Estimate, estimate, loosened, recorded};
 pub use facts::{Answer, Breakaway, Facts, Level, RestReading};
 pub use log::Log;
 pub use plan::Plan;
-pub use report::{Report, Stated, StepReport, steps};
+pub use report::{Report, Stated, StepReport, stands_out, steps};
 pub use session::{Next, Session};
 pub use stop::Stop;
+pub use zeros::{Zero, zeros};

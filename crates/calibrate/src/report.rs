@@ -60,10 +60,13 @@ fn stated(name: impl Into<String>, value: f64, tolerance: f64, unit: &str) -> St
     Stated { name: name.into(), value, tolerance, unit: unit.into() }
 }
 
-/// A dead time is known to the servo's period: when within it commands act and sensors are read nobody writes down.
-fn of_fit(p: &ParameterReport, period_s: f64) -> Stated {
-    let grain = if p.name == "delay_s" { period_s } else { 0.0 };
-    stated(p.name.clone(), p.value, ALL_INSIDE * p.std_error + grain, &p.unit)
+fn of_fit(p: &ParameterReport) -> Stated {
+    stated(p.name.clone(), p.value, ALL_INSIDE * p.std_error, &p.unit)
+}
+
+/// Whether it is more than nothing: by the tolerance that is stated of it.
+pub fn stands_out(p: &ParameterReport) -> bool {
+    p.value.abs() > ALL_INSIDE * p.std_error
 }
 
 /// The estimated torque constant over the stated one, and its relative tolerance.
@@ -146,7 +149,7 @@ pub fn steps(facts: &Facts, estimate: Option<&Estimate>) -> Vec<StepReport> {
             .iter()
             .filter(of_rig)
             .chain(fit.effects.iter().flat_map(|e| &e.parameters))
-            .map(|p| of_fit(p, estimate.period_s))
+            .map(of_fit)
             .collect();
         let mut together =
             step("estimated_together", "fitted to the whole record by kort fit".into(), quantities);

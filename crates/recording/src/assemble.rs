@@ -1,10 +1,12 @@
 //! From rows of a file to a recording: names, units, time, maps. The same for every format.
 
+mod angle;
 mod clock;
 
 use std::cmp::Reverse;
+use std::collections::BTreeMap;
 
-use crate::cell::Cell;
+use crate::cell::{Cell, Odd};
 use crate::columns::{self, nearest};
 use crate::error::{Place, Problem};
 use crate::log::{Back, longest_is_read};
@@ -26,6 +28,11 @@ pub(crate) struct Assembler<'m> {
     source: Vec<String>,
     /// Texts have a decimal comma.
     decimal_comma: bool,
+    /// A log of others: what stands there for no value is none.
+    foreign: bool,
+    /// Its rows without a stamp, and its cells that hold no value, by source column.
+    unstamped: Odd,
+    no_value: BTreeMap<usize, Odd>,
     time: TimeColumn,
     select: Option<(usize, &'m str, Vec<String>)>,
     takes: Vec<Take<'m>>,
@@ -63,6 +70,9 @@ impl<'m> Assembler<'m> {
             row: Vec::with_capacity(takes.len()),
             source,
             decimal_comma: map.is_some_and(|map| map.decimal_comma),
+            foreign: map.is_some(),
+            unstamped: Odd::default(),
+            no_value: BTreeMap::new(),
             time,
             select,
             takes,
@@ -89,6 +99,10 @@ impl<'m> Assembler<'m> {
             TimeColumn::Settled { settle_s } => self.rows as f64 * *settle_s,
             TimeColumn::Stamps { index, of_day, clock, drop_stale } => {
                 let column = &self.source[*index];
+                if self.foreign && (cell(*index).is_empty() || cell(*index).is_no_value()) {
+                    self.unstamped.add(place, &cell(*index).text());
+                    return Ok(());
+                }
                 let beside = of_day.map(|of_day| (self.source[of_day].as_str(), cell(of_day)));
                 let raw = clock.read(place, (column, cell(*index)), beside, self.decimal_comma)?;
                 if raw.is_nan() {
@@ -114,9 +128,15 @@ impl<'m> Assembler<'m> {
                 time_s
             }
         };
-        let number = |index: usize| cell(index).number(place, &self.source[index], self.decimal_comma);
+        let number = |index: usize| {
+            let cell = if self.foreign { cell(index).or_empty() } else { cell(index) };
+            cell.number(place, &self.source[index], self.decimal_comma)
+        };
         self.row.clear();
         for take in &self.takes {
+            if self.foreign && cell(take.index).is_no_value() {
+                self.no_value.entry(take.index).or_default().add(place, &cell(take.index).text());
+            }
             let mut value = number(take.index)?;
             if let Some(how) = take.how {
                 value = how.apply(value);
@@ -189,6 +209,11 @@ impl<'m> Assembler<'m> {
         let mut recording = self.recording;
         recording.losses = losses;
         recording.losses.extend(resets);
+        recording.losses.extend(self.unstamped.said("row(s) have no stamp and are left out"));
+        recording.losses.extend(self.no_value.iter().filter_map(|(at, odd)| odd.no_value(&self.source[*at])));
+        if self.foreign {
+            angle::unwrap(&mut recording);
+        }
         if self.stale_rows > 0 {
             let rows = self.stale_rows;
             recording.losses.push(format!("{rows} row(s) with a stale time stamp skipped"));
@@ -258,18 +283,10 @@ type Plan<'m> = (TimeColumn, Option<(usize, &'m str, Vec<String>)>, Vec<Take<'m>
 /// Our own names.
 fn native<'m>(source: &[String], recording: &mut Recording) -> Result<Plan<'m>, Problem> {
     let Some(time) = source.iter().position(|n| n == "time_s") else {
-        let hint = match source {
-            [one] if one.contains([';', '\t']) => {
-                "its cells are parted by semicolons or tabs; such a log comes in through a column map (--columns NAME): `kort columns LOG` names the one that fits, or proposes one".into()
-            }
-            _ => match nearest("time_s", source.iter().map(String::as_str)) {
-                Some(near) => format!(
-                    "if `{near}` is time in seconds, rename it to time_s; a log with other names or units comes in through a column map (--columns NAME)"
-                ),
-                None => {
-                    "a log with other names or units comes in through a column map (--columns NAME)".into()
-                }
-            },
+        const MAP: &str = "a log with other names or units comes in through a column map (--columns NAME): `kort columns LOG` names the one that fits, or proposes one";
+        let hint = match nearest("time_s", source.iter().map(String::as_str)) {
+            Some(near) => format!("if `{near}` is time in seconds, rename it to time_s; {MAP}"),
+            None => MAP.into(),
         };
         return Err(Problem::MissingTime { wanted: "time_s".into(), found: list(source), hint });
     };

@@ -154,6 +154,18 @@ pub enum Problem {
         /// Cells in the header.
         expected: u64,
     },
+    /// Names without cells below them, and nothing shows which.
+    #[error(
+        "{place} has {cells} cells, the header names {}: {}; nothing in the file shows which of them has no cell", names.len(), names.join(" | ")
+    )]
+    HeaderLonger {
+        /// Where the first row is.
+        place: Place,
+        /// Its cells.
+        cells: u64,
+        /// The names of the header.
+        names: Vec<String>,
+    },
     /// A row without its instant.
     #[error("{place}, column `{column}` is empty; every row needs its time")]
     TimeEmpty {

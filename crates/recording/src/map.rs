@@ -30,10 +30,14 @@ pub struct ColumnMap {
     pub delimiter: Option<u8>,
     /// Its numbers have a decimal comma.
     pub decimal_comma: bool,
+    /// Names of a table's header that no row has a cell for.
+    pub without_cells: Vec<String>,
     /// Where the instants come from.
     pub time: Time,
     /// What the user said of the log: names and values.
     pub given: Vec<(String, String)>,
+    /// Which of them are nothing but the map's own examples, and what they mean: the user must say them.
+    pub examples: Vec<(String, String)>,
     /// Only rows with this value, if the file holds several runs.
     pub select: Option<Select>,
     /// Our columns.

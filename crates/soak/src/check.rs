@@ -1,6 +1,6 @@
 //! Checks of a scenario's values: each message names the key, the value and what is allowed.
 
-use crate::scenario::{Lie, Scenario, Segment};
+use crate::scenario::{Channel, Lie, Scenario, Segment};
 
 impl Scenario {
     /// All values that cannot be meant.
@@ -111,6 +111,17 @@ impl Scenario {
             wrong.within("supply_sag.to", sag.to, 0.0, 1.0, "share of the nominal supply: 0.8");
         }
         for fault in &self.sensor_faults {
+            let fitted = match fault.channel {
+                Channel::ShaftSpeedRadS => None,
+                Channel::CurrentA => Some(("current_a", "current", self.sensors.current)),
+                Channel::ThrustN => Some(("thrust_n", "thrust", self.sensors.thrust)),
+                Channel::FlowMS => Some(("flow_m_s", "flow", self.sensors.flow)),
+            };
+            if let Some((channel, key, false)) = fitted {
+                wrong.say(&format!(
+                    "`sensor_fault.channel` = \"{channel}\", but `sensors.{key}` = false: what is not fitted cannot fail\nhint: take the fault away, or fit the sensor"
+                ));
+            }
             wrong.spell("sensor_fault", run_s, (fault.at_s, fault.for_s, fault.every_s));
             let hint = match fault.lie {
                 Lie::Dropout | Lie::Stuck if fault.size.is_none() => continue,

@@ -3,8 +3,9 @@
 use std::collections::HashMap;
 
 use kort_control::ControlModel;
-use kort_thruster::effects::{self, Context, Descriptor, Scale};
+use kort_thruster::effects::{self, Context, Descriptor, Scale, Spec};
 use kort_thruster::parameters::{Parameter, Parameters};
+use kort_thruster::place;
 use kort_thruster::plant::Plant;
 use kort_thruster::rig::Rig;
 use rand_distr::{Distribution, StandardNormal};
@@ -69,55 +70,81 @@ const EFFECT_STATES: usize = 8;
 /// The scenario's effects; a parameter left out stands where a fit would start.
 ///
 /// # Errors
-/// Words that name the effect, its parameter, the value and what is allowed.
-pub fn effects(scenario: &Scenario, rig: &Rig, model: &ControlModel) -> Result<Vec<Hooked>, String> {
+/// All that is wrong, in words that name the effect, its parameter, the value and what is allowed.
+pub fn effects(scenario: &Scenario, rig: &Rig, model: &ControlModel) -> Result<Vec<Hooked>, Vec<String>> {
     let scale = model.scale(rig, scenario.duration_s);
     let parameters = Parameters::stated(rig);
     let context = Context { parameters: &parameters, rig, tick_s: model.period_s };
-    let mut states = 0;
+    let (mut states, mut wrong) = (0, Vec::new());
     let mut hooked = Vec::with_capacity(scenario.effects.len());
-    for EffectSpec { id, values, shares } in &scenario.effects {
-        let descriptor = effects::find(id).ok_or_else(|| {
-            let known: Vec<_> = effects::ALL.iter().map(|d| d.id).collect();
-            format!("effect `{id}` is not in the catalogue\nhint: known are {}", known.join(", "))
-        })?;
-        let specs = (descriptor.parameters)(&scale);
-        if let Some(unknown) =
-            values.keys().chain(shares.keys()).find(|k| specs.iter().all(|s| s.name != k.as_str()))
-        {
-            let known: Vec<_> = specs.iter().map(|s| s.name).collect();
-            return Err(format!("effect `{id}` has no value `{unknown}`\nhint: it has {}", known.join(", ")));
+    for spec in &scenario.effects {
+        let Some(descriptor) = effects::find(&spec.id) else {
+            wrong.push(no_effect(&spec.id));
+            continue;
+        };
+        let before = wrong.len();
+        let values = valued(spec, &(descriptor.parameters)(&scale), &scale, &mut wrong);
+        if wrong.len() == before {
+            states += (descriptor.build.plain)(&values, &context).states();
+            hooked.push((descriptor, values));
         }
-        let mut chosen = Vec::with_capacity(specs.len());
-        for spec in &specs {
-            let share = match shares.get(spec.name) {
-                Some(share) => Some(share * largest(&scale, id, spec.name, spec.unit)?),
-                None => None,
-            };
-            let stated = values.get(spec.name).copied().or(share);
-            let value = stated.unwrap_or(spec.start);
-            if stated.is_some() && !(value >= spec.low && value <= spec.high) {
-                return Err(format!(
-                    "`{id}.{}` = {value} is outside what is allowed: {} to {} ({})\nhint: {} is small but visible",
-                    spec.name, spec.low, spec.high, spec.unit, spec.start
-                ));
-            }
-            chosen.push(value);
-        }
-        states += (descriptor.build.plain)(&chosen, &context).states();
-        hooked.push((descriptor, chosen));
     }
     if states > EFFECT_STATES {
-        return Err(format!(
+        wrong.push(format!(
             "the effects have {states} states of their own together, at most {EFFECT_STATES} can be simulated\nhint: take an [[effect]] away"
         ));
     }
-    Ok(hooked)
+    if wrong.is_empty() { Ok(hooked) } else { Err(wrong) }
+}
+
+/// Words for an identifier that the catalogue has not.
+fn no_effect(id: &str) -> String {
+    let known: Vec<_> = effects::ALL.iter().map(|d| d.id).collect();
+    let near = place::near(id, known.iter().copied());
+    let near = near.map(|near| format!("did you mean `{near}`? ")).unwrap_or_default();
+    format!("effect `{id}` is not in the catalogue\nhint: {near}known are {}", known.join(", "))
+}
+
+/// The values of an effect's parameters in order, as far as nothing is wrong with them.
+fn valued(effect: &EffectSpec, specs: &[Spec], scale: &Scale, wrong: &mut Vec<String>) -> Vec<f64> {
+    let EffectSpec { id, values, shares } = effect;
+    for unknown in values.keys().chain(shares.keys()).filter(|k| specs.iter().all(|s| s.name != k.as_str())) {
+        let known: Vec<_> = specs.iter().map(|s| s.name).collect();
+        wrong.push(format!("effect `{id}` has no value `{unknown}`\nhint: it has {}", known.join(", ")));
+    }
+    let mut chosen = Vec::with_capacity(specs.len());
+    for spec in specs {
+        let share = match shares.get(spec.name).map(|share| Ok(share * largest(scale, id, spec)?)).transpose()
+        {
+            Ok(share) => share,
+            Err(words) => {
+                wrong.push(words);
+                continue;
+            }
+        };
+        let stated = values.get(spec.name).copied();
+        if let (Some(value), Some(share)) = (stated, shares.get(spec.name)) {
+            wrong.push(format!(
+                "`{id}.{}` is {value} under `values` and {share} of the rig's largest under `shares`\nhint: leave one of them out",
+                spec.name
+            ));
+        }
+        let stated = stated.or(share);
+        let value = stated.unwrap_or(spec.start);
+        if stated.is_some() && !(value >= spec.low && value <= spec.high) {
+            wrong.push(format!(
+                "`{id}.{}` = {value} is outside what is allowed: {} to {} ({})\nhint: {} is small but visible",
+                spec.name, spec.low, spec.high, spec.unit, spec.start
+            ));
+        }
+        chosen.push(value);
+    }
+    chosen
 }
 
 /// What a share of 1 of a unit stands for on the rig.
-fn largest(scale: &Scale, id: &str, name: &str, unit: &str) -> Result<f64, String> {
-    match unit {
+fn largest(scale: &Scale, id: &str, spec: &Spec) -> Result<f64, String> {
+    match spec.unit {
         "N m" => Ok(scale.torque_n_m),
         "rad/s" => Ok(scale.shaft_speed_rad_s),
         "N" => Ok(scale.thrust_n),
@@ -125,7 +152,8 @@ fn largest(scale: &Scale, id: &str, name: &str, unit: &str) -> Result<f64, Strin
         "A" => Ok(scale.current_a),
         "V" => Ok(scale.supply_v),
         other => Err(format!(
-            "`{id}.{name}` in [{other}] cannot be given as a share of the rig's largest\nhint: give it under values"
+            "`{id}.{}` in [{other}] cannot be given as a share of the rig's largest\nhint: give it under values",
+            spec.name
         )),
     }
 }

@@ -5,7 +5,12 @@ use std::path::Path;
 use kort_control::ControllerConfig;
 use kort_control::known::uses;
 use kort_recording::ColumnMap;
+use kort_scenario::{Excitation, Scenario, ScenarioError};
+use kort_thruster::effects::{self, Scale};
 use kort_thruster::rig::Rig;
+
+use crate::commands::simulate::Files;
+use crate::soak::{self, Instead};
 
 /// Kinds of configuration beside a deployment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,14 +50,23 @@ impl Kind {
         }
         match self {
             Kind::Rig => Rig::from_toml_with_all(text).map(drop).map_err(all),
-            Kind::Soak => kort_soak::Scenario::from_toml(text).map(drop),
-            Kind::Scenario => {
-                let wrong = match kort_scenario::Scenario::from_toml_with_all(text) {
-                    Ok(scenario) => scenario.check(),
-                    Err(wrong) => wrong,
-                };
-                if wrong.is_empty() { Ok(()) } else { Err(all(wrong)) }
+            Kind::Soak => {
+                soak::of_text(text, path, &Instead::default()).map(drop).map_err(|wrong| {
+                    // Its own file is named by whoever asks.
+                    let own = format!("{}: ", path.display());
+                    let bare = |words: String| words.strip_prefix(&own).map(str::to_owned).unwrap_or(words);
+                    wrong.iter().map(ToString::to_string).map(bare).collect()
+                })
             }
+            Kind::Scenario => match Scenario::from_toml_with_all(text) {
+                Ok(scenario) => {
+                    let mut wrong = scenario.check();
+                    wrong.extend(replays(&scenario, path));
+                    wrong.extend(values(&scenario));
+                    if wrong.is_empty() { Ok(()) } else { Err(all(wrong)) }
+                }
+                Err(wrong) => Err(all(wrong)),
+            },
             Kind::Columns => {
                 let name = path.file_stem().unwrap_or_default().to_string_lossy();
                 ColumnMap::from_toml(&name, text).map(drop).map_err(|wrong| all(wrong.0))
@@ -68,6 +82,68 @@ impl Kind {
             _ => Vec::new(),
         }
     }
+}
+
+/// What a scenario replays and is not to be had.
+fn replays(scenario: &Scenario, path: &Path) -> Vec<ScenarioError> {
+    let mut files = Files::beside(path);
+    let signals = [
+        ("segments", &scenario.segments),
+        ("ambient", &scenario.ambient),
+        ("supply", &scenario.supply),
+        ("depth", &scenario.depth),
+        ("temperature", &scenario.temperature),
+    ];
+    let wrong = signals.into_iter().flat_map(|(name, segments)| {
+        Excitation::new(name, segments, scenario.seed, &mut files).err().unwrap_or_default()
+    });
+    wrong.filter(|error| matches!(error, ScenarioError::Replay { .. })).collect()
+}
+
+/// Values of effects that are missing, or that no rig allows: the most of many goes by the rig, which a scenario does not name.
+fn values(scenario: &Scenario) -> Vec<ScenarioError> {
+    let larger = Scale {
+        shaft_speed_rad_s: 2.0,
+        torque_n_m: 2.0,
+        thrust_n: 2.0,
+        flow_m_s: 2.0,
+        current_a: 2.0,
+        command: 2.0,
+        supply_v: 2.0,
+        winding_resistance_ohm: 2.0,
+        inertia_kg_m2: 2.0,
+        ..Scale::ANY
+    };
+    let mut wrong = Vec::new();
+    for (i, wanted) in scenario.effects.iter().enumerate() {
+        let Some(effect) = effects::find(&wanted.effect) else { continue };
+        let given = format!("effects[{i}].parameters");
+        let used = kort_scenario::used_effect(("", effect.id), (&given, &wanted.parameters), &Scale::ANY);
+        let missing = used.err().unwrap_or_default().into_iter().filter_map(|error| match error {
+            ScenarioError::Missing { key, .. } => Some(key),
+            _ => None,
+        });
+        let explain = format!("`kort explain {}` tells each, and its range", effect.id);
+        wrong.extend(missing.map(|key| ScenarioError::Missing { key, hint: explain.clone() }));
+        let specs = (effect.parameters)(&Scale::ANY);
+        for (spec, of_larger) in specs.iter().zip((effect.parameters)(&larger)) {
+            let Some(value) = wanted.parameters.get(spec.name) else { continue };
+            let allowed = if (spec.low, spec.high) == (of_larger.low, of_larger.high) {
+                (!(*value >= spec.low && *value <= spec.high))
+                    .then(|| format!("{} to {}", spec.low, spec.high))
+            } else if spec.low >= 0.0 {
+                (!(*value >= 0.0 && value.is_finite())).then(|| "0 or above".to_owned())
+            } else {
+                (!value.is_finite()).then(|| "a finite number".to_owned())
+            };
+            wrong.extend(allowed.map(|allowed| ScenarioError::Value {
+                key: format!("{given}.{}", spec.name),
+                found: value.to_string(),
+                allowed: if spec.unit == "1" { allowed } else { format!("{allowed} {}", spec.unit) },
+            }));
+        }
+    }
+    wrong
 }
 
 #[cfg(test)]
@@ -90,6 +166,96 @@ mod tests {
                 assert!(kinds.contains(&kind), "{}: {kind:?}", path.display());
                 assert_eq!(kind.check(&text, &path), Ok(()), "{}", path.display());
             }
+        }
+    }
+
+    /// A scenario of `kort soak` as a tester broke it, beside the shipped ones, and what is wrong with it.
+    fn said_of_soak(with: &str) -> Vec<String> {
+        let text = format!(
+            "name = \"x\"\nwhat = \"y\"\nrig = \"../thrusters/t200.toml\"\nduration_s = 60\ncontrollers = [\"velocity_servo\"]\n[[reference]]\nkind = \"steps\"\nlevels = [0.5]\nhold_s = 3\n{with}"
+        );
+        // The rig of the line above, the controller: each may be replaced by what stands in `with`.
+        let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../config/scenarios/soak-towed.toml"));
+        Kind::Soak.check(&text, path).err().unwrap_or_default()
+    }
+
+    #[test]
+    fn a_soak_scenario_is_checked_with_all_that_it_names() {
+        assert_eq!(said_of_soak(""), Vec::<String>::new());
+        for (with, words) in [
+            ("[[effect]]\nid = \"coulomb_frictoin\"", "did you mean `coulomb_friction`?"),
+            ("[[effect]]\nid = \"coulomb_friction\"\nvalues = { coulomb_torque_nm = 0.02 }", "has no value"),
+            (
+                "[[effect]]\nid = \"coulomb_friction\"\nvalues = { coulomb_torque_n_m = 200 }",
+                "= 200 is outside",
+            ),
+            (
+                "[[effect]]\nid = \"coulomb_friction\"\nvalues = { coulomb_torque_n_m = 0.01 }\nshares = { coulomb_torque_n_m = 0.1 }",
+                "leave one of them out",
+            ),
+            (
+                "[[reference]]\nkind = \"replay\"\nfile = \"nofile\"\npeak = 0.7",
+                "nofile: there is no such recording",
+            ),
+            (
+                "[sensors]\nthrust = false\n[[sensor_fault]]\nchannel = \"thrust_n\"\nlie = \"gain\"\nsize = 2\nat_s = 4\nfor_s = 2",
+                "what is not fitted cannot fail",
+            ),
+        ] {
+            let said = said_of_soak(with);
+            assert!(
+                said.len() == 1 && said[0].contains(words) && said[0].contains("hint: "),
+                "{with}: {said:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn all_that_is_wrong_with_a_soak_scenario_is_said_at_once() {
+        let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../config/scenarios/soak-towed.toml"));
+        let rest = "duration_s = 60\ncontrollers = [\"velocity_servo\", \"modle2_inversion\"]\n[[reference]]\nkind = \"replay\"\nfile = \"nofile\"\npeak = 0.7\n[[effect]]\nid = \"coulomb_frictoin\"";
+        let of_rig = |rig: &str| {
+            let text = format!("name = \"x\"\nwhat = \"y\"\nrig = \"../thrusters/{rig}.toml\"\n{rest}");
+            Kind::Soak.check(&text, path).unwrap_err()
+        };
+        let said = of_rig("t200");
+        assert_eq!(said.len(), 3, "{said:?}");
+        // An effect is held to a rig; without one the rest is said.
+        for rig in ["t20", "rosa-rotor"] {
+            let said = of_rig(rig);
+            assert!(said.len() == 3 && said[0].contains("hint: "), "{rig}: {said:?}");
+        }
+        assert!(of_rig("t20")[0].starts_with("`rig` = \"../thrusters/t20.toml\""), "{:?}", of_rig("t20"));
+    }
+
+    #[test]
+    fn a_scenario_without_a_rig_is_checked_for_what_no_rig_allows() {
+        let said = |effects: &str, more: &str| {
+            let text = format!(
+                "effects = [{effects}]\n[[segments]]\nkind = \"hold\"\nvalue = 0.3\nduration_s = 3\n{more}"
+            );
+            Kind::Scenario.check(&text, Path::new("a.toml")).err().unwrap_or_default()
+        };
+        let friction = |torque: f64, rise: f64| {
+            format!(
+                "{{ effect = \"coulomb_friction\", parameters = {{ coulomb_torque_n_m = {torque}, stribeck_rise = {rise}, stribeck_speed_rad_s = 2.0 }} }}"
+            )
+        };
+        assert_eq!(said(&friction(0.1, 0.1), ""), Vec::<String>::new());
+        assert_eq!(said(&friction(300.0, 0.1), ""), Vec::<String>::new(), "which is too much the rig says");
+        let lacking = "{ effect = \"coulomb_friction\", parameters = { coulomb_torque_n_m = 0.1 } }";
+        for (effects, more, words) in [
+            (friction(-0.1, 0.1), "", "`effects[0].parameters.coulomb_torque_n_m` = -0.1 is outside"),
+            (friction(0.1, 1e4), "", "`effects[0].parameters.stribeck_rise` = 10000 is outside"),
+            (lacking.to_owned(), "", "stribeck_speed_rad_s` is missing"),
+            (
+                String::new(),
+                "[[segments]]\nkind = \"replay\"\nrecording = \"nofile.csv\"\ncolumn = \"thrust_n\"\n",
+                "nofile.csv: there is no such",
+            ),
+        ] {
+            let said = said(&effects, more);
+            assert!(said.len() == 1 && said[0].contains(words), "{effects} {more}: {said:?}");
         }
     }
 }

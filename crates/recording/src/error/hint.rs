@@ -39,6 +39,9 @@ impl Problem {
             Problem::RowLength { .. } => {
                 "cells are parted by commas, or what the column map's `delimiter` says; a decimal comma or a comma in a text must be quoted there".into()
             }
+            Problem::HeaderLonger { .. } => {
+                "a name with a delimiter in it must be quoted, one too many taken out; or a column map says which names no row has a cell for: without_cells = [\"NAME\"], above [time]; if only this row is too short, fill it up".into()
+            }
             Problem::TimeEmpty { .. } => "fill in the time, or remove the row".into(),
             Problem::TimeNotIncreasing { before, value, .. } if before == value => {
                 "where rows come faster than their stamps can tell, as stamps of whole seconds, have the logger write fractions of a second; of rows with one stamp a column map may keep the first: [time] stale_rows = \"drop\"".into()
@@ -47,7 +50,7 @@ impl Problem {
                 "sort the rows and remove repeated stamps; separate runs belong in separate files; a column map may say [time] stale_rows = \"drop\"".into()
             }
             Problem::NotANumber { text, .. } if has_comma(text) => {
-                "a decimal comma is read where the column map says decimal = \",\"; `kort columns LOG` proposes such a map".into()
+                "a decimal comma is read where the column map says decimal = \",\"; `kort columns LOG` proposes such a map; a mark for thousands is not read: save the file without".into()
             }
             Problem::NotANumber { text, .. } if is_date(text) => {
                 "dates are read where the column map says [time] unit = \"date\"; `kort columns LOG` proposes such a map".into()
@@ -80,9 +83,9 @@ impl Problem {
                 "write the file without marks for thousands and with one decimal mark throughout, or correct `decimal` in the map".into()
             }
             Problem::NotANumber { .. } => {
-                "a text column can be left out by a column map (--columns NAME)".into()
+                "correct the cell, or take its row out; a column of text is left out where a column map (--columns NAME) does not name it".into()
             }
-            Problem::NotFinite { .. } => "leave the cell empty if there was no sample".into(),
+            Problem::NotFinite { .. } => "leave the cell empty if there was no sample; through a column map (--columns NAME) such a cell is none".into(),
             Problem::TooFewRows { .. } => "was the logger stopped too early?".into(),
             Problem::NothingSelected { .. } => "give the value after the map's name: --columns NAME:VALUE".into(),
             Problem::MapWanted { .. } => {

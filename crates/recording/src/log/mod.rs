@@ -11,7 +11,7 @@ pub(crate) mod stamps;
 mod survey;
 
 use crate::dates::Dates;
-pub use survey::{FieldSurvey, GapSurvey, Incomplete, Lack, Proposal, Survey, TopicSurvey, survey};
+pub use survey::{Example, FieldSurvey, GapSurvey, Incomplete, Lack, Proposal, Survey, TopicSurvey, survey};
 
 /// A stamp that lies further than this behind its topic's newest begins the clock anew, s; less is disorder of the
 /// logger.
@@ -59,6 +59,14 @@ pub(crate) struct Log {
     pub delimiter: u8,
     /// Numbers of a table have a decimal comma.
     pub decimal_comma: bool,
+    /// Numbers of a table have a comma that may be one for thousands too.
+    pub perhaps_decimal_comma: bool,
+    /// Names of a table's header that may be those without cells, where all rows are too short.
+    pub without_cells: Vec<String>,
+    /// Columns of a table on another clock than its stamps'.
+    pub other_clocks: Vec<std::ops::Range<usize>>,
+    /// What a table's columns lack, by place: cells without a value, or without a number.
+    pub lost_in: std::collections::BTreeMap<usize, Vec<String>>,
     /// A table without names: its columns are called by their places.
     pub nameless: bool,
     /// The stamps of a table, if they are dates.
@@ -278,6 +286,11 @@ impl<'w> Gather<'w> {
     /// What was lost.
     pub fn loss(&mut self, loss: String) {
         self.log.losses.push(loss);
+    }
+
+    /// More of that.
+    pub fn losses(&mut self, losses: impl IntoIterator<Item = String>) {
+        self.log.losses.extend(losses);
     }
 
     /// Whether any message came.

@@ -18,13 +18,39 @@ const TONGUES: &[(&str, &[&str])] = &[
     ("power", &["leistung", "potencia", "puissance", "potenza", "vermogen"]),
     ("depth", &["tiefe", "profundidad", "profondeur", "profondità", "profondita", "diepte"]),
     ("setpoint", &["soll", "sollwert", "consigna", "consigne"]),
+    ("actual", &["ist", "istwert"]),
+    (
+        "electrical",
+        &["elektrisch", "elektrische", "eléctrica", "electrica", "électrique", "electrique", "elettrica"],
+    ),
+    ("fan", &["lüfter", "luefter"]),
+    ("cell", &["zelle", "zell", "zellen"]),
     ("weight", &["gewicht", "peso", "poids"]),
 ];
 
-/// What is measured in grams of force: of all else a `g` is something else, as the gravity of an acceleration.
+/// What German writes at the end of one word, behind what it is of: `Solldrehzahl`, `Motorstrom`.
+const COMPOUNDED: &[&str] = &[
+    "zeit",
+    "spannung",
+    "strom",
+    "drehzahl",
+    "schubkraft",
+    "schub",
+    "kraft",
+    "drehmoment",
+    "winkel",
+    "temperatur",
+    "leistung",
+    "tiefe",
+    "gewicht",
+];
+
+/// What is measured in grams of force, and in kilograms or pounds of it: of all else a `g` is something else, as the gravity of
+/// an acceleration.
 const WEIGHED: &[&str] = &["thrust", "force", "weight", "load", "loadcell", "pull"];
 
-/// Words of a name, in English where [`TONGUES`] knows them: split at what is no letter, and where small letters become large.
+/// Words of a name, in English where [`TONGUES`] knows them: split at what is no letter, where small letters become large, and
+/// where German joins them.
 pub(super) fn words(name: &str) -> Vec<String> {
     let mut out = vec![String::new()];
     let mut small = false;
@@ -39,13 +65,42 @@ pub(super) fn words(name: &str) -> Vec<String> {
             last.extend(c.to_lowercase());
         }
     }
-    out.retain(|word| !word.is_empty());
-    for word in &mut out {
-        if let Some((english, _)) = TONGUES.iter().find(|(_, others)| others.contains(&word.as_str())) {
-            *word = (*english).to_owned();
-        }
+    out.iter().filter(|word| !word.is_empty()).flat_map(|word| parts(word)).map(english).collect()
+}
+
+/// A word and what it is joined to, if it is no word of its own.
+fn parts(word: &str) -> Vec<&str> {
+    let known = TONGUES.iter().any(|(_, others)| others.contains(&word));
+    let joined = || COMPOUNDED.iter().find_map(|end| Some([word.strip_suffix(end)?, end]));
+    match joined().filter(|[before, _]| !known && !before.is_empty()) {
+        Some(parts) => parts.to_vec(),
+        None => vec![word],
     }
-    out
+}
+
+fn english(word: &str) -> String {
+    let known = TONGUES.iter().find(|(_, others)| others.contains(&word));
+    known.map_or(word, |(english, _)| english).to_owned()
+}
+
+/// A name without the unit in brackets behind it, or at its end.
+pub(super) fn bare(name: &str) -> &str {
+    let name = name.trim();
+    let in_brackets = [('(', ')'), ('[', ']')]
+        .into_iter()
+        .find_map(|(open, close)| Some(name.strip_suffix(close)?.rsplit_once(open)?.0));
+    in_brackets.or_else(|| Some(units::split_suffix(name)?.0)).unwrap_or(name).trim()
+}
+
+/// Whether a name says that its numbers are a multiple of its unit: `rpm/100`, `RPM*10`, `Current x100 (A)`.
+pub(super) fn has_factor(name: &str) -> bool {
+    let power_of_ten = |digits: &str| {
+        let end = digits.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(digits.len());
+        let power = digits[..end].parse::<f64>().ok().map(f64::log10);
+        power.is_some_and(|power| power != 0.0 && power.is_finite() && power.fract() == 0.0)
+    };
+    let signs = name.char_indices().filter(|(_, c)| matches!(c, '/' | '*' | '·' | '×' | 'x' | 'X'));
+    signs.into_iter().any(|(at, sign)| power_of_ten(name[at + sign.len_utf8()..].trim_start()))
 }
 
 /// Whether a word, or several one after the other, stand among these.
@@ -57,6 +112,9 @@ pub(super) fn says(names: &[String], phrase: &str) -> bool {
 /// The unit that a name claims: in brackets or parentheses behind it, or as its end.
 pub(super) fn unit_in(name: &str) -> Option<&'static Unit> {
     let name = name.trim();
+    if has_factor(name) {
+        return None;
+    }
     for (open, close) in [('(', ')'), ('[', ']')] {
         if let Some((_, inside)) = name.strip_suffix(close).and_then(|rest| rest.rsplit_once(open)) {
             return symbol_beside(name, inside);
@@ -70,13 +128,25 @@ pub(super) fn unit_in(name: &str) -> Option<&'static Unit> {
         "pct" => units::find("%"),
         _ => None,
     };
-    units::of_column(&name.to_lowercase()).or_else(last)
+    units::of_column(&name.to_lowercase()).map(|unit| of_force(name, unit)).or_else(last)
 }
 
 /// The unit that a symbol beside a name means.
 fn symbol_beside(name: &str, text: &str) -> Option<&'static Unit> {
-    let weighed = || words(name).iter().any(|word| WEIGHED.contains(&word.as_str()));
-    symbol(text.trim()).filter(|_| text.trim() != "g" || weighed())
+    if is_weighed(name) && matches!(text.trim(), "lb" | "lbs") {
+        return units::find("lbf");
+    }
+    let unit = symbol(text.trim()).filter(|_| text.trim() != "g" || is_weighed(name))?;
+    Some(of_force(name, unit))
+}
+
+fn is_weighed(name: &str) -> bool {
+    words(name).iter().any(|word| WEIGHED.contains(&word.as_str()))
+}
+
+/// A scale that shows a force in kilograms means those of force.
+fn of_force(name: &str, unit: &'static Unit) -> &'static Unit {
+    if unit.symbol == "kg" && is_weighed(name) { units::find("kgf").unwrap_or(unit) } else { unit }
 }
 
 /// A unit by its symbol, as other programs spell it.
@@ -106,7 +176,8 @@ pub(crate) fn symbol(text: &str) -> Option<&'static Unit> {
 }
 
 pub(super) fn unit_of(field: &Field) -> Option<&'static Unit> {
-    field.unit.as_deref().map_or_else(|| unit_in(&field.name), |unit| symbol_beside(&field.name, unit))
+    let beside = || field.unit.as_deref().map(|unit| symbol_beside(&field.name, unit));
+    beside().unwrap_or_else(|| unit_in(&field.name)).filter(|_| !has_factor(&field.name))
 }
 
 #[cfg(test)]
@@ -133,6 +204,23 @@ mod tests {
         ] {
             assert_eq!(unit_in(name).map(|u| u.symbol), Some(unit), "{name}");
         }
+        assert_eq!(words("Solldrehzahl_Motorstrom"), ["setpoint", "speed", "motor", "current"]);
+        assert_eq!(words("Drehmoment Istwert"), ["torque", "actual"]);
+        for (name, unit) in
+            [("thrust(kg)", "kgf"), ("Thrust (lbs)", "lbf"), ("thrust_kg", "kgf"), ("mass (kg)", "kg")]
+        {
+            assert_eq!(unit_in(name).map(|u| u.symbol), Some(unit), "{name}");
+        }
+        for name in ["rpm/100", "RPM*10", "Current x100 (A)", "Thrust × 0.1 (N)"] {
+            assert!(has_factor(name) && unit_in(name).is_none(), "{name}");
+        }
+        for name in ["n [1/min]", "speed (r/min)", "max1 (A)", "flow m/s", "Ch 1/2", "x1 (A)"] {
+            assert!(!has_factor(name), "{name}");
+        }
+        assert_eq!(
+            (bare("Speed SP (rpm)"), bare("rpm_des"), bare("speed_rad_s")),
+            ("Speed SP", "rpm_des", "speed")
+        );
         assert_eq!(unit_in("output[1]").map(|u| u.symbol), None);
         assert_eq!(unit_in("erpm").map(|u| u.symbol), None, "electrical turns are no turns of the shaft");
         assert_eq!(unit_in("Vibration (g)").map(|u| u.symbol), None, "gravity, and no force");

@@ -4,11 +4,12 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-use super::names::unit_of;
+use super::names::{has_factor, unit_of};
 use super::rules::{
     COMMANDS, RULES, by_unit, fit, is_asked, is_electrical, is_of_motor, is_of_supply, is_pulse,
+    is_unchanging,
 };
-use super::survey::Proposal;
+use super::survey::{Example, Proposal};
 use super::{Field, Log, Topic, shipped, stamps};
 use crate::columns;
 use crate::map::ColumnMap;
@@ -19,15 +20,29 @@ pub(super) type Chosen = BTreeMap<(usize, usize), &'static str>;
 /// What brings a log in.
 pub(super) fn propose(log: &Log) -> (Proposal, Chosen) {
     let table = log.topics.len() == 1 && log.topics[0].name.is_empty();
-    let native = log.topics.iter().any(is_native);
+    // A recording of our own with decimal commas needs a map that says so.
+    let named = log.topics.iter().any(is_native);
+    let native = named && !log.decimal_comma && !log.perhaps_decimal_comma;
     let maps = shipped::fitting(log, table);
     let incomplete = if native || table || !maps.is_empty() { Vec::new() } else { shipped::in_part(log) };
-    let chosen = choose(log, table);
+    let chosen = if named && table { own(&log.topics[0]) } else { choose(log, table) };
     let map = (!native && (log.nameless || !chosen.is_empty())).then(|| toml(log, &chosen, table));
     let without_response =
         maps.iter().filter(|map| !shipped::responds(map, log)).map(ColumnMap::call).collect();
+    let examples = maps.iter().flat_map(|map| {
+        let value =
+            |key: &str| map.given.iter().find(|(known, _)| known == key).map(|(_, value)| value.clone());
+        map.examples.iter().filter_map(move |(key, meaning)| {
+            Some(Example { map: map.call(), key: key.clone(), value: value(key)?, meaning: meaning.clone() })
+        })
+    });
+    let examples = examples.collect();
     let shipped = maps.iter().map(ColumnMap::call).collect();
-    let proposal = Proposal { native, shipped, without_response, incomplete, map };
+    let fields = log.topics.iter().flat_map(|topic| topic.fields.iter().map(move |field| (topic, field)));
+    let nothing = |_: &_| !native && map.is_none();
+    let unchanging = fields.filter(nothing).filter(|(topic, field)| is_unchanging(topic, field, table));
+    let unchanging = unchanging.map(|(topic, field)| topic.source(field)).collect();
+    let proposal = Proposal { native, shipped, examples, without_response, incomplete, unchanging, map };
     (proposal, if native { Chosen::new() } else { chosen })
 }
 
@@ -38,6 +53,13 @@ fn is_native(topic: &Topic) -> bool {
     names().any(|n| n == columns::TIME.name)
         && names().all(|n| columns::unit_missing(n).is_none())
         && names().any(|n| n != columns::TIME.name && columns::find(n).is_some())
+}
+
+/// The columns of our own names.
+fn own(topic: &Topic) -> Chosen {
+    let known = |field: &Field| columns::find(&field.name).filter(|known| *known != columns::TIME);
+    let fields = topic.fields.iter().enumerate();
+    fields.filter_map(|(f, field)| Some(((0, f), known(field)?.name))).collect()
 }
 
 fn choose(log: &Log, table: bool) -> Chosen {
@@ -55,7 +77,8 @@ fn choose(log: &Log, table: bool) -> Chosen {
             });
             let best = candidates
                 .filter(|(place, topic, field)| {
-                    !chosen.contains_key(place) && asked == is_asked(topic, field)
+                    let elsewhere = log.other_clocks.iter().any(|other| other.contains(&place.1));
+                    !elsewhere && !chosen.contains_key(place) && asked == is_asked(topic, field)
                 })
                 .filter_map(|(place, topic, field)| Some((fit(rule, topic, field, table)?, place)))
                 .min();
@@ -102,6 +125,15 @@ fn toml(log: &Log, chosen: &Chosen, table: bool) -> String {
     }
     if log.decimal_comma {
         out += "decimal = \",\"   # in the whole file\n";
+    } else if log.perhaps_decimal_comma {
+        out += "# decimal = \",\"   take out the # if the commas in the numbers are decimal marks; where they part thousands, save the file without\n";
+    }
+    if !log.without_cells.is_empty() {
+        let _ = writeln!(
+            out,
+            "# without_cells = {:?}   every row has fewer cells than the header has names: write which names have none, mend what was read of the others, and take out the #",
+            log.without_cells
+        );
     }
     out += "\n[time]\n";
     if log.nameless {
@@ -152,7 +184,10 @@ fn unit_lines(column: &str, topic: &Topic, field: &Field, doubts: bool) -> Strin
         );
     }
     let Some(unit) = unit_of(field) else {
-        let more = if is_electrical(column, field) { format!("\n{POLES}") } else { String::new() };
+        let factor = if has_factor(&field.name) { FACTOR } else { "" };
+        let poles = if is_electrical(column, field) { POLES } else { "" };
+        let more: String =
+            [factor, poles].iter().filter(|line| !line.is_empty()).map(|line| format!("\n{line}")).collect();
         return format!("# unit = \"…\"   the log does not say it; {seen}{more}\n");
     };
     let whence = match (&field.unit, by_unit(column, field)) {
@@ -169,6 +204,9 @@ fn unit_lines(column: &str, topic: &Topic, field: &Field, doubts: bool) -> Strin
         if doubts { doubt(column, topic, field) } else { "" }
     )
 }
+
+/// The numbers are a multiple of the unit in the name.
+const FACTOR: &str = "# scale = …   its name speaks of a factor: what the numbers are to be multiplied with; then take out both #";
 
 /// Turns of the field are as many times those of the shaft as the motor has pole pairs.
 const POLES: &str = "# divide_by = …   electrical turns: the motor's pole pairs, 1 if the logger has divided already; then take out both #";

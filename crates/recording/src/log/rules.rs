@@ -1,6 +1,6 @@
 //! Which of our columns a field of others may be: by the words in its name, by its unit.
 
-use super::names::{says, unit_of, words};
+use super::names::{bare, says, unit_of, words};
 use super::{Field, Topic};
 use crate::columns;
 use crate::units;
@@ -12,8 +12,26 @@ pub(super) struct Rule {
     without: &'static [&'static str],
 }
 
-pub(super) const ASKED: &[&str] =
-    &["cmd", "command", "ref", "reference", "set", "setpoint", "target", "desired", "goal"];
+pub(super) const ASKED: &[&str] = &[
+    "cmd",
+    "command",
+    "commanded",
+    "ref",
+    "reference",
+    "set",
+    "setpoint",
+    "sp",
+    "target",
+    "desired",
+    "goal",
+    "demand",
+    "demanded",
+    "req",
+    "request",
+    "requested",
+];
+/// Words of what was measured, where something else of its kind was not.
+const ACTUAL: &[&str] = &["actual", "act", "measured", "meas"];
 pub(super) const SUPPLY: &[&str] = &["supply", "bat", "batt", "battery", "in", "input", "bus", "dc"];
 
 pub(super) const RULES: &[Rule] = &[
@@ -22,11 +40,7 @@ pub(super) const RULES: &[Rule] = &[
         words: &["erpm", "rpm", "omega", "rotorspeed", "velocity", "speed"],
         without: &["air", "ground", "wind", "wheel", "fan", "gps", "gnss"],
     },
-    Rule {
-        column: "current_a",
-        words: &["current", "curr", "iq", "q axis", "amps", "motorstrom"],
-        without: SUPPLY,
-    },
+    Rule { column: "current_a", words: &["current", "curr", "iq", "q axis", "amps"], without: SUPPLY },
     Rule {
         column: "supply_v",
         words: &["voltage", "volt", "volts", "vbus", "vbat", "vcc"],
@@ -115,9 +129,9 @@ pub(super) const COMMANDS: &[(&str, &str)] = &[
 /// Words of a pulse that tells a speed controller what to do.
 pub(super) const PULSES: &[&str] = &["esc", "throttle", "pwm", "thruster", "pulse", "signal"];
 /// Words of turns that are not those of the shaft.
-const ELECTRICAL: &[&str] = &["erpm", "electrical", "elec"];
+const ELECTRICAL: &[&str] = &["erpm", "e rpm", "electrical", "elec", "el rpm", "el speed"];
 /// Words of the motor's own current.
-const OF_MOTOR: &[&str] = &["motor", "motorstrom", "phase", "iq", "q axis", "winding", "coil"];
+const OF_MOTOR: &[&str] = &["motor", "phase", "iq", "q axis", "winding", "coil"];
 
 /// Units that tell what a field of a table is, where no word of its name does. Degrees may be those of a vehicle.
 const TELLING: &[(&str, &[&str])] = &[
@@ -146,9 +160,10 @@ pub(super) fn is_pulse(field: &Field) -> bool {
     unit_of(field).is_some_and(|unit| matches!(unit.symbol, "us" | "ms")) && has(&words(&field.name), PULSES)
 }
 
-/// A speed of electrical turns.
+/// A speed, or an angle, of electrical turns.
 pub(super) fn is_electrical(column: &str, field: &Field) -> bool {
-    column == "shaft_speed_rad_s" && has(&words(&field.name), ELECTRICAL)
+    let turns = ["shaft_speed_rad_s", "speed_cmd_rad_s", "shaft_angle_rad"].contains(&column);
+    turns && has(&words(&field.name), ELECTRICAL)
 }
 
 /// Whether the name says whose current it is.
@@ -166,7 +181,10 @@ pub(super) fn is_asked(topic: &Topic, field: &Field) -> bool {
     let own = words(&field.name);
     // moteus' control_velocity is what its trajectory asks for.
     let control = own.len() > 1 && own[0] == "control";
-    control || has(&own, ASKED) || has(&words(&topic.name), ASKED)
+    // Within a name `des` is an article of French.
+    let bare = words(bare(&field.name));
+    let desired = [bare.first(), bare.last()].into_iter().flatten().any(|word| word == "des");
+    control || desired || has(&own, ASKED) || has(&words(&topic.name), ASKED)
 }
 
 /// Whether a field may be a signal of a drive at all. A value that never changes is a channel that nobody uses, if it is not
@@ -179,6 +197,15 @@ fn possible(rule: &Rule, topic: &Topic, field: &Field, table: bool) -> bool {
         && (table || unit_of(field).is_some() || has(&names, DRIVE))
 }
 
+/// Whether a field would be a signal of a drive if its numbers were not all one.
+pub(super) fn is_unchanging(topic: &Topic, field: &Field, table: bool) -> bool {
+    let suits = |field: &Field| RULES.iter().any(|rule| fit(rule, topic, field, table).is_some());
+    let moved = field.range.map(|(low, _)| (low, low + 1.0));
+    field.range.is_some_and(|(low, high)| low == high)
+        && !suits(field)
+        && suits(&Field { range: moved, ..field.clone() })
+}
+
 /// Whether nothing but its unit tells what a field is.
 pub(super) fn by_unit(column: &str, field: &Field) -> bool {
     let names = words(&field.name);
@@ -188,7 +215,25 @@ pub(super) fn by_unit(column: &str, field: &Field) -> bool {
 }
 
 /// How well a field suits a rule: lower is better.
-pub(super) type Fit = (bool, bool, bool, usize, bool, bool);
+pub(super) type Fit = (bool, bool, bool, bool, usize, usize, bool);
+
+/// How far a name is from the plain one of a measured value: what says that it was measured comes first, and behind the plain
+/// name what says more than that, as `estimated_rpm`.
+fn qualified(rule: &Rule, field: &Field) -> usize {
+    let names = words(bare(&field.name));
+    let plain = |name: &String| {
+        let within = |list: &[&str]| list.iter().any(|phrase| phrase.split(' ').any(|word| word == name));
+        within(rule.words)
+            || within(DRIVE)
+            || within(ELECTRICAL)
+            || rule.column.split('_').any(|word| word == name)
+    };
+    match () {
+        () if has(&names, ACTUAL) => 0,
+        () if names.iter().all(plain) => 1,
+        () => 2,
+    }
+}
 
 /// How well a field suits a rule, if it does.
 pub(super) fn fit(rule: &Rule, topic: &Topic, field: &Field, table: bool) -> Option<Fit> {
@@ -226,5 +271,6 @@ pub(super) fn fit(rule: &Rule, topic: &Topic, field: &Field, table: bool) -> Opt
         return None;
     }
     let steady = field.range.is_none_or(|(low, high)| low == high);
-    Some((by_unit, steady, unit.is_none(), place, is_electrical(rule.column, field), elsewhere))
+    let electrical = is_electrical(rule.column, field);
+    Some((by_unit, steady, unit.is_none(), electrical, qualified(rule, field), place, elsewhere))
 }

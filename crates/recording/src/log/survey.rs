@@ -96,6 +96,8 @@ pub struct Proposal {
     pub native: bool,
     /// Shipped maps that fit, as they stand behind `--columns`.
     pub shipped: Vec<String>,
+    /// What stands in those for what only the user knows.
+    pub examples: Vec<Example>,
     /// Those of them that give no measured response, for `kort convert`: there is nothing to compare a model with.
     pub without_response: Vec<String>,
     /// Where no shipped map fits: those that some of the log would come in by, and what they lack.
@@ -103,6 +105,21 @@ pub struct Proposal {
     /// A column map as TOML, made from names and units; to be checked by a person. None if nothing in the log looks
     /// like a column of kort.
     pub map: Option<String>,
+    /// Where there is none: sources that have the name of a signal of a thruster, and one number throughout.
+    pub unchanging: Vec<String>,
+}
+
+/// A value of a shipped map that is nothing but an example: the user must give another, or confirm it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Example {
+    /// The map, as it stands behind `--columns`.
+    pub map: String,
+    /// What it asks for.
+    pub key: String,
+    /// The example.
+    pub value: String,
+    /// In words.
+    pub meaning: String,
 }
 
 /// A shipped map that has not all that it needs.
@@ -137,6 +154,14 @@ pub fn survey(name: &str, reader: impl Read) -> Result<Survey, RecordingError> {
 
 fn of(name: &str, log: &Log) -> Survey {
     let (proposal, chosen) = propose(log);
+    // Without a map every column is read.
+    let taken = |column: &usize| proposal.native || chosen.contains_key(&(0, *column));
+    let lost_in = log.lost_in.iter().filter(|(column, _)| taken(column)).flat_map(|(_, lost)| lost);
+    let said = |lost: &String| match proposal.native {
+        true => format!("{lost}; a recording of kort is refused for it: leave such a cell empty"),
+        false => lost.clone(),
+    };
+    let losses = log.losses.iter().cloned().chain(lost_in.map(said)).collect();
     let stretch = log.longest(0..log.topics.len());
     let topics: Vec<TopicSurvey> = log
         .topics
@@ -157,7 +182,7 @@ fn of(name: &str, log: &Log) -> Survey {
         resets: log.resets,
         topics,
         notes: log.notes.clone(),
-        losses: log.losses.clone(),
+        losses,
         proposal,
     }
 }

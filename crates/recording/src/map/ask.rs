@@ -137,6 +137,13 @@ impl Given {
         Ok(out)
     }
 
+    /// What the map asks for without a default, and the value is that of its example: key and meaning.
+    pub fn examples(&self, asks: &BTreeMap<String, Ask>) -> Vec<(String, String)> {
+        let is_example =
+            |(key, ask): &(&String, &Ask)| ask.default.is_none() && ask.example.as_ref() == self.0.get(*key);
+        asks.iter().filter(is_example).map(|(key, ask)| (key.clone(), ask.meaning.clone())).collect()
+    }
+
     pub fn into_pairs(self) -> Vec<(String, String)> {
         self.0.into_iter().collect()
     }

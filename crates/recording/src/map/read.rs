@@ -19,6 +19,8 @@ struct RawMap {
     decimal: Option<String>,
     #[serde(default)]
     ask: BTreeMap<String, Ask>,
+    #[serde(default)]
+    without_cells: Vec<String>,
     time: RawTime,
     select: Option<Select>,
     columns: BTreeMap<String, RawColumn>,
@@ -64,6 +66,13 @@ impl RawMap {
                 "name at least one of our columns, for example [columns.thrust_n]",
             ));
         }
+        // What stands in a source is confirmed by the log that has it.
+        let in_a_source = |key: &str| {
+            let inside = [format!("{{{key}}}"), format!("{{{key}+")];
+            self.columns.values().any(|column| inside.iter().any(|inside| column.source.contains(inside)))
+        };
+        let mut examples = given.examples(&self.ask);
+        examples.retain(|(key, _)| !in_a_source(key));
         // Each is looked at, also behind one that is wrong.
         let columns: Vec<_> = self
             .columns
@@ -75,7 +84,9 @@ impl RawMap {
             description: self.description,
             delimiter: delimiter?,
             decimal_comma: decimal_comma?,
+            without_cells: self.without_cells,
             time: time?,
+            examples,
             given: given.into_pairs(),
             select: self.select,
             columns,

@@ -12,6 +12,8 @@ use serde_json::Value;
 
 use super::{CalibrationState, Calibrations};
 
+/// What was measured.
+pub(super) const RECORDING: &str = "recording.mcap";
 /// Before each stage that `kort calibrate --job` is about to begin.
 const ASK: &str = "ask: ";
 /// Before each step of the estimation.
@@ -22,6 +24,8 @@ const DONE: [i32; 2] = [0, 3];
 const LOOK_EVERY: Duration = Duration::from_millis(20);
 /// A process that was told to end is killed after this time; the servo's own time-out takes the torque away then.
 const END_WITHIN: Duration = Duration::from_secs(3);
+/// The same once it drives no more: what it measured is being written.
+const WRITE_WITHIN: Duration = Duration::from_secs(60);
 
 /// A calibration about to be made.
 pub struct Job {
@@ -76,7 +80,7 @@ impl Job {
         command.arg("--root").arg(&calibrations.root).args(["--thruster", &self.thruster]);
         command.arg("--rig").arg(in_folder("rig.toml")).args(["--share", &self.share.to_string()]);
         command.arg("-o").arg(in_folder("calibrated.toml"));
-        command.arg("--recording").arg(in_folder("recording.mcap"));
+        command.arg("--recording").arg(in_folder(RECORDING));
         let report = File::create(in_folder("report.json"))?;
         let mut child = command.stdin(Stdio::piped()).stdout(report).stderr(Stdio::piped()).spawn()?;
         let (talk, agree) = (child.stderr.take(), child.stdin.take());
@@ -91,8 +95,11 @@ impl Job {
                 break status;
             }
             calibrations.keep_to_lease(&self.lease);
-            if calibrations.is_to_end() && told.get_or_insert_with(Instant::now).elapsed() > END_WITHIN {
-                child.kill()?;
+            if let Some(drives) = calibrations.is_to_end() {
+                let within = if drives { END_WITHIN } else { WRITE_WITHIN };
+                if told.get_or_insert_with(Instant::now).elapsed() > within {
+                    child.kill()?;
+                }
             }
             std::thread::sleep(LOOK_EVERY);
         };

@@ -208,10 +208,14 @@ impl Calibrations {
         text.and_then(|text| serde_json::from_slice(&text).ok()).unwrap_or(Value::Null)
     }
 
-    /// A file of one that is done.
+    /// A file of one that is done; what was measured of one that is over, however it ended.
     pub fn file(&self, info: &CalibrationInfo, name: &str) -> Result<Vec<u8>, Problem> {
-        let done = info.state == CalibrationState::Done;
-        done.then(|| fs::read(self.folder.join(&info.id).join(name)).ok()).flatten().ok_or_else(|| {
+        let there = match info.state {
+            CalibrationState::Done => true,
+            CalibrationState::Running => false,
+            _ => name == job::RECORDING,
+        };
+        there.then(|| fs::read(self.folder.join(&info.id).join(name)).ok()).flatten().ok_or_else(|| {
             let words = format!("calibration {} is {}: it has no {name}", info.id, info.state.name());
             Problem::new(Kind::Refused, words)
                 .hint("GET …/calibrations/{calibration} says how far it is, and why it ended")
@@ -280,9 +284,10 @@ impl Calibrations {
         }
     }
 
-    /// Was it told to end?
-    fn is_to_end(&self) -> bool {
-        lock(&self.running).as_ref().is_some_and(|running| running.ends.is_some())
+    /// Was it told to end? If so, whether it still drives.
+    fn is_to_end(&self) -> Option<bool> {
+        let running = lock(&self.running);
+        running.as_ref().filter(|running| running.ends.is_some()).map(|running| running.info.drives)
     }
 
     /// It drives only while the lease is in force under which it was begun.
@@ -290,7 +295,8 @@ impl Calibrations {
         let mut running = lock(&self.running);
         let Some(running) = running.as_mut().filter(|running| running.info.drives) else { return };
         if running.thruster.holds(Some(lease)).is_err() {
-            running.end("its lease ended".into());
+            let by = running.thruster.desk().lease.taken_over(lease).map(str::to_owned);
+            running.end(by.map_or("its lease ended".into(), |by| format!("{by} took command")));
         }
     }
 

@@ -4,8 +4,7 @@
 //! process ends its commands, and the servo goes to zero by itself; Ctrl-C reaches both. As a job of a running service
 //! the servo is the service's, and its controller is asked to stand aside for as long as this process speaks.
 
-use std::path::{Path, PathBuf};
-use std::process::{Child, Command as Program};
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
@@ -18,8 +17,8 @@ use kort_proto::messages::{ASIDE_NS, Command, DriveKind, Outcome, Process, Reque
 use kort_proto::transport::{ControllerPorts, Deployment, GatewayPorts, keep_on, ordinary, realtime};
 use kort_servo::settings::Settings;
 use kort_thruster::rig::Rig;
-use rustix::process::{Pid, Signal, kill_process};
 
+use super::servo::Servo;
 use crate::failure::Failure;
 
 /// The servo is up, and armed, within this.
@@ -57,6 +56,40 @@ pub struct Ended {
     pub session: Session,
     /// Why it stopped before its end.
     pub stopped: Option<String>,
+    /// What was asked of this process by signals.
+    pub signals: Signals,
+}
+
+/// Signals that end the process: while it drives, and while it writes down what it measured, in order.
+#[derive(Clone, Debug, Default)]
+pub struct Signals {
+    stop: Arc<AtomicBool>,
+    over: Arc<AtomicBool>,
+}
+
+impl Signals {
+    fn heard() -> Result<Self, Failure> {
+        let heard = Self::default();
+        for signal in [signal_hook::consts::SIGTERM, signal_hook::consts::SIGINT, signal_hook::consts::SIGHUP]
+        {
+            signal_hook::flag::register_conditional_default(signal, Arc::clone(&heard.over))
+                .and_then(|_| signal_hook::flag::register(signal, Arc::clone(&heard.stop)))
+                .map_err(Failure::failed)?;
+        }
+        Ok(heard)
+    }
+
+    /// What was to be kept is: from now on they end the process as they end any other.
+    ///
+    /// # Errors
+    /// One came meanwhile.
+    pub fn let_through(&self) -> Result<(), Failure> {
+        self.over.store(true, Ordering::Relaxed);
+        match self.stop.load(Ordering::Relaxed) {
+            true => Err(Failure::failed("aborted; the drive is at zero")),
+            false => Ok(()),
+        }
+    }
 }
 
 /// Runs a session to its end.
@@ -67,14 +100,8 @@ pub fn run(bench: &Bench) -> Result<Ended, Failure> {
     let thruster = bench.config.thruster(bench.thruster).map_err(Failure::input)?;
     let settings =
         Settings::new(bench.config, bench.thruster, thruster, bench.rig).map_err(Failure::input)?;
-    let stop = Arc::new(AtomicBool::new(false));
-    let over = Arc::new(AtomicBool::new(false));
-    for signal in [signal_hook::consts::SIGTERM, signal_hook::consts::SIGINT, signal_hook::consts::SIGHUP] {
-        // Once nothing is driven any more they end the process as they end any other.
-        signal_hook::flag::register_conditional_default(signal, Arc::clone(&over))
-            .map_err(Failure::failed)?;
-        signal_hook::flag::register(signal, Arc::clone(&stop)).map_err(Failure::failed)?;
-    }
+    let signals = Signals::heard()?;
+    let stop = Arc::clone(&signals.stop);
     let plan = Plan::new(
         bench.rig,
         settings.limits.drive_max,
@@ -82,7 +109,7 @@ pub fn run(bench: &Bench) -> Result<Ended, Failure> {
         settings.period_ns as f64 * 1e-9,
         bench.share,
     );
-    let mut servo = if bench.job { Servo(None) } else { Servo::start(bench)? };
+    let mut servo = if bench.job { Servo::of_service() } else { Servo::start(bench)? };
     let mut wire = Wire::open(bench, settings.limits.kind, &mut servo, &stop)?;
     if let Some(missing) = keep_on(&thruster.controller.cores) {
         eprintln!("warning: {missing}");
@@ -94,16 +121,19 @@ pub fn run(bench: &Bench) -> Result<Ended, Failure> {
     }
     wire.arm(&mut servo, &stop)?;
     let session = Session::new(plan, settings.limits.kind.name());
-    let ended = go(session, &mut wire, &stop, bench);
+    let (session, stopped) = go(session, &mut wire, &stop, bench);
     wire.rest();
-    over.store(true, Ordering::Relaxed);
+    if bench.job {
+        // The thruster is anybody's again, and no lease ends what follows.
+        eprintln!("step: writing the recording");
+    }
     // What follows is arithmetic, and must not keep the servos of others waiting.
     ordinary();
-    Ok(ended)
+    Ok(Ended { session, stopped, signals })
 }
 
-/// The session, tick by tick, until it ends.
-fn go(mut session: Session, wire: &mut Wire, stop: &AtomicBool, bench: &Bench) -> Ended {
+/// The session, tick by tick, until it ends, and why before its end.
+fn go(mut session: Session, wire: &mut Wire, stop: &AtomicBool, bench: &Bench) -> (Session, Option<String>) {
     let mut asked: Option<&'static str> = None;
     let mut answer: Option<Receiver<bool>> = None;
     let mut first_ns = None;
@@ -114,11 +144,7 @@ fn go(mut session: Session, wire: &mut Wire, stop: &AtomicBool, bench: &Bench) -
         while let Some(told) = wire.controller.telemetry.next() {
             heard = Instant::now();
             if told.armed == 0 {
-                let words = format!(
-                    "the servo switched off: {}\nhint: docs/faults has a page for each; remove the cause and begin anew",
-                    Names(told.faults)
-                );
-                return Ended { session, stopped: Some(words) };
+                return (session, Some(switched_off(told.faults)));
             }
             let from_ns = *first_ns.get_or_insert(told.time_ns);
             let time_s = told.time_ns.saturating_sub(from_ns) as f64 * 1e-9;
@@ -135,24 +161,35 @@ fn go(mut session: Session, wire: &mut Wire, stop: &AtomicBool, bench: &Bench) -
                         Ok(false) | Err(TryRecvError::Disconnected) => {
                             let words =
                                 format!("nobody agreed to {stage}\nhint: Enter goes on; --yes asks nobody");
-                            return Ended { session, stopped: Some(words) };
+                            return (session, Some(words));
                         }
                     }
                     0.0
                 }
-                Next::Finished => return Ended { session, stopped: None },
-                Next::Stopped(why) => return Ended { session, stopped: Some(why.to_string()) },
+                Next::Finished => return (session, None),
+                Next::Stopped(why) => return (session, Some(why.to_string())),
             };
         }
         if stop.load(Ordering::Relaxed) || wire.is_to_rest() {
-            return Ended { session, stopped: Some("aborted; the drive is at zero".into()) };
+            return (session, Some("aborted; the drive is at zero".into()));
         }
         if heard.elapsed() > SILENCE {
             let words = "the servo fell silent\nhint: its words stand above";
-            return Ended { session, stopped: Some(words.into()) };
+            return (session, Some(words.into()));
         }
         wire.command(drive, 0);
     }
+}
+
+/// Why the drive is off that was armed: a fault, or somebody asked for it.
+fn switched_off(faults: u64) -> String {
+    if faults == 0 {
+        return "somebody switched the drive off: no fault stands, so it was STOP, a disarm, or whoever took command\nhint: the service's events say who; begin anew when they agree".into();
+    }
+    format!(
+        "the servo switched off: {}\nhint: docs/faults has a page for each; remove the cause and begin anew",
+        Names(faults)
+    )
 }
 
 /// Asks the operator on a thread of its own: the servo goes on being commanded zero meanwhile.
@@ -173,50 +210,6 @@ fn ask(stage: &str, words: &str, bench: &Bench) -> Option<Receiver<bool>> {
         let _ = tell.send(read && line.trim().is_empty());
     });
     Some(told)
-}
-
-/// The servo's process; it ends with this one. None: it is the service's.
-struct Servo(Option<Child>);
-
-impl Servo {
-    fn start(bench: &Bench) -> Result<Self, Failure> {
-        let program: PathBuf = std::env::current_exe().map_err(Failure::failed)?;
-        let mut command = Program::new(program);
-        command.arg("servo").arg("--root").arg(bench.deployment.root());
-        command.arg("--parent").arg(std::process::id().to_string());
-        if let Some(file) = bench.file.or(bench.config.file.as_deref()) {
-            command.arg("--config").arg(file);
-        }
-        command.arg("--thruster").arg(bench.thruster);
-        command.spawn().map(|child| Self(Some(child))).map_err(Failure::failed)
-    }
-
-    /// Has it ended?
-    fn ended(&mut self) -> Option<Failure> {
-        let status = self.0.as_mut()?.try_wait().ok().flatten()?;
-        let words = format!("the servo ended ({status}); its reason stands above");
-        Some(match status.code() {
-            Some(2) => Failure::Input(words),
-            _ => {
-                Failure::Failed(format!("{words}\nhint: if a service runs on this deployment, stop it first"))
-            }
-        })
-    }
-}
-
-impl Drop for Servo {
-    fn drop(&mut self) {
-        let Some(child) = &mut self.0 else { return };
-        if let Some(pid) = i32::try_from(child.id()).ok().and_then(Pid::from_raw) {
-            let _ = kill_process(pid, Signal::TERM);
-        }
-        let end = Instant::now() + SILENCE;
-        while Instant::now() < end && matches!(child.try_wait(), Ok(None)) {
-            std::thread::sleep(Duration::from_millis(5));
-        }
-        let _ = child.kill();
-        let _ = child.wait();
-    }
 }
 
 /// The controller's and the operator's ports.
@@ -375,5 +368,19 @@ impl Wire {
     fn rest(&mut self) {
         self.command(0.0, 1);
         self.request(RequestKind::Disarm);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use kort_proto::faults::Fault;
+
+    #[test]
+    fn a_stop_is_not_told_as_a_fault_without_a_name() {
+        let stopped = switched_off(0);
+        assert!(stopped.contains("STOP") && !stopped.contains("docs/faults"), "{stopped}");
+        let tripped = switched_off(Fault::OverCurrent.bit());
+        assert!(tripped.contains(Fault::OverCurrent.name()) && tripped.contains("docs/faults"), "{tripped}");
     }
 }

@@ -5,4 +5,5 @@ pub mod concealed;
 pub mod conclude;
 pub mod live;
 pub mod rehearse;
+mod servo;
 pub mod stand;

@@ -128,6 +128,15 @@ fn session(
         job: args.job.is_some(),
     };
     let ended = live::run(&bench).inspect_err(|_| remove_empty(&[output, &recording]))?;
+    remove_empty(&[output, &recording]);
+    // Whatever follows, and whatever the session ended for, what was measured is kept.
+    let period_s = ended.session.plan().period_s;
+    let saved = conclude::save(ended.session.log(), period_s, &recording);
+    if args.job.is_some() {
+        behind_everything_else();
+    } else if matches!(saved, Ok(true)) {
+        eprintln!("what was measured is in {}", recording.display());
+    }
     let facts = ended.session.facts();
     let mut report = Report {
         schema: "kort.calibration/1",
@@ -135,12 +144,14 @@ fn session(
         thruster: args.thruster.clone(),
         steps: steps(facts, None),
         rig: None,
-        recording: None,
+        recording: matches!(saved, Ok(true)).then(|| recording.display().to_string()),
         diagnosis: None,
         stopped: ended.stopped,
     };
     if let Some(why) = report.stopped.clone() {
-        remove_empty(&[output, &recording]);
+        if let Err(lost) = &saved {
+            eprintln!("warning: the recording is lost: {lost}");
+        }
         if args.json {
             print_json(&report)?;
         } else {
@@ -148,17 +159,14 @@ fn session(
         }
         return Err(Failure::failed(why));
     }
-    let period_s = ended.session.plan().period_s;
-    if args.job.is_some() {
-        behind_everything_else();
-    }
+    saved?;
+    ended.signals.let_through()?;
     let spinner = args.job.is_none().then(progress::spinner);
     let told = |text: &str| match &spinner {
         Some(spinner) => spinner.set_message(text.to_string()),
         None => eprintln!("step: {text}"),
     };
     let estimate = conclude::estimated(ended.session.log(), period_s, rig, facts, &told)?;
-    conclude::save(&estimate, &recording)?;
     let (text, left_out) = conclude::rig_text(rig_text, &estimate)?;
     write_text(output, &text)?;
     let calibrated = Rig::from_toml(&text).map_err(|e| Failure::in_file(output, e))?;
@@ -169,7 +177,6 @@ fn session(
         step.skipped_because.extend(left_out);
     }
     report.rig = Some(output.display().to_string());
-    report.recording = Some(recording.display().to_string());
     report.diagnosis = Some(diagnosis.report.summary.clone());
     if args.json {
         print_json(&report)?;

@@ -158,6 +158,10 @@ fn proposal(found: &Survey) -> String {
     }
     for name in &found.proposal.shipped {
         let file = &found.file;
+        for example in found.proposal.examples.iter().filter(|example| example.map == *name) {
+            let (key, value, meaning) = (&example.key, &example.value, &example.meaning);
+            let _ = writeln!(out, "{key}={value} below is an example: write yours in its place ({meaning})");
+        }
         let _ = if found.proposal.without_response.contains(name) {
             writeln!(
                 out,
@@ -184,11 +188,30 @@ fn proposal(found: &Survey) -> String {
             && found.proposal.shipped.is_empty()
             && found.proposal.incomplete.is_empty() =>
         {
-            out += "nothing in it has the name of a signal of a thruster; docs/recordings.md shows how a map is written\n";
+            out += &nothing(found);
         }
         None => {}
     }
     out
+}
+
+/// Why there is nothing to propose.
+fn nothing(found: &Survey) -> String {
+    let rows = found.topics.iter().map(|topic| topic.messages).max().unwrap_or(0);
+    let unchanging = &found.proposal.unchanging;
+    if rows < 2 {
+        return format!(
+            "there are {rows} row(s) in it, and at least 2 are needed: was the logger stopped too early?\n"
+        );
+    }
+    if !unchanging.is_empty() {
+        return format!(
+            "{} never change in it, and nothing else has the name of a signal of a thruster; docs/recordings.md shows how a map is written\n",
+            unchanging.join(", ")
+        );
+    }
+    "nothing in it has the name of a signal of a thruster; docs/recordings.md shows how a map is written\n"
+        .into()
 }
 
 #[cfg(test)]

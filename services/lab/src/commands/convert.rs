@@ -2,9 +2,11 @@
 
 use std::path::PathBuf;
 
-use kort_recording::Format;
+use kort_recording::columns::known;
+use kort_recording::{Format, Recording};
+use serde::Serialize;
 
-use crate::failure::{Failure, Outcome, check_writable, print};
+use crate::failure::{Failure, Outcome, check_writable, print, print_json};
 use crate::files;
 
 const EXAMPLE: &str = "\
@@ -26,6 +28,58 @@ pub struct Args {
     /// The file to write: .csv, .csv.gz, .mcap or .parquet
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
+    /// Print one JSON document (kort.convert/1)
+    #[arg(long)]
+    json: bool,
+}
+
+/// What was written.
+#[derive(Debug, Serialize)]
+struct Written<'r> {
+    schema: &'static str,
+    /// What was read.
+    file: String,
+    /// What was written.
+    output: String,
+    rows: usize,
+    from_s: Option<f64>,
+    to_s: Option<f64>,
+    columns: Vec<WrittenColumn<'r>>,
+    /// Columns of the log that the map does not take.
+    unused: &'r [String],
+    notes: &'r [String],
+    losses: &'r [String],
+}
+
+#[derive(Debug, Serialize)]
+struct WrittenColumn<'r> {
+    name: &'r str,
+    /// Of a column that kort knows.
+    unit: Option<&'static str>,
+    /// Rows with a value in it.
+    samples: usize,
+}
+
+impl<'r> Written<'r> {
+    fn of(args: &Args, recording: &'r Recording) -> Self {
+        let columns = recording.columns.iter().map(|column| WrittenColumn {
+            name: &column.name,
+            unit: known().find(|known| known.name == column.name).map(|known| known.unit),
+            samples: column.samples(),
+        });
+        Self {
+            schema: "kort.convert/1",
+            file: args.recording.display().to_string(),
+            output: args.output.display().to_string(),
+            rows: recording.rows(),
+            from_s: recording.time_s.first().copied(),
+            to_s: recording.time_s.last().copied(),
+            columns: columns.collect(),
+            unused: &recording.unused,
+            notes: &recording.notes,
+            losses: &recording.losses,
+        }
+    }
 }
 
 /// Does it.
@@ -41,6 +95,10 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         eprintln!("columns not used: {}", recording.unused.join(", "));
     }
     recording.save(&args.output).map_err(Failure::failed)?;
+    if args.json {
+        print_json(&Written::of(args, &recording))?;
+        return Ok(Outcome::with_loss(!recording.losses.is_empty()));
+    }
     let names: Vec<&str> = recording.columns.iter().map(|column| column.name.as_str()).collect();
     print(&format!("{}: {} rows of {}\n", args.output.display(), recording.rows(), names.join(", ")));
     Ok(Outcome::with_loss(!recording.losses.is_empty()))

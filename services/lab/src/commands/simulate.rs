@@ -63,7 +63,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let mut scenario = read_scenario(&args.scenario)?;
     scenario.seed = args.seed.unwrap_or(scenario.seed);
     scenario.noise = args.noise.unwrap_or(scenario.noise);
-    let mut files = Files { beside: args.scenario.parent().map(Path::to_path_buf), lost: false };
+    let mut files = Files::beside(&args.scenario);
     let mut run =
         Run::new(&scenario, &rig, &mut files).map_err(|wrong| Failure::in_file_all(&args.scenario, wrong))?;
     let columns = run.columns().to_vec();
@@ -108,7 +108,7 @@ pub fn recording(
         Scenario::from_text_with_all(text).map_err(|wrong| Failure::in_file_all(scenario, wrong))?;
     wanted.seed = seed.unwrap_or(wanted.seed);
     wanted.noise = noise.unwrap_or(wanted.noise);
-    let mut files = Files { beside: scenario.parent().map(Path::to_path_buf), lost: false };
+    let mut files = Files::beside(scenario);
     let mut run =
         Run::new(&wanted, &rig, &mut files).map_err(|wrong| Failure::in_file_all(scenario, wrong))?;
     let names = run.columns().to_vec();
@@ -156,9 +156,16 @@ fn read_scenario(wanted: &Path) -> Result<Scenario, Failure> {
 }
 
 /// Replays from files and built-in recordings.
-struct Files {
+pub(crate) struct Files {
     beside: Option<PathBuf>,
     lost: bool,
+}
+
+impl Files {
+    /// Those that a scenario's file names.
+    pub(crate) fn beside(scenario: &Path) -> Self {
+        Self { beside: scenario.parent().map(Path::to_path_buf), lost: false }
+    }
 }
 
 impl Replays for Files {

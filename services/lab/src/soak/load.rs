@@ -20,9 +20,19 @@ pub struct ScenarioError {
     pub message: String,
 }
 
+impl ScenarioError {
+    /// In the file of a scenario or its rig.
+    fn of(file: &Path, message: String) -> SoakError {
+        SoakError::Scenario(Self { file: file.display().to_string(), message })
+    }
+}
+
 /// Why a soak cannot be run.
 #[derive(Debug, Error)]
 pub enum SoakError {
+    /// Several things at once.
+    #[error("{}", all_lines(.0))]
+    Several(Vec<SoakError>),
     /// A scenario or its rig.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
@@ -86,6 +96,18 @@ pub enum SoakError {
     Threads(#[from] rayon::ThreadPoolBuildError),
 }
 
+impl SoakError {
+    /// All that is wrong, as one.
+    fn all(mut wrong: Vec<Self>) -> Self {
+        if wrong.len() == 1 { wrong.remove(0) } else { Self::Several(wrong) }
+    }
+}
+
+/// Each on lines of its own.
+fn all_lines(wrong: &[SoakError]) -> String {
+    wrong.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
+}
+
 /// The name under which a rig's own default controller runs.
 pub const DEFAULT: &str = "default";
 
@@ -145,77 +167,102 @@ pub struct Instead<'a> {
 /// Reads a scenario, by path or name, its rig, its recordings and the controllers to compare.
 ///
 /// # Errors
-/// [`SoakError`] names the file, the key and what is allowed.
+/// [`SoakError`] names the file, the key and what is allowed; all that is wrong.
 pub fn load(path: &Path, instead: &Instead) -> Result<Loaded, SoakError> {
-    let (scenario, rig, rig_text) = read(path, instead.rig)?;
-    let period_s = 1.0 / scenario.control_rate_hz;
-    let model = ControlModel::from_rig(&rig, period_s)
-        .map_err(|source| SoakError::Model { file: path.display().to_string(), source })?;
-    let effects = kort_soak::effects(&scenario, &rig, &model)
-        .map_err(|message| ScenarioError { file: path.display().to_string(), message })?;
-    let folder = path.parent().unwrap_or(Path::new("."));
-    let names = instead.controllers.map_or_else(|| scenario.controllers.clone(), <[String]>::to_vec);
-    let controllers = names
-        .iter()
-        .map(|name| {
-            let contestant = match name.as_str() {
-                kort_soak::limits::NAME => Contestant::Limits,
-                DEFAULT => Contestant::Law(Box::new(
-                    advise(&rig, period_s)
-                        .map_err(|source| SoakError::Model { file: path.display().to_string(), source })?
-                        .config,
-                )),
-                _ => Contestant::Law(Box::new(controller(name, folder)?)),
-            };
-            Ok((name.clone(), contestant))
-        })
-        .collect::<Result<_, SoakError>>()?;
-    let replayed = scenario
-        .references
-        .iter()
-        .map(|s| replay(s, folder, model.thrust_max_n))
-        .collect::<Result<_, _>>()?;
-    let seeds = instead.seeds.unwrap_or(scenario.seeds);
-    Ok(Loaded {
-        scenario,
-        rig,
-        rig_text,
-        effects,
-        replayed,
-        thrust_max_n: model.thrust_max_n,
-        controllers,
-        seeds,
-    })
+    let text = files::soak_scenario_text(path)?;
+    of_text(&text, path, instead).map_err(SoakError::all)
 }
 
-/// A scenario, and its rig or another, with the rig's text.
-fn read(path: &Path, rig: Option<&Path>) -> Result<(Scenario, Rig, String), SoakError> {
-    let text = files::soak_scenario_text(path)?;
-    let error = |path: &Path, message: String| ScenarioError { file: path.display().to_string(), message };
-    let all = |path: &Path, wrong: Vec<String>| error(path, all_of(&path.display().to_string(), wrong));
-    let parsed = |path: &Path, text: &str| {
-        let words = |wrong: Vec<RigError>| wrong.iter().map(ToString::to_string).collect();
-        Rig::from_toml_with_all(text).map_err(|wrong| all(path, words(wrong)))
+/// The same from the scenario's text, and all that is wrong one by one.
+///
+/// # Errors
+/// At least one [`SoakError`].
+pub fn of_text(text: &str, path: &Path, instead: &Instead) -> Result<Loaded, Vec<SoakError>> {
+    let file = path.display().to_string();
+    let of_scenario = |wrong: Vec<String>| -> Vec<SoakError> {
+        wrong.into_iter().map(|words| ScenarioError::of(path, words)).collect()
     };
-    let scenario = Scenario::from_toml(&text).map_err(|wrong| all(path, wrong))?;
-    let by_name = |name: &Path| -> Result<(Rig, String), SoakError> {
-        let text = files::rig_text(name)?;
-        Ok((parsed(name, &text)?, text))
+    let scenario = Scenario::from_toml(text).map_err(of_scenario)?;
+    let folder = path.parent().unwrap_or(Path::new("."));
+    let mut wrong = Vec::new();
+    let found = rig(&scenario, path, instead.rig).map_err(|errors| wrong.extend(errors)).ok();
+    let period_s = 1.0 / scenario.control_rate_hz;
+    let model = found.as_ref().and_then(|(rig, _)| {
+        let model = ControlModel::from_rig(rig, period_s);
+        model.map_err(|source| wrong.push(SoakError::Model { file: file.clone(), source })).ok()
+    });
+    let with_model = found.as_ref().zip(model.as_ref());
+    let effects = with_model.and_then(|((rig, _), model)| {
+        let effects = kort_soak::effects(&scenario, rig, model);
+        effects.map_err(|words| wrong.extend(of_scenario(words))).ok()
+    });
+    let names = instead.controllers.map_or_else(|| scenario.controllers.clone(), <[String]>::to_vec);
+    let mut controllers = Vec::new();
+    for name in names {
+        let contestant = match name.as_str() {
+            kort_soak::limits::NAME => Ok(Contestant::Limits),
+            // Without a model for its rig nothing more is to be said of it.
+            DEFAULT => match with_model.map(|((rig, _), _)| advise(rig, period_s)) {
+                Some(advice) => advice
+                    .map(|advice| Contestant::Law(Box::new(advice.config)))
+                    .map_err(|source| SoakError::Model { file: file.clone(), source }),
+                None => continue,
+            },
+            _ => controller(&name, folder).map(|config| Contestant::Law(Box::new(config))),
+        };
+        match contestant {
+            Ok(contestant) => controllers.push((name, contestant)),
+            Err(error) => wrong.push(error),
+        }
+    }
+    // What can be replayed does not go by how large a thrust is.
+    let thrust_max_n = model.map_or(1.0, |model| model.thrust_max_n);
+    let mut replayed = Vec::new();
+    for segment in &scenario.references {
+        match replay(segment, folder, thrust_max_n) {
+            Ok(one) => replayed.push(one),
+            Err(error) => wrong.push(error),
+        }
+    }
+    let seeds = instead.seeds.unwrap_or(scenario.seeds);
+    match (found, effects) {
+        (Some((rig, rig_text)), Some(effects)) if wrong.is_empty() => {
+            Ok(Loaded { scenario, rig, rig_text, effects, replayed, thrust_max_n, controllers, seeds })
+        }
+        _ => Err(wrong),
+    }
+}
+
+/// The rig of a scenario, or another, with its text.
+fn rig(scenario: &Scenario, path: &Path, instead: Option<&Path>) -> Result<(Rig, String), Vec<SoakError>> {
+    let parsed = |file: &Path, text: String| {
+        let of_rig = |error: RigError| ScenarioError::of(file, error.to_string());
+        let rig = Rig::from_toml_with_all(&text);
+        let rig = rig.map_err(|wrong| wrong.into_iter().map(of_rig).collect::<Vec<_>>())?;
+        Ok((rig, text))
     };
-    if let Some(rig) = rig {
-        let (rig, text) = by_name(rig)?;
-        return Ok((scenario, rig, text));
+    // A scenario by name goes with a rig by name.
+    let named = (!path.is_file()).then(|| Path::new(scenario.rig.file_stem().unwrap_or_default()));
+    if let Some(name) = instead.or(named) {
+        return parsed(name, files::rig_text(name).map_err(|error| vec![error.into()])?);
     }
-    if !path.is_file() {
-        // A scenario by name goes with a rig by name.
-        let (rig, text) = by_name(Path::new(scenario.rig.file_stem().unwrap_or_default()))?;
-        return Ok((scenario, rig, text));
+    let file = path.parent().unwrap_or(Path::new(".")).join(&scenario.rig);
+    let text = if file.is_file() {
+        std::fs::read_to_string(&file).map_err(|error| error.to_string())
+    } else {
+        Err("there is no such file".into())
+    };
+    match text {
+        Ok(text) => parsed(&file, text),
+        Err(why) => {
+            let words = format!(
+                "`rig` = {:?}: {}: {why}\nhint: it is taken relative to the scenario's file",
+                scenario.rig.display().to_string(),
+                file.display()
+            );
+            Err(vec![ScenarioError::of(path, words)])
+        }
     }
-    let rig = path.parent().unwrap_or(Path::new(".")).join(&scenario.rig);
-    let text = std::fs::read_to_string(&rig).map_err(|e| {
-        error(&rig, format!("{e}\nhint: `rig` in {} is taken relative to that file", path.display()))
-    })?;
-    Ok((scenario, parsed(&rig, &text)?, text))
 }
 
 /// A controller by name: a path, a file beside the scenario or under `config/`, or a bare law.

@@ -20,7 +20,7 @@ pub use adopt::adopt;
 pub use adoption::Adoption;
 use chain::ProductionChain;
 pub use live::{LiveError, live};
-pub use load::{Contestant, DEFAULT, Instead, Loaded, SoakError, load};
+pub use load::{Contestant, DEFAULT, Instead, Loaded, SoakError, load, of_text};
 pub use markdown::put_into;
 pub use metrics::{Metrics, MetricsError};
 pub use page::page;

@@ -10,6 +10,7 @@ pub mod odrive;
 pub mod simulated;
 pub mod vesc;
 mod wired;
+mod wrong;
 
 use kort_proto::config::{Config, ConfigError, Thruster};
 use kort_proto::messages::DriveKind;
@@ -28,6 +29,7 @@ use odrive::ODrive;
 pub use simulated::Simulated;
 use vesc::Vesc;
 pub use wired::{Own, Wired};
+pub(crate) use wrong::Wrong;
 
 /// A drive: takes commands, and tells what it measures itself.
 ///
@@ -63,7 +65,14 @@ pub const ALL: [&str; 7] = ["simulated", "vesc", "odrive", "moteus", "cia402", "
 /// # Errors
 /// [`ConfigError`] names the kinds there are.
 pub fn choose(config: &Config, id: &str, thruster: &Thruster, rig: &Rig) -> Result<Chosen, ConfigError> {
-    unread(config, id, thruster)?;
+    // What waits is told beside what is read, and is as much a reason not to start.
+    let waiting = unread(config, id, thruster);
+    let chosen = read(config, id, thruster, rig);
+    waiting.and(chosen)
+}
+
+/// The drive's own section.
+fn read(config: &Config, id: &str, thruster: &Thruster, rig: &Rig) -> Result<Chosen, ConfigError> {
     match thruster.amplifier.as_str() {
         "simulated" => Ok(Chosen::Simulated(Box::new(Simulated::new(config, id, thruster, rig)?))),
         "vesc" => {
@@ -151,12 +160,17 @@ fn current_or_speed(
     id: &str,
     thruster: &Thruster,
     rig: &Rig,
-) -> Result<DriveKind, ConfigError> {
-    match kind_of(rig) {
-        DriveKind::Voltage => Err(config.error(format!(
+    wrong: &mut Vec<ConfigError>,
+) -> DriveKind {
+    let kind = kind_of(rig);
+    if kind == DriveKind::Voltage {
+        wrong.push(config.error(format!(
             "`thrusters.{id}.amplifier` = \"{}\" takes current or speed, but the rig's amplifier is of kind voltage\nhint: amplifier.kind = \"current\" in the rig, with its current_limit_a",
             thruster.amplifier
-        ))),
-        kind => Ok(kind),
+        )));
     }
+    kind
 }
+
+#[cfg(test)]
+mod tests;

@@ -26,7 +26,7 @@ const CATCH_UP: u64 = 50;
 #[serde(deny_unknown_fields, default)]
 struct Simulation {
     model: String,
-    seed: u64,
+    seed: i64,
     ambient_m_s: f64,
     effects: Vec<EffectKeys>,
     sensor_fault: Option<SensorFault>,
@@ -89,17 +89,26 @@ impl Simulated {
         let section = format!("thrusters.{id}.simulation");
         let keys: Simulation = config.section(&section, &thruster.simulation)?;
         let fail = |key: &str, words: String| config.error(format!("`{section}.{key}`: {words}"));
-        let model: ModelName = keys.model.parse().map_err(|e| fail("model", e))?;
+        let mut wrong = Vec::new();
+        // Whatever plays the stand, the rest is told with it.
+        let model = keys.model.parse().unwrap_or_else(|e| {
+            wrong.push(fail("model", e));
+            ModelName::Model2
+        });
         if matches!(model, ModelName::Model0 | ModelName::Model3) {
-            return Err(fail(
+            wrong.push(fail(
                 "model",
                 format!(
                     "{model} has no shaft of its own and cannot play a stand\nhint: model1, model2 or rotational_flow"
                 ),
             ));
         }
+        if keys.seed < 0 {
+            let words = format!("{} is outside 0 to {}\nhint: 0 is without noise", keys.seed, i64::MAX);
+            wrong.push(fail("seed", words));
+        }
         if keys.ambient_m_s.is_nan() || keys.ambient_m_s.abs() > 5.0 {
-            return Err(fail(
+            wrong.push(fail(
                 "ambient_m_s",
                 format!(
                     "{} is outside -5 to 5\nhint: the stream past the stand, 0 in still water",
@@ -108,7 +117,7 @@ impl Simulated {
             ));
         }
         if !(0.0..=1e6).contains(&keys.sensor_fault_after_s) {
-            return Err(fail(
+            wrong.push(fail(
                 "sensor_fault_after_s",
                 format!(
                     "{} is outside 0 to 1e6\nhint: when the sensor begins to lie",
@@ -119,7 +128,7 @@ impl Simulated {
         let tick_s = thruster.servo_period_ns() as f64 * 1e-9;
         let parameters = Parameters::stated(rig);
         let scale = kort_scenario::scale(rig, &parameters, full_drive(rig, &parameters), tick_s, 60.0);
-        let (mut chosen, mut wrong) = (Vec::new(), Vec::new());
+        let mut chosen = Vec::new();
         for (i, effect) in keys.effects.iter().enumerate() {
             let (named, given) = (format!("{section}.effects[{i}].id"), format!("{section}.effects[{i}]"));
             let used = kort_scenario::used_effect((&named, &effect.id), (&given, &effect.values), &scale);
@@ -156,7 +165,12 @@ impl Simulated {
             time_s: 0.0,
             ambient_m_s: keys.ambient_m_s,
             sensors: rig.sensors,
-            measuring: Measuring::new(&rig.sensors, scale, if keys.seed == 0 { 0.0 } else { 1.0 }, keys.seed),
+            measuring: Measuring::new(
+                &rig.sensors,
+                scale,
+                if keys.seed == 0 { 0.0 } else { 1.0 },
+                keys.seed as u64,
+            ),
             lying: keys.sensor_fault.map(|fault| Lying::new(fault, keys.sensor_fault_after_s)),
         })
     }

@@ -9,23 +9,23 @@ use super::forms::Form;
 use crate::claims::Claim;
 use crate::link::Medium;
 
-/// Section `drive` as written.
+/// Section `drive` as written: whole numbers as they stand there, since what may stand there is no computer's range.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct Keys {
     port: Option<PathBuf>,
-    baud: u32,
+    baud: i64,
     rate_hz: f64,
     timeout_ms: f64,
     reading_life_ms: Option<f64>,
     reversed: bool,
     identity: Option<String>,
-    pole_pairs: Option<u32>,
-    address: Option<u8>,
-    bitrate: Option<u32>,
+    pole_pairs: Option<i64>,
+    address: Option<i64>,
+    bitrate: Option<i64>,
     units_per_turn: Option<f64>,
     speed_units: Option<f64>,
-    motor: Option<u32>,
+    motor: Option<i64>,
 }
 
 impl Default for Keys {
@@ -68,8 +68,9 @@ impl Default for Times {
 }
 
 impl Times {
-    /// An error begins with its key, behind the section's name.
-    pub(super) fn check(&self, thruster: &Thruster) -> Result<(), String> {
+    /// All that is wrong; each begins with its key, behind the section's name.
+    pub(super) fn check(&self, thruster: &Thruster) -> Vec<String> {
+        let mut wrong = Vec::new();
         for (key, value, low, high, hint) in [
             (
                 "rate_hz",
@@ -88,20 +89,24 @@ impl Times {
             ),
         ] {
             if !(low..=high).contains(&value) {
-                return Err(format!("{key}` = {value} is outside {low} to {high}\nhint: {hint}"));
+                wrong.push(format!("{key}` = {value} is outside {low} to {high}\nhint: {hint}"));
             }
+        }
+        if !wrong.is_empty() {
+            // What one is beside another is told once each can be meant.
+            return wrong;
         }
         let period_ms = 1e3 / self.rate_hz;
         for (key, value) in [("timeout_ms", self.timeout_ms), ("reading_life_ms", self.reading_life_ms)] {
             if value < 3.0 * period_ms {
-                return Err(format!(
+                wrong.push(format!(
                     "{key}` = {value} is less than three exchanges at rate_hz = {}\nhint: {} or more, or a faster exchange",
                     self.rate_hz,
                     3.0 * period_ms
                 ));
             }
         }
-        Ok(())
+        wrong
     }
 
     pub(super) fn reading_life_ns(&self) -> u64 {
@@ -157,49 +162,55 @@ pub struct Wired {
     /// Serial number of the one drive that is meant; empty takes any.
     pub identity: String,
     /// Pole pairs of the motor, for drives that tell electrical speed.
-    pub pole_pairs: Option<u32>,
+    pub pole_pairs: Option<i64>,
     /// Number on the bus, for drives that share one.
-    pub address: Option<u8>,
+    pub address: Option<i64>,
     /// Bits a second on the CAN behind an adapter on a serial port.
-    pub bitrate: Option<u32>,
+    pub bitrate: Option<i64>,
     /// Position units of a turn of the shaft, for drives whose unit is a setting.
     pub units_per_turn: Option<f64>,
     /// Velocity units at a turn a second, likewise.
     pub speed_units: Option<f64>,
     /// Number of the motor, for drives that have several.
-    pub motor: Option<u32>,
+    pub motor: Option<i64>,
     /// What no other device may have too: the wire, unless the drive shares it, and the one drive that is meant.
     pub claims: Vec<Claim>,
 }
 
 impl Wired {
-    /// Reads and checks the section.
+    /// Reads the section; what is wrong in it goes to `wrong`, and the drive is then not to be had.
     ///
     /// # Errors
-    /// [`ConfigError`] names key, value and what is allowed.
-    pub fn new(config: &Config, id: &str, thruster: &Thruster, own: &Own) -> Result<Self, ConfigError> {
+    /// [`ConfigError`] where it cannot be read at all.
+    pub fn read(
+        config: &Config,
+        id: &str,
+        thruster: &Thruster,
+        own: &Own,
+        wrong: &mut Vec<ConfigError>,
+    ) -> Result<Self, ConfigError> {
         let section = format!("thrusters.{id}.drive");
         let keys: Keys = config.section(&section, &thruster.drive)?;
-        let fail = |key: &str, words: String| Err(config.error(format!("`{section}.{key}` {words}")));
+        let mut fail =
+            |key: &str, words: String| wrong.push(config.error(format!("`{section}.{key}` {words}")));
         for (key, why, hint) in OWN {
             if let Some(value) = thruster.drive.get(key).filter(|_| !own.keys.contains(&key)) {
-                return fail(key, format!("= {value}: {why}\nhint: {hint}"));
+                fail(key, format!("= {value}: {why}\nhint: {hint}"));
             }
         }
-        let Some(port) = keys.port else {
-            return fail(
-                "port",
-                format!("is missing; allowed is {}\nhint: {}", own.port.allowed, own.port.hint),
-            );
-        };
-        if let Err(words) = own.port.check(&port.to_string_lossy()) {
-            return fail("port", words);
+        match &keys.port {
+            Some(port) => {
+                own.port.check(&port.to_string_lossy()).unwrap_or_else(|words| fail("port", words));
+            }
+            None => {
+                fail("port", format!("is missing; allowed is {}\nhint: {}", own.port.allowed, own.port.hint))
+            }
         }
         if let Some(Err(words)) = keys.identity.as_deref().map(|number| own.identity.check(number)) {
-            return fail("identity", words);
+            fail("identity", words);
         }
         if !(1200..=12_000_000).contains(&keys.baud) {
-            return fail(
+            fail(
                 "baud",
                 format!("= {} is outside 1200 to 12000000\nhint: 115200; an USB device takes any", keys.baud),
             );
@@ -209,13 +220,16 @@ impl Wired {
             timeout_ms: keys.timeout_ms,
             reading_life_ms: keys.reading_life_ms.unwrap_or(own.reading_life_ms),
         };
-        times.check(thruster).map_err(|words| config.error(format!("`{section}.{words}")))?;
+        wrong.extend(
+            times.check(thruster).into_iter().map(|words| config.error(format!("`{section}.{words}"))),
+        );
+        let port = keys.port.unwrap_or_default();
         let identity = keys.identity.unwrap_or_default().to_ascii_lowercase();
         let meant = Some(&identity).filter(|identity| !identity.is_empty());
         let meant = meant.map(|identity| Claim::identity(&thruster.amplifier, identity));
         Ok(Self {
             claims: [Claim::port(&port)].into_iter().chain(meant).collect(),
-            medium: Medium::Serial { port: port.clone(), baud: keys.baud },
+            medium: Medium::Serial { port: port.clone(), baud: u32::try_from(keys.baud).unwrap_or_default() },
             port,
             rate_hz: keys.rate_hz,
             timeout_s: keys.timeout_ms * 1e-3,

@@ -14,12 +14,12 @@ use super::serial_line::SerialLine;
 use super::units::to_si;
 use super::{Channel, Plausible, place};
 use crate::claims::Claim;
-use crate::drives::DEVICE;
+use crate::drives::{DEVICE, Wrong};
 
 /// Names of the kinds, as `kind` gives them.
 const KINDS: [&str; 2] = ["serial_line", "iio"];
 /// Bits a second of a serial line whose section does not say.
-const BAUD: u32 = 9600;
+const BAUD: i64 = 9600;
 
 /// A section as written.
 #[derive(Clone, Debug, Deserialize)]
@@ -27,7 +27,7 @@ const BAUD: u32 = 9600;
 struct Keys {
     kind: String,
     port: Option<PathBuf>,
-    baud: Option<u32>,
+    baud: Option<i64>,
     pattern: Option<String>,
     ask: Option<String>,
     path: Option<PathBuf>,
@@ -54,7 +54,7 @@ fn required() -> bool {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct SignalKeys {
-    column: Option<usize>,
+    column: Option<i64>,
     channel: Option<String>,
     unit: Option<String>,
     scale: Option<f64>,
@@ -93,60 +93,70 @@ pub struct Chosen {
 pub fn choose(config: &Config, id: &str, thruster: &Thruster, rig: &Rig) -> Result<Vec<Chosen>, ConfigError> {
     let plausible = Plausible::of(rig);
     let mut chosen: Vec<Chosen> = Vec::new();
+    let mut errors = Vec::new();
     for (name, table) in &thruster.sensors {
         let section = format!("thrusters.{id}.sensors.{name}");
         let keys: Keys = config.section(&section, table)?;
-        let one =
-            read(name, &keys, &plausible).map_err(|words| config.error(format!("`{section}.{words}")))?;
+        let mut wrong = Wrong::default();
+        let one = read(name, &keys, &plausible, &mut wrong);
         for other in &chosen {
-            if let Some(signal) =
-                one.gives.iter().find(|p| other.gives.contains(p)).and_then(|p| SIGNALS.get(*p))
-            {
-                return Err(config.error(format!(
-                    "`{section}.signals.{}` is given by `{}` too\nhint: leave one of them out",
+            let given = one.iter().flat_map(|one| &one.gives).filter(|place| other.gives.contains(place));
+            for signal in given.filter_map(|place| SIGNALS.get(*place)) {
+                wrong.say(format!(
+                    "signals.{}` is given by `{}` too\nhint: leave one of them out",
                     signal.name, other.name
-                )));
+                ));
             }
         }
-        chosen.push(one);
+        errors.extend(wrong.of_section(config, &section));
+        chosen.extend(one);
     }
-    Ok(chosen)
+    match config.first_of(errors.into_iter()) {
+        Some(first) => Err(first),
+        None => Ok(chosen),
+    }
 }
 
-/// One section; an error begins with its key, behind the section's name.
-fn read(name: &str, keys: &Keys, plausible: &Plausible) -> Result<Chosen, String> {
-    let within = |key: &str, value: f64, low: f64, high: f64, hint: &str| {
-        if (low..=high).contains(&value) {
-            return Ok(());
+/// One section, as far as it can be read.
+fn read(name: &str, keys: &Keys, plausible: &Plausible, wrong: &mut Wrong) -> Option<Chosen> {
+    let mut within = |key: &str, value: f64, low: f64, high: f64, hint: &str| {
+        if !(low..=high).contains(&value) {
+            wrong.say(format!("{key}` = {value} is outside {low} to {high}\nhint: {hint}"));
         }
-        Err(format!("{key}` = {value} is outside {low} to {high}\nhint: {hint}"))
     };
-    within("rate_hz", keys.rate_hz, 0.1, 1000.0, "how often the instrument has a new value")?;
-    within("reading_life_ms", keys.reading_life_ms, 10.0, 60_000.0, "some of the instrument's periods")?;
+    within("rate_hz", keys.rate_hz, 0.1, 1000.0, "how often the instrument has a new value");
+    within("reading_life_ms", keys.reading_life_ms, 10.0, 60_000.0, "some of the instrument's periods");
     if keys.signals.is_empty() {
-        return Err("signals` is empty\nhint: signals = { thrust_n = { column = 1, unit = \"N\" } }".into());
+        wrong.say("signals` is empty\nhint: signals = { thrust_n = { column = 1, unit = \"N\" } }");
     }
+    let measured = |p: &usize| SIGNALS.get(*p).is_some_and(|s| s.kind == SignalKind::Measured);
     let mut gives = Vec::new();
     for signal in keys.signals.keys() {
-        let measured = |p: &usize| SIGNALS.get(*p).is_some_and(|s| s.kind == SignalKind::Measured);
-        gives.push(place(signal).filter(measured).ok_or_else(|| {
-            let known: Vec<_> =
-                SIGNALS.iter().filter(|s| s.kind == SignalKind::Measured).map(|s| s.name).collect();
-            format!("signals.{signal}` is nothing that is measured\nhint: known are {}", known.join(", "))
-        })?);
+        match place(signal).filter(measured) {
+            Some(place) => gives.push(place),
+            None => {
+                let known: Vec<_> =
+                    SIGNALS.iter().filter(|s| s.kind == SignalKind::Measured).map(|s| s.name).collect();
+                wrong.say(format!(
+                    "signals.{signal}` is nothing that is measured\nhint: known are {}",
+                    known.join(", ")
+                ));
+            }
+        }
     }
     let kind = match keys.kind.as_str() {
-        "serial_line" => Kind::SerialLine(serial_line(keys, plausible)?),
-        "iio" => Kind::Iio(iio(keys, plausible)?),
+        "serial_line" => serial_line(keys, plausible, wrong).map(Kind::SerialLine),
+        "iio" => iio(keys, plausible, wrong).map(Kind::Iio),
         other => {
-            return Err(format!(
+            wrong.say(format!(
                 "kind` = \"{other}\" is no source\nhint: known are \"{}\"",
                 KINDS.join("\", \"")
             ));
+            None
         }
-    };
+    }?;
     let life_ns = (keys.reading_life_ms * 1e6) as u64;
-    Ok(Chosen { name: name.to_owned(), kind, gives, life_ns, required: keys.required })
+    Some(Chosen { name: name.to_owned(), kind, gives, life_ns, required: keys.required })
 }
 
 /// Refuses a key that this kind of source does not read: it would be left unheard.
@@ -157,74 +167,86 @@ fn not_read<T>(key: &str, given: Option<&T>, kind: &str) -> Result<(), String> {
     }
 }
 
-fn serial_line(keys: &Keys, plausible: &Plausible) -> Result<SerialLine, String> {
-    not_read("path", keys.path.as_ref(), "serial_line")?;
+fn serial_line(keys: &Keys, plausible: &Plausible, wrong: &mut Wrong) -> Option<SerialLine> {
+    wrong.of(not_read("path", keys.path.as_ref(), "serial_line"));
     let port = keys.port.clone();
     let port =
-        port.ok_or("port` is missing\nhint: the instrument's device, for example /dev/ttyUSB0".to_owned())?;
-    DEVICE.check(&port.to_string_lossy()).map_err(|words| format!("port` {words}"))?;
+        port.ok_or("port` is missing\nhint: the instrument's device, for example /dev/ttyUSB0".to_owned());
+    let port = wrong.of(port.and_then(|port| {
+        DEVICE.check(&port.to_string_lossy()).map_err(|words| format!("port` {words}")).map(|()| port)
+    }));
     let baud = keys.baud.unwrap_or(BAUD);
     if !(300..=12_000_000).contains(&baud) {
-        return Err(format!("baud` = {baud} is outside 300 to 12000000\nhint: see the instrument's manual"));
+        wrong.say(format!("baud` = {baud} is outside 300 to 12000000\nhint: see the instrument's manual"));
     }
     let pattern = keys.pattern.as_deref().map(Regex::new).transpose().map_err(|e| {
         format!("pattern` is no regular expression: {e}\nhint: (…) around each number, for example 'F=([-+.0-9]+)'")
-    })?;
+    });
+    let pattern = wrong.of(pattern);
     // The whole match is group zero.
-    let columns = pattern.as_ref().map_or(100, |pattern| pattern.captures_len() - 1);
+    let groups = |pattern: &Option<Regex>| pattern.as_ref().map_or(100, |pattern| pattern.captures_len() - 1);
+    let columns = pattern.as_ref().map_or(100, groups) as i64;
     let mut channels = Vec::new();
     for (signal, given) in &keys.signals {
         let key = format!("signals.{signal}");
-        not_read(&format!("{key}.channel"), given.channel.as_ref(), "serial_line")?;
-        let from =
-            given.column.ok_or_else(|| format!("{key}.column` is missing\nhint: the first column is 1"))?;
-        if !(1..=columns).contains(&from) {
-            return Err(format!(
-                "{key}.column` = {from} is outside 1 to {columns}\nhint: the first column is 1"
-            ));
+        wrong.of(not_read(&format!("{key}.channel"), given.channel.as_ref(), "serial_line"));
+        let from = given.column.filter(|from| (1..=columns).contains(from));
+        if from.is_none() {
+            let said = match given.column {
+                Some(from) => format!("= {from} is outside 1 to {columns}"),
+                None => "is missing".into(),
+            };
+            wrong.say(format!("{key}.column` {said}\nhint: the first column is 1"));
         }
-        let unit = given.unit.as_deref().ok_or_else(|| {
-            format!("{key}.unit` is missing; a unit is never guessed\nhint: unit = \"kgf\", as the instrument prints it")
-        })?;
-        channels.push(channel(signal, &key, from, unit, given, plausible)?);
+        let Some(unit) = given.unit.as_deref() else {
+            wrong.say(format!(
+                "{key}.unit` is missing; a unit is never guessed\nhint: unit = \"kgf\", as the instrument prints it"
+            ));
+            continue;
+        };
+        let from = from.and_then(|from| usize::try_from(from).ok()).unwrap_or(1);
+        channels.extend(channel(signal, &key, from, unit, given, plausible, wrong));
     }
     let ask = keys.ask.clone().unwrap_or_default();
-    Ok(SerialLine { port, baud, pattern, ask, rate_hz: keys.rate_hz, channels })
+    let baud = u32::try_from(baud).unwrap_or_default();
+    Some(SerialLine { port: port?, baud, pattern: pattern?, ask, rate_hz: keys.rate_hz, channels })
 }
 
-fn iio(keys: &Keys, plausible: &Plausible) -> Result<Iio, String> {
-    not_read("port", keys.port.as_ref(), "iio")?;
-    not_read("baud", keys.baud.as_ref(), "iio")?;
-    not_read("pattern", keys.pattern.as_ref(), "iio")?;
-    not_read("ask", keys.ask.as_ref(), "iio")?;
+fn iio(keys: &Keys, plausible: &Plausible, wrong: &mut Wrong) -> Option<Iio> {
+    wrong.of(not_read("port", keys.port.as_ref(), "iio"));
+    wrong.of(not_read("baud", keys.baud.as_ref(), "iio"));
+    wrong.of(not_read("pattern", keys.pattern.as_ref(), "iio"));
+    wrong.of(not_read("ask", keys.ask.as_ref(), "iio"));
     let path = keys.path.clone().filter(|path| !path.as_os_str().is_empty());
-    let path =
-        path.ok_or("path` is missing\nhint: for example /sys/bus/iio/devices/iio:device0".to_owned())?;
+    let missing = "path` is missing\nhint: for example /sys/bus/iio/devices/iio:device0";
+    let path = wrong.of(path.ok_or_else(|| missing.to_owned()));
     let mut channels = Vec::new();
     for (signal, given) in &keys.signals {
         let key = format!("signals.{signal}");
-        not_read(&format!("{key}.column"), given.column.as_ref(), "iio")?;
-        let from = given.channel.clone().filter(|c| !c.is_empty()).ok_or_else(|| {
-            format!(
+        wrong.of(not_read(&format!("{key}.column"), given.column.as_ref(), "iio"));
+        let from = given.channel.clone().unwrap_or_default();
+        if from.is_empty() {
+            wrong.say(format!(
                 "{key}.channel` is missing\nhint: in_voltage0 for in_voltage0_raw, count0/count for a counter"
-            )
-        })?;
-        if from.contains("..") {
-            return Err(format!(
+            ));
+        } else if from.contains("..") {
+            wrong.say(format!(
                 "{key}.channel` = \"{from}\" leaves the device's folder\nhint: give the folder as `path`"
             ));
         }
         if given.scale.is_none() {
-            return Err(format!(
+            wrong.say(format!(
                 "{key}.scale` is missing; it is never guessed\nhint: how many SI units a millivolt, a milliampere or a count is"
             ));
         }
         let si = place(signal).and_then(|p| SIGNALS.get(p)).map_or("", |s| s.unit);
-        channels.push(channel(signal, &key, from, given.unit.as_deref().unwrap_or(si), given, plausible)?);
+        let unit = given.unit.as_deref().unwrap_or(si);
+        channels.extend(channel(signal, &key, from, unit, given, plausible, wrong));
     }
-    Ok(Iio { path, rate_hz: keys.rate_hz, channels })
+    Some(Iio { path: path?, rate_hz: keys.rate_hz, channels })
 }
 
+/// A channel; none of what is no signal, which is told where the signals are looked up.
 fn channel<F>(
     signal: &str,
     key: &str,
@@ -232,25 +254,25 @@ fn channel<F>(
     unit: &str,
     given: &SignalKeys,
     plausible: &Plausible,
-) -> Result<Channel<F>, String> {
-    let (place, si) = place(signal)
-        .and_then(|p| SIGNALS.get(p).map(|s| (p, s.unit)))
-        .ok_or_else(|| format!("{key}` is no signal\nhint: see docs/hardware.md"))?;
-    let (factor, zero) = to_si(unit, si).map_err(|words| format!("{key}.unit` {words}"))?;
+    wrong: &mut Wrong,
+) -> Option<Channel<F>> {
+    let (place, si) = place(signal).and_then(|p| SIGNALS.get(p).map(|s| (p, s.unit)))?;
+    let converted = wrong.of(to_si(unit, si).map_err(|words| format!("{key}.unit` {words}")));
     let scale = given.scale.unwrap_or(1.0);
     if !scale.is_finite() || scale == 0.0 {
-        return Err(format!(
+        wrong.say(format!(
             "{key}.scale` = {scale}; allowed is a finite number that is not zero\nhint: -1 turns the sign"
         ));
     }
     if !given.offset.is_finite() {
-        return Err(format!(
+        wrong.say(format!(
             "{key}.offset` = {}; allowed is a finite number\nhint: SI, at the instrument's zero",
             given.offset
         ));
     }
+    let (factor, zero) = converted?;
     let most = plausible.most(signal);
-    Ok(Channel { from, place, scale: factor * scale, offset: zero + given.offset, most })
+    Some(Channel { from, place, scale: factor * scale, offset: zero + given.offset, most })
 }
 
 impl Chosen {

@@ -1,8 +1,11 @@
-//! Where a table has less, or more, than rows of cells below names: no names at all, and a separator at the end of each row.
+//! Where a table has less, or more, than rows of cells below names: no names at all, names without cells, names once more
+//! among the rows, and a separator at the end of each row.
 
 use csv::ByteRecord;
 
 use super::opening::{self, DELIMITERS};
+use crate::error::Problem;
+use crate::map::ColumnMap;
 
 /// How a column is called that has no name.
 pub(super) fn by_place(place: usize) -> String {
@@ -20,6 +23,79 @@ pub(super) fn said(line: u64) -> String {
     format!(
         "line {line} holds numbers where the names of the columns should stand: it is taken for a row, and the columns are called column_1, column_2 and so on, from the left"
     )
+}
+
+/// Takes out of a header the names that the map says no row has a cell for; what a user should know of it.
+pub(super) fn without_cells(
+    header: &mut Vec<String>,
+    map: Option<&ColumnMap>,
+) -> Result<Option<String>, Problem> {
+    let Some(map) = map.filter(|map| !map.without_cells.is_empty()) else { return Ok(None) };
+    for name in &map.without_cells {
+        let Some(place) = header.iter().position(|known| known == name) else {
+            return Err(Problem::MappedColumnMissing {
+                map: map.name.clone(),
+                column: name.clone(),
+                found: header.join(", "),
+                hint: "`without_cells` lists names of the header that no row has a cell for; an empty one is called as `kort columns LOG` shows it".into(),
+            });
+        };
+        header.remove(place);
+    }
+    Ok(Some(format!("no row has a cell for {}, as the column map says", map.without_cells.join(", "))))
+}
+
+/// Which names of a header may be those without cells, where all rows have so many: names that are empty, if they are as many
+/// as are too many, else the last ones. It is for a person to say.
+pub(super) fn perhaps_without(names: &[String], cells: usize) -> Vec<String> {
+    let empty = || (1..=names.len()).filter(|place| names[place - 1].is_empty());
+    if empty().count() + cells == names.len() {
+        return empty().map(|place| format!("(column {place})")).collect();
+    }
+    names[cells..].to_vec()
+}
+
+/// That a header is longer than all rows.
+pub(super) fn said_longer(names: &[String], beyond: &[String]) -> String {
+    format!(
+        "the header names {} columns, every row has {} cells, and nothing shows which of the names has none: below, those at the end; mend the header, or say it in a column map: without_cells = {beyond:?}",
+        names.len(),
+        names.len() - beyond.len(),
+    )
+}
+
+/// The names of a table, and the units below them if there are, once more among its rows: a logger that was started anew.
+pub(super) struct Repeats {
+    rows: Vec<ByteRecord>,
+    found: u64,
+    first: u64,
+}
+
+impl Repeats {
+    /// Of these rows, as the file has them.
+    pub fn of(rows: Vec<ByteRecord>) -> Self {
+        Self { rows, found: 0, first: 0 }
+    }
+
+    /// Whether a row is one of them.
+    pub fn is(&mut self, row: &ByteRecord, line: u64) -> bool {
+        let same =
+            |known: &ByteRecord| known.iter().map(<[u8]>::trim_ascii).eq(row.iter().map(<[u8]>::trim_ascii));
+        let is = self.rows.iter().any(same);
+        if is {
+            self.found += 1;
+            self.first = if self.found == 1 { line } else { self.first };
+        }
+        is
+    }
+
+    /// What a user should know.
+    pub fn note(&self) -> Option<String> {
+        let (rows, line) = (self.found, self.first);
+        (rows > 0).then(|| {
+            format!("{rows} row(s), the first in line {line}, hold the header once more, as where a logger was started anew, and are passed over")
+        })
+    }
 }
 
 /// A separator at the end of the rows where none stands behind the names: the table's own, or another of those in use.
@@ -44,6 +120,11 @@ impl Ends {
         }
         *first = row;
         (ends, true)
+    }
+
+    /// Where some of the names have no cells.
+    pub fn narrow(&mut self, width: usize) {
+        self.width = width;
     }
 
     /// Takes it away.

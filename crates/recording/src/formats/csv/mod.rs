@@ -1,5 +1,6 @@
 //! CSV as RFC 4180 has it, header row first.
 
+mod clocks;
 mod encoding;
 mod ends;
 mod opening;
@@ -17,8 +18,8 @@ use crate::error::{Place, Problem};
 use crate::map::ColumnMap;
 use crate::recording::Recording;
 use encoding::Texts;
-use ends::Ends;
-use opening::Opening;
+use ends::{Ends, Repeats};
+use opening::{DELIMITERS, Opening};
 
 pub(super) use table::log;
 
@@ -26,8 +27,14 @@ pub(super) use table::log;
 pub(super) fn decode(name: &str, input: impl Read, map: Option<&ColumnMap>) -> Result<Recording, Problem> {
     let stated = map.and_then(|map| map.delimiter);
     let wanted = map.map_or(vec!["time_s"], ColumnMap::wanted);
+    // A recording of our own that a spreadsheet has saved again is known by its names.
+    let offered = match stated {
+        Some(delimiter) => vec![delimiter],
+        None if map.is_none() => DELIMITERS.to_vec(),
+        None => vec![b','],
+    };
     let Opening { rows: input, delimiter, lines, mut notes } =
-        opening::open(input, stated, &[stated.unwrap_or(b',')], &wanted)?;
+        opening::open(input, stated, &offered, &wanted)?;
     let mut tail = Tail { input, last: b'\n' };
     let mut reader =
         ReaderBuilder::new().has_headers(false).flexible(true).delimiter(delimiter).from_reader(&mut tail);
@@ -36,6 +43,7 @@ pub(super) fn decode(name: &str, input: impl Read, map: Option<&ColumnMap>) -> R
         return Err(Problem::Empty);
     }
     let mut texts = Texts::default();
+    let mut above = vec![record.clone()];
     texts.take(&mut record, lines.header())?;
     let (mut ends, nameless) = Ends::of(&mut record, delimiter);
     if nameless && map.is_none() {
@@ -53,11 +61,10 @@ pub(super) fn decode(name: &str, input: impl Read, map: Option<&ColumnMap>) -> R
             *name = format!("(column {})", place + 1);
         }
     }
-    let mut width = header.len() as u64;
-    let mut rows = Assembler::new(name, header.clone(), map)?;
     let (mut losses, mut empty) = (Vec::new(), 0_u64);
     let mut next = if nameless { Ok(true) } else { read(&mut reader, &mut record) };
     let line = lines.at(&record);
+    let second = record.clone();
     if matches!(next, Ok(true))
         && !nameless
         && texts.take(&mut record, line).is_ok()
@@ -65,21 +72,19 @@ pub(super) fn decode(name: &str, input: impl Read, map: Option<&ColumnMap>) -> R
         // Names of our own say the unit themselves: another below them is a contradiction, not a second header.
         && (map.is_some() || units::as_named(&header, &below))
     {
+        above.push(second);
         notes.push(units::said(line));
         notes.extend(
             map.iter().flat_map(|map| units::differ(line, &header, &below, map.units_as_they_stand())),
         );
         next = read(&mut reader, &mut record);
     }
-    let mut shorter = None;
-    if let (Ok(true), Some(_)) = (&next, map)
-        && !is_empty(&record)
-        && let Some(note) = beyond_the_rows(&header, record.len(), &wanted)
-    {
-        shorter = Some(Place::Line(lines.at(&record)));
-        width = record.len() as u64;
-        notes.push(note);
-    }
+    let mut repeats = Repeats::of(if nameless { Vec::new() } else { above });
+    notes.extend(ends::without_cells(&mut header, map)?);
+    ends.narrow(header.len());
+    let width = header.len() as u64;
+    let mut rows = Assembler::new(name, header.clone(), map)?;
+    let mut first = true;
     loop {
         match next {
             Ok(true) => {}
@@ -97,6 +102,10 @@ pub(super) fn decode(name: &str, input: impl Read, map: Option<&ColumnMap>) -> R
             continue;
         }
         let line = lines.at(&record);
+        if repeats.is(&record, line) {
+            next = read(&mut reader, &mut record);
+            continue;
+        }
         ends.cut(&mut record);
         let found = record.len() as u64;
         if found != width {
@@ -109,15 +118,14 @@ pub(super) fn decode(name: &str, input: impl Read, map: Option<&ColumnMap>) -> R
                 losses.push(format!("{place} was cut off after {found} of {width} cells and is skipped"));
                 break;
             }
-            return Err(match shorter {
-                // One row is as long as the names: the first was too short.
-                Some(first) if found == header.len() as u64 => {
-                    Problem::RowLength { place: first, found: width, expected: found }
-                }
-                _ => Problem::RowLength { place, found, expected: width },
+            return Err(if first && found < width {
+                Problem::HeaderLonger { place, cells: found, names: header }
+            } else {
+                Problem::RowLength { place, found, expected: width }
             });
         }
         texts.take(&mut record, line)?;
+        first = false;
         rows.push(Place::Line(line), |i| match record.get(i).map_or("", text) {
             "" => Cell::Empty,
             text => Cell::Text(text),
@@ -127,6 +135,7 @@ pub(super) fn decode(name: &str, input: impl Read, map: Option<&ColumnMap>) -> R
     let mut recording = rows.finish(losses)?;
     notes.extend(texts.note());
     notes.extend(empty_rows(empty));
+    notes.extend(repeats.note());
     notes.extend(ends.note());
     recording.notes.extend(notes);
     Ok(recording)
@@ -136,20 +145,6 @@ fn read(reader: &mut csv::Reader<impl Read>, record: &mut ByteRecord) -> Result<
     reader.read_byte_record(record).map_err(|e| match e.into_kind() {
         ErrorKind::Io(e) => Problem::Unreadable { message: e.to_string() },
         other => Problem::Unreadable { message: format!("{other:?}") },
-    })
-}
-
-/// Names at the end of a header that no row has cells for, in words; none where there are none or a map wants one of them.
-/// Loggers name what an instrument could have and write what it has.
-fn beyond_the_rows(header: &[String], cells: usize, wanted: &[&str]) -> Option<String> {
-    let beyond = header.get(cells..).filter(|names| !names.is_empty() && cells > 0)?;
-    let unwanted = beyond.iter().all(|name| !wanted.contains(&name.as_str()));
-    unwanted.then(|| {
-        format!(
-            "the header names {} columns, the rows have {cells}: nothing is read of {}",
-            header.len(),
-            beyond.join(", ")
-        )
     })
 }
 

@@ -8,7 +8,7 @@ use encoding_rs_io::DecodeReaderBytesBuilder;
 use super::encoding::Texts;
 use super::{Lines, units};
 use crate::dates::{is_date, is_day, is_time_of_day};
-use crate::decimal::with_comma;
+use crate::decimal::{with_comma, with_point};
 use crate::error::Problem;
 
 /// The names of the columns are looked for in so many bytes.
@@ -243,7 +243,7 @@ pub(super) fn filled(row: &ByteRecord) -> usize {
 /// Whether it is a number: a date, a day and a time of day are too, for no name is one.
 pub(super) fn is_number(text: &str) -> bool {
     let stamp = || is_date(text) || is_day(text) || is_time_of_day(text);
-    text.parse::<f64>().is_ok() || with_comma(text).is_some() || stamp()
+    with_point(text).is_some() || with_comma(text).is_some() || stamp()
 }
 
 pub(super) fn numbers(row: &ByteRecord) -> usize {

@@ -3,7 +3,7 @@
 use csv::ByteRecord;
 
 use crate::dates::{self, Dates, Stamp, is_date, is_day, is_time_of_day};
-use crate::decimal::with_comma;
+use crate::decimal::{with_comma, with_point};
 use crate::error::{Place, Problem};
 use crate::log::names::symbol;
 use crate::log::stamps::{is_time, is_time_by_unit, time_factor};
@@ -32,7 +32,7 @@ pub(super) fn find(
     place: Place,
 ) -> (Stamps, Option<Problem>) {
     let cell = |at: usize| text(row, at);
-    let number = |at: usize| cell(at).parse::<f64>().is_ok() || with_comma(cell(at)).is_some();
+    let number = |at: usize| with_point(cell(at)).is_some() || with_comma(cell(at)).is_some();
     let stamp = |at: &usize| number(*at) || is_date(cell(*at)) || is_time_of_day(cell(*at));
     let all = || 0..names.len();
     let named = || all().filter(|at| is_time(&names[*at]));

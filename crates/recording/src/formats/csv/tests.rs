@@ -1,7 +1,9 @@
 //! Tables of others: units below the names, decimal commas. What is proposed for them reads them to the same numbers, and no
 //! table of another kind is taken for one.
 
+mod cells;
 mod names;
+mod short;
 
 use proptest::prelude::*;
 
@@ -16,47 +18,6 @@ fn surveyed(text: &str) -> Survey {
 fn through(text: &str, map: &str) -> Recording {
     let map = ColumnMap::from_toml("proposed", map).unwrap();
     Recording::decode("log.csv", text.as_bytes(), Some(&map)).unwrap()
-}
-
-#[test]
-fn names_at_the_end_that_no_row_has_cells_for_are_passed_over_where_a_map_wants_none() {
-    let text = |last: &str| format!("t,f,App message,Debug\n0,1\n0.5,2\n1.0,{last}\n");
-    let map = |more: &str| {
-        format!(
-            "[time]\nsource = \"t\"\nunit = \"s\"\n[columns.thrust_n]\nsource = \"f\"\nunit = \"N\"\n{more}"
-        )
-    };
-    let read = through(&text("3"), &map(""));
-    assert_eq!(read.column("thrust_n").unwrap(), [1.0, 2.0, 3.0]);
-    let note = "names 4 columns, the rows have 2: nothing is read of App message, Debug";
-    assert!(read.notes.iter().any(|said| said.contains(note)), "{:?}", read.notes);
-    let spaced = through(
-        &text("3").replace("0,1\n", ",\n0,1,,\n").replace("0.5,2", "0.5,2,,").replace("1.0,3", "1.0,3,,"),
-        &map(""),
-    );
-    assert_eq!(
-        spaced.column("thrust_n").unwrap(),
-        [1.0, 2.0, 3.0],
-        "a row of separators says nothing of the others"
-    );
-    let refused = |text: &str, map: Option<&str>| {
-        let map = map.map(|map| ColumnMap::from_toml("own", map).unwrap());
-        Recording::decode("log.csv", text.as_bytes(), map.as_ref()).unwrap_err().problem
-    };
-    let at = |line, cells: u64| (Place::Line(line), cells);
-    let wanted = map("[columns.torque_n_m]\nsource = \"Debug\"\nunit = \"N m\"\n");
-    for (text, map, (line, cells), names) in [
-        (text("3"), Some(wanted), at(2, 2), 4),
-        // The first row was the odd one, or a later one is.
-        (text("3,,0"), Some(map("")), at(2, 2), 4),
-        (text("3,,").replace("0.5,2", "0.5"), Some(map("")), at(3, 1), 2),
-        ("time_s,thrust_n,more\n0,1\n1,2\n".into(), None, at(2, 2), 3),
-    ] {
-        let Problem::RowLength { place, found, expected } = refused(&text, map.as_deref()) else {
-            panic!("{text}");
-        };
-        assert_eq!((place, found, expected), (line, cells, names), "{text}");
-    }
 }
 
 const BENCH: &str =

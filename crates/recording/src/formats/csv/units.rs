@@ -2,7 +2,7 @@
 
 use csv::ByteRecord;
 
-use crate::decimal::with_comma;
+use crate::decimal::{with_comma, with_point};
 use crate::log::names::symbol;
 use crate::log::stamps::is_time;
 use crate::units::{self, Unit};
@@ -23,7 +23,7 @@ pub(super) fn below(names: &[String], row: &ByteRecord) -> Option<Vec<Option<Str
         if NONE.contains(&cell) {
             continue;
         }
-        if cell.parse::<f64>().is_ok() || with_comma(cell).is_some() {
+        if with_point(cell).is_some() || with_comma(cell).is_some() {
             return None;
         }
         words += 1;

@@ -97,55 +97,55 @@ impl Cia402 {
     /// # Errors
     /// [`ConfigError`] names key, value and what is allowed.
     pub fn new(config: &Config, id: &str, thruster: &Thruster, rig: &Rig) -> Result<Self, ConfigError> {
-        let mut wired = Wired::new(config, id, thruster, &OWN)?;
-        let kind = current_or_speed(config, id, thruster, rig)?;
-        let fail =
-            |key: &str, words: String| Err(config.error(format!("`thrusters.{id}.drive.{key}` {words}")));
+        let mut wrong = Vec::new();
+        let mut wired = Wired::read(config, id, thruster, &OWN, &mut wrong)?;
+        let kind = current_or_speed(config, id, thruster, rig, &mut wrong);
+        let mut fail = |key: &str, words: String| {
+            wrong.push(config.error(format!("`thrusters.{id}.drive.{key}` {words}")))
+        };
         let node = wired.address.unwrap_or(1);
-        if !(1..=NODE_MAX).contains(&node) {
-            return fail(
+        if !(1..=i64::from(NODE_MAX)).contains(&node) {
+            fail(
                 "address",
                 format!(
                     "= {node} is outside 1 to {NODE_MAX}\nhint: the drive's node, by its switches or tool; those above are kort's"
                 ),
             );
         }
-        let Some(units_per_turn) = wired.units_per_turn else {
-            return fail(
+        if wired.units_per_turn.is_none() {
+            fail(
                 "units_per_turn",
                 "is missing: what a turn of the shaft is in 0x6064 is a setting of the drive\nhint: counts of its encoder in a turn, four a line, unless 0x6091 or 0x6092 were changed".into(),
             );
-        };
-        let speed_units = wired.speed_units.unwrap_or(units_per_turn);
+        }
         for (key, value, hint) in [
-            ("units_per_turn", units_per_turn, "counts of the encoder in a turn, for example 4096"),
-            ("speed_units", speed_units, "60 for a drive that tells turns a minute"),
+            ("units_per_turn", wired.units_per_turn, "counts of the encoder in a turn, for example 4096"),
+            ("speed_units", wired.speed_units, "60 for a drive that tells turns a minute"),
         ] {
-            if !(1.0..=1e9).contains(&value) {
-                return fail(key, format!("= {value} is outside 1 to 1e9\nhint: {hint}"));
+            if let Some(value) = value.filter(|value| !(1.0..=1e9).contains(value)) {
+                fail(key, format!("= {value} is outside 1 to 1e9\nhint: {hint}"));
             }
         }
+        let units_per_turn = wired.units_per_turn.unwrap_or(1.0);
+        let speed_units = wired.speed_units.unwrap_or(units_per_turn);
         let on_interface = !wired.port.to_string_lossy().contains('/');
-        if let Some(bitrate) = wired.bitrate.filter(|_| on_interface) {
-            let port = wired.port.display();
-            return fail(
+        let bitrate = wired.bitrate.unwrap_or(1_000_000);
+        let digit =
+            BITRATES.into_iter().find(|(known, _)| i64::from(*known) == bitrate).map(|(_, digit)| digit);
+        let most_hz = SHARE * bitrate as f64 / EXCHANGE_BITS;
+        let port = wired.port.display();
+        if on_interface && wired.bitrate.is_some() && !wired.port.as_os_str().is_empty() {
+            fail(
                 "bitrate",
                 format!(
                     "= {bitrate}: {port} is an interface of the system, which has its own\nhint: ip link set {port} up type can bitrate {bitrate}; or a port under /dev, for an adapter"
                 ),
             );
-        }
-        let bitrate = wired.bitrate.unwrap_or(1_000_000);
-        let Some((_, digit)) = BITRATES.into_iter().find(|(known, _)| *known == bitrate) else {
+        } else if digit.is_none() {
             let known = BITRATES.map(|(known, _)| known.to_string()).join(", ");
-            return fail(
-                "bitrate",
-                format!("= {bitrate} is none of {known}\nhint: the bus's, in bits a second"),
-            );
-        };
-        let most_hz = SHARE * f64::from(bitrate) / EXCHANGE_BITS;
-        if !on_interface && wired.rate_hz > most_hz {
-            return fail(
+            fail("bitrate", format!("= {bitrate} is none of {known}\nhint: the bus's, in bits a second"));
+        } else if !on_interface && wired.rate_hz > most_hz {
+            fail(
                 "rate_hz",
                 format!(
                     "= {} is beyond {most_hz}, what a bus of {bitrate} bit/s carries\nhint: a lower rate_hz with a longer timeout_ms and reading_life_ms, or a faster bus",
@@ -153,6 +153,8 @@ impl Cia402 {
                 ),
             );
         }
+        config.first_of(wrong.into_iter()).map_or(Ok(()), Err)?;
+        let node = u8::try_from(node).unwrap_or(1);
         if on_interface {
             wired.medium = Medium::Can { interface: wired.port.clone(), node };
             // Others may be on the bus: the node is its own.
@@ -171,7 +173,15 @@ impl Cia402 {
             wired.claims.retain(|claim| claim.key != "identity");
         }
         let carrier = if on_interface { Carrier::Socket } else { Carrier::Slcan };
-        Ok(Self { wired, kind, node, carrier, bitrate: digit, units_per_turn, speed_units })
+        Ok(Self {
+            wired,
+            kind,
+            node,
+            carrier,
+            bitrate: digit.unwrap_or_default(),
+            units_per_turn,
+            speed_units,
+        })
     }
 
     /// Number of the mode of operation.

@@ -10,6 +10,7 @@ use serde::Deserialize;
 use super::super::forms::NAME;
 use super::super::kind_of;
 use super::super::wired::Times;
+use super::super::wrong::Wrong;
 use super::{Counter, Iio, Monitor, Place, Watchdog};
 use crate::settings::Settings;
 
@@ -55,7 +56,7 @@ struct MonitorKeys {
 struct CounterKeys {
     count: PathBuf,
     counts_per_turn: f64,
-    ceiling: Option<u64>,
+    ceiling: Option<i64>,
 }
 
 impl Default for Keys {
@@ -102,88 +103,88 @@ impl Iio {
             timeout_ms: keys.timeout_ms,
             reading_life_ms: keys.reading_life_ms,
         };
-        times.check(thruster).map_err(|words| config.error(format!("`{section}.{words}")))?;
+        let mut wrong = Wrong::default();
+        wrong.all(times.check(thruster));
         let kind = kind_of(rig);
         // What is wrong with the limits is said where they are read.
         let limits = Settings::new(config, id, thruster, rig).ok().map(|settings| settings.limits);
-        let read = || {
-            if let Some(name) = &keys.identity {
-                NAME.check(name).map_err(|words| format!("identity` {words}"))?;
-            }
-            let gain = keys.gain(kind)?;
-            let limit_v = keys.limit_v.ok_or("limit_v` is missing; it is never guessed\nhint: the largest voltage that the amplifier's input bears, either way, for example 10.0")?;
-            within(
-                "limit_v",
-                limit_v,
-                0.01,
-                100.0,
-                "the largest voltage that the amplifier's input bears, either way",
-            )?;
-            if let Some(most) =
-                limits.map(|limits| limits.drive_max).filter(|most| most / gain > limit_v * (1.0 + 1e-9))
-            {
-                let (unit, limit) = match kind {
-                    DriveKind::Current => ("A", "limits.current_a"),
-                    DriveKind::Speed => ("rad/s", "limits.speed_rad_s"),
-                    DriveKind::Voltage | DriveKind::Duty => ("V", "amplifier.supply_v of the rig"),
-                };
-                return Err(format!(
-                    "limit_v` = {limit_v}, but the largest command, {most} {unit}, is {:.3} V at {gain} {unit} a volt\nhint: a smaller {limit}, or a larger gain set in the amplifier",
-                    most / gain
-                ));
-            }
-            if let Some(scale) = keys.scale_mv {
-                within(
-                    "scale_mv",
-                    scale,
-                    1e-9,
-                    1e4,
-                    "millivolts of a count: full scale over the number of counts",
-                )?;
-            }
-            Ok(Self {
-                kind,
-                dac: volts(
-                    "dac",
-                    &keys.dac,
-                    "out_voltage",
-                    "the DAC's channel, for example /sys/bus/iio/devices/iio:device0/out_voltage0",
-                )?,
-                scale_mv: keys.scale_mv,
-                gain,
-                limit_v,
-                identity: keys.identity.clone().unwrap_or_default(),
-                watchdog: keys.watchdog()?,
-                current: keys.current.as_ref().map(MonitorKeys::read).transpose()?,
-                counter: keys.counter.as_ref().map(CounterKeys::read).transpose()?,
-                rate_hz: times.rate_hz,
-                timeout_s: times.timeout_ms * 1e-3,
-                reading_life_ns: times.reading_life_ns(),
-                full_drive_s: limits.map_or(FULL_DRIVE_S, |limits| limits.full_drive_s),
-                sign: if keys.reversed { -1.0 } else { 1.0 },
-            })
+        if let Some(name) = &keys.identity {
+            wrong.of(NAME.check(name).map_err(|words| format!("identity` {words}")));
+        }
+        let gain = wrong.of(keys.gain(kind));
+        let limit_v = wrong.of(keys.limit_v());
+        if let (Some(gain), Some(limit_v), Some(most)) =
+            (gain, limit_v, limits.map(|limits| limits.drive_max))
+            && most / gain > limit_v * (1.0 + 1e-9)
+        {
+            let (unit, limit) = match kind {
+                DriveKind::Current => ("A", "limits.current_a"),
+                DriveKind::Speed => ("rad/s", "limits.speed_rad_s"),
+                DriveKind::Voltage | DriveKind::Duty => ("V", "amplifier.supply_v of the rig"),
+            };
+            wrong.say(format!(
+                "limit_v` = {limit_v}, but the largest command, {most} {unit}, is {:.3} V at {gain} {unit} a volt\nhint: a smaller {limit}, or a larger gain set in the amplifier",
+                most / gain
+            ));
+        }
+        if let Some(scale) = keys.scale_mv {
+            let hint = "millivolts of a count: full scale over the number of counts";
+            wrong.of(within("scale_mv", scale, 1e-9, 1e4, hint));
+        }
+        let hint = "the DAC's channel, for example /sys/bus/iio/devices/iio:device0/out_voltage0";
+        let dac = wrong.of(volts("dac", &keys.dac, "out_voltage", hint));
+        let watchdog = wrong.of(keys.watchdog());
+        let current = keys.current.as_ref().map(|current| current.read(&mut wrong));
+        let counter = keys.counter.as_ref().map(|counter| counter.read(&mut wrong));
+        keys.tells_enough(kind, thruster, &mut wrong);
+        let whole = dac.zip(gain.zip(limit_v)).zip(watchdog).filter(|_| wrong.is_empty());
+        let first = config.first_of(wrong.of_section(config, &section).into_iter());
+        let Some(((dac, (gain, limit_v)), watchdog)) = whole else {
+            return Err(first.unwrap_or_else(|| config.error(format!("`{section}` cannot be read"))));
         };
-        let iio = read().and_then(|iio: Self| iio.tells_enough(thruster).map(|()| iio));
-        iio.map_err(|words| config.error(format!("`{section}.{words}")))
+        Ok(Self {
+            kind,
+            dac,
+            scale_mv: keys.scale_mv,
+            gain,
+            limit_v,
+            identity: keys.identity.clone().unwrap_or_default(),
+            watchdog,
+            current: current.flatten(),
+            counter: counter.flatten(),
+            rate_hz: times.rate_hz,
+            timeout_s: times.timeout_ms * 1e-3,
+            reading_life_ns: times.reading_life_ns(),
+            full_drive_s: limits.map_or(FULL_DRIVE_S, |limits| limits.full_drive_s),
+            sign: if keys.reversed { -1.0 } else { 1.0 },
+        })
     }
+}
 
+impl Keys {
     /// Somebody must tell what the guard needs: the amplifier's monitors, or instruments beside it.
-    fn tells_enough(&self, thruster: &Thruster) -> Result<(), String> {
+    fn tells_enough(&self, kind: DriveKind, thruster: &Thruster, wrong: &mut Wrong) {
         let told = |signal: &str| {
             let signals = thruster.sensors.values().filter_map(|sensor| sensor.get("signals"));
             signals.filter_map(|signals| signals.as_table()).any(|signals| signals.contains_key(signal))
         };
         if self.counter.is_none() && !told("shaft_speed_rad_s") {
-            return Err("counter` is missing, and no sensor gives shaft_speed_rad_s\nhint: counter = { count = \"/sys/bus/counter/devices/counter0/count0\", counts_per_turn = 4096 }, or a sensor".into());
+            wrong.say("counter` is missing, and no sensor gives shaft_speed_rad_s\nhint: counter = { count = \"/sys/bus/counter/devices/counter0/count0\", counts_per_turn = 4096 }, or a sensor");
         }
-        if self.current.is_none() && self.kind != DriveKind::Speed && !told("current_a") {
-            return Err("current` is missing, and no sensor gives current_a\nhint: current = { adc = \"/sys/bus/iio/devices/iio:device1/in_voltage0\", gain_a_per_v = 2.0 }, the amplifier's current monitor, or a sensor".into());
+        if self.current.is_none() && kind != DriveKind::Speed && !told("current_a") {
+            wrong.say("current` is missing, and no sensor gives current_a\nhint: current = { adc = \"/sys/bus/iio/devices/iio:device1/in_voltage0\", gain_a_per_v = 2.0 }, the amplifier's current monitor, or a sensor");
         }
-        Ok(())
     }
-}
 
-impl Keys {
+    /// The largest voltage that the input bears.
+    fn limit_v(&self) -> Result<f64, String> {
+        let hint = "the largest voltage that the amplifier's input bears, either way";
+        let limit_v = self.limit_v.ok_or_else(|| {
+            format!("limit_v` is missing; it is never guessed\nhint: {hint}, for example 10.0")
+        })?;
+        within("limit_v", limit_v, 0.01, 100.0, hint).map(|()| limit_v)
+    }
+
     /// What a volt commands: the key that has the unit of the rig's amplifier.
     fn gain(&self, kind: DriveKind) -> Result<f64, String> {
         let (wanted, example) = match kind {
@@ -252,43 +253,45 @@ impl Keys {
 }
 
 impl MonitorKeys {
-    fn read(&self) -> Result<Monitor, String> {
+    fn read(&self, wrong: &mut Wrong) -> Option<Monitor> {
         let gain = self.gain_a_per_v;
         if !(1e-6..=1e6).contains(&gain.abs()) {
-            return Err(format!(
+            wrong.say(format!(
                 "current.gain_a_per_v` = {gain}; allowed is 1e-6 to 1e6, or that with a minus\nhint: amperes in a volt, as the amplifier's manual says it"
             ));
         }
-        within("current.zero_v", self.zero_v, -100.0, 100.0, "the monitor's voltage without current")?;
-        let adc = volts(
-            "current.adc",
-            &self.adc,
-            "in_voltage",
-            "the ADC's channel, for example /sys/bus/iio/devices/iio:device1/in_voltage0",
-        )?;
-        Ok(Monitor { adc, gain_a_per_v: gain, zero_v: self.zero_v })
+        let hint = "the monitor's voltage without current";
+        wrong.of(within("current.zero_v", self.zero_v, -100.0, 100.0, hint));
+        let hint = "the ADC's channel, for example /sys/bus/iio/devices/iio:device1/in_voltage0";
+        let adc = wrong.of(volts("current.adc", &self.adc, "in_voltage", hint))?;
+        Some(Monitor { adc, gain_a_per_v: gain, zero_v: self.zero_v })
     }
 }
 
 impl CounterKeys {
-    fn read(&self) -> Result<Counter, String> {
+    fn read(&self, wrong: &mut Wrong) -> Option<Counter> {
         let counts = self.counts_per_turn.abs();
         if !(1.0..=1e9).contains(&counts) {
-            return Err(format!(
+            wrong.say(format!(
                 "counter.counts_per_turn` = {}; allowed is 1 to 1e9, or that with a minus\nhint: four times the encoder's lines; minus where it counts down ahead",
                 self.counts_per_turn
             ));
         }
         let hint = "the count's folder, for example /sys/bus/counter/devices/counter0/count0";
-        let count = place("counter.count", &self.count, hint)?;
-        // With its file or without.
-        let folder = if count.channel == "count" { count.folder } else { count.folder.join(&count.channel) };
+        let count = wrong.of(place("counter.count", &self.count, hint));
         if let Some(ceiling) = self.ceiling.filter(|ceiling| (*ceiling as f64) < 2.0 * counts) {
-            return Err(format!(
+            wrong.say(format!(
                 "counter.ceiling` = {ceiling} is less than two turns\nhint: the counter's largest count: 65535 for one of 16 bits"
             ));
         }
-        Ok(Counter { folder, counts_per_turn: self.counts_per_turn, ceiling: self.ceiling })
+        let count = count?;
+        // With its file or without.
+        let folder = if count.channel == "count" { count.folder } else { count.folder.join(&count.channel) };
+        Some(Counter {
+            folder,
+            counts_per_turn: self.counts_per_turn,
+            ceiling: self.ceiling.and_then(|ceiling| u64::try_from(ceiling).ok()),
+        })
     }
 }
 

@@ -89,39 +89,36 @@ impl Mavlink {
     /// # Errors
     /// [`ConfigError`] names key, value and what is allowed.
     pub fn new(config: &Config, id: &str, thruster: &Thruster, rig: &Rig) -> Result<Self, ConfigError> {
-        let mut wired = Wired::new(config, id, thruster, &OWN)?;
-        let fail =
-            |key: &str, words: String| Err(config.error(format!("`thrusters.{id}.drive.{key}` {words}")));
+        let mut wrong = Vec::new();
+        let mut wired = Wired::read(config, id, thruster, &OWN, &mut wrong)?;
         if kind_of(rig) != DriveKind::Voltage {
-            return Err(config.error(format!(
+            wrong.push(config.error(format!(
                 "`thrusters.{id}.amplifier` = \"mavlink\" takes volts (as pulse width), but the rig's amplifier is of another kind\nhint: amplifier.kind = \"voltage\" in the rig, with its supply_v"
             )));
         }
-        let motor = match wired.motor {
-            Some(motor) if (1..=MOTORS).contains(&motor) => motor,
-            Some(motor) => {
-                return fail(
-                    "motor",
-                    format!("= {motor} is outside 1 to {MOTORS}\nhint: as QGroundControl counts them"),
-                );
-            }
-            None => {
-                return fail(
-                    "motor",
-                    "is missing: which of the vehicle's thrusters?\nhint: as QGroundControl counts them, from 1"
-                        .into(),
-                );
-            }
+        let mut fail = |key: &str, words: String| {
+            wrong.push(config.error(format!("`thrusters.{id}.drive.{key}` {words}")))
         };
-        let system = wired.address.unwrap_or(1);
-        if system == 0 {
-            return fail(
-                "address",
-                "= 0 is everybody\nhint: the vehicle's MAV_SYSID, 1 unless changed".into(),
+        let motor = wired.motor.unwrap_or_default();
+        if wired.motor.is_none() {
+            fail(
+                "motor",
+                "is missing: which of the vehicle's thrusters?\nhint: as QGroundControl counts them, from 1"
+                    .into(),
             );
+        } else if !(1..=i64::from(MOTORS)).contains(&motor) {
+            fail("motor", format!("= {motor} is outside 1 to {MOTORS}\nhint: as QGroundControl counts them"));
+        }
+        let system = wired.address.unwrap_or(1);
+        if !(1..=255).contains(&system) {
+            let whose = if system == 0 { "everybody" } else { "nobody" };
+            let words = format!(
+                "= {system} is {whose}; allowed is 1 to 255\nhint: the vehicle's MAV_SYSID, 1 unless changed"
+            );
+            fail("address", words);
         }
         if wired.timeout_s < TIMEOUT_S {
-            return fail(
+            fail(
                 "timeout_ms",
                 format!(
                     "= {}, but a motor test of ArduSub ends 500 ms after its last command, and that is no setting\nhint: timeout_ms = 510 accepts that torque outlives a broken cable by half a second",
@@ -133,16 +130,16 @@ impl Mavlink {
         if let Some(address) = port.strip_prefix(UDP) {
             match address.parse::<SocketAddr>() {
                 Ok(address) if address.port() != 0 => wired.medium = Medium::Udp(address),
-                _ => {
-                    return fail(
-                        "port",
-                        format!(
-                            "= \"{port}\" is no address and port\nhint: \"udp:192.168.2.2:14550\", an endpoint of the vehicle that waits for clients"
-                        ),
-                    );
-                }
+                _ => fail(
+                    "port",
+                    format!(
+                        "= \"{port}\" is no address and port\nhint: \"udp:192.168.2.2:14550\", an endpoint of the vehicle that waits for clients"
+                    ),
+                ),
             }
         }
+        config.first_of(wrong.into_iter()).map_or(Ok(()), Err)?;
+        let (motor, system) = (u32::try_from(motor).unwrap_or(1), u8::try_from(system).unwrap_or(1));
         let udp = matches!(wired.medium, Medium::Udp(_));
         // A vehicle has several motors, and by UDP several may ask it: the motor is its own.
         let vehicles = [

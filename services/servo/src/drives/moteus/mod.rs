@@ -54,14 +54,17 @@ impl Moteus {
     /// # Errors
     /// [`ConfigError`] names key, value and what is allowed.
     pub fn new(config: &Config, id: &str, thruster: &Thruster, rig: &Rig) -> Result<Self, ConfigError> {
-        let wired = Wired::new(config, id, thruster, &OWN)?;
-        let kind = current_or_speed(config, id, thruster, rig)?;
+        let mut wrong = Vec::new();
+        let wired = Wired::read(config, id, thruster, &OWN, &mut wrong)?;
+        let kind = current_or_speed(config, id, thruster, rig, &mut wrong);
         let address = wired.address.unwrap_or(1);
         if !(1..=126).contains(&address) {
-            return Err(config.error(format!(
+            wrong.push(config.error(format!(
                 "`thrusters.{id}.drive.address` = {address} is outside 1 to 126\nhint: 1 unless it was changed with moteus_tool"
             )));
         }
+        config.first_of(wrong.into_iter()).map_or(Ok(()), Err)?;
+        let address = u8::try_from(address).unwrap_or(1);
         Ok(Self { wired, kind, address, torque_constant_nm_a: rig.motor.torque_constant_nm_a.value })
     }
 }

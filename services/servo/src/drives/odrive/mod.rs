@@ -54,8 +54,10 @@ impl ODrive {
     /// # Errors
     /// [`ConfigError`] names key, value and what is allowed.
     pub fn new(config: &Config, id: &str, thruster: &Thruster, rig: &Rig) -> Result<Self, ConfigError> {
-        let wired = Wired::new(config, id, thruster, &OWN)?;
-        let kind = current_or_speed(config, id, thruster, rig)?;
+        let mut wrong = Vec::new();
+        let wired = Wired::read(config, id, thruster, &OWN, &mut wrong)?;
+        let kind = current_or_speed(config, id, thruster, rig, &mut wrong);
+        config.first_of(wrong.into_iter()).map_or(Ok(()), Err)?;
         Ok(Self { wired, kind })
     }
 }

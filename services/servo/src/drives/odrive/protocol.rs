@@ -353,7 +353,8 @@ mod tests {
     fn a_reading_lives_for_longer_than_a_lost_answer_takes() {
         let text = "[thrusters.t1]\nrig = \"r\"\namplifier = \"odrive\"\ndrive = { port = \"/dev/p\" }\n";
         let config = Config::parse(text, None).unwrap();
-        let wired = crate::drives::Wired::new(&config, "t1", config.thruster("t1").unwrap(), &OWN).unwrap();
+        let (thruster, mut wrong) = (config.thruster("t1").unwrap(), Vec::new());
+        let wired = crate::drives::Wired::read(&config, "t1", thruster, &OWN, &mut wrong).unwrap();
         assert_eq!(wired.reading_life_ns as f64, READING_LIFE_MS * 1e6);
         let mut out = Vec::new();
         let mut protocol = Protocol::new(ODrive { wired, kind: DriveKind::Current });

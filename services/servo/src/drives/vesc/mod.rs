@@ -56,21 +56,24 @@ impl Vesc {
     /// # Errors
     /// [`ConfigError`] names key, value and what is allowed.
     pub fn new(config: &Config, id: &str, thruster: &Thruster, rig: &Rig) -> Result<Self, ConfigError> {
-        let wired = Wired::new(config, id, thruster, &OWN)?;
+        let mut wrong = Vec::new();
+        let wired = Wired::read(config, id, thruster, &OWN, &mut wrong)?;
         let key = format!("thrusters.{id}.drive.pole_pairs");
+        let hint = "half the number of the rotor's magnets; 7 for a T200";
         let pole_pairs = match wired.pole_pairs {
-            Some(pairs) if (1..=100).contains(&pairs) => f64::from(pairs),
+            Some(pairs) if (1..=100).contains(&pairs) => pairs as f64,
             Some(pairs) => {
-                return Err(config.error(format!(
-                    "`{key}` = {pairs} is outside 1 to 100\nhint: half the number of the rotor's magnets; 7 for a T200"
-                )));
+                wrong.push(config.error(format!("`{key}` = {pairs} is outside 1 to 100\nhint: {hint}")));
+                1.0
             }
             None => {
-                return Err(config.error(format!(
-                    "`{key}` is missing: a VESC tells electrical speed\nhint: half the number of the rotor's magnets; 7 for a T200"
-                )));
+                wrong.push(
+                    config.error(format!("`{key}` is missing: a VESC tells electrical speed\nhint: {hint}")),
+                );
+                1.0
             }
         };
+        config.first_of(wrong.into_iter()).map_or(Ok(()), Err)?;
         let supply_v = rig.amplifier.supply_v.unwrap_or(f64::NAN);
         Ok(Self { wired, kind: kind_of(rig), pole_pairs, supply_v })
     }

@@ -93,6 +93,78 @@ fn a_unit_in_brackets_tells_what_a_column_of_another_tongue_is() {
 }
 
 #[test]
+fn what_was_asked_for_or_estimated_is_told_from_what_was_measured() {
+    for (names, measured, asked) in [
+        ("Demanded RPM,RPM", "RPM", Some("Demanded RPM")),
+        ("req_rpm,actual_rpm", "actual_rpm", Some("req_rpm")),
+        ("rpm_demand,RPM", "RPM", Some("rpm_demand")),
+        ("Solldrehzahl [1/min],Istdrehzahl [1/min]", "Istdrehzahl [1/min]", Some("Solldrehzahl [1/min]")),
+        ("RPM commanded,RPM", "RPM", Some("RPM commanded")),
+        ("Speed SP (rpm),Speed (rpm)", "Speed (rpm)", Some("Speed SP (rpm)")),
+        ("des_rpm,rpm", "rpm", Some("des_rpm")),
+        ("rpm_des,rpm", "rpm", Some("rpm_des")),
+        ("estimated_rpm,rpm", "rpm", None),
+        ("estimated_rpm,Speed (rpm)", "Speed (rpm)", None),
+        ("rpm,measured rpm", "measured rpm", None),
+        ("Vitesse des pales (rad/s),t2", "Vitesse des pales (rad/s)", None),
+    ] {
+        let width = names.split(',').count();
+        let row = |k: usize| (0..width).map(|n| format!(",{}", k * (n + 1))).collect::<String>();
+        let found = surveyed(&format!("Time (s),{names}\n0{}\n1{}\n2{}\n", row(0), row(1), row(2)));
+        let map = map_of(&found);
+        let source = |column| {
+            lines(map, column).and_then(|lines| lines.lines().next()).map(|line| line.trim_matches('"'))
+        };
+        assert_eq!(
+            (source("shaft_speed_rad_s"), source("speed_cmd_rad_s")),
+            (Some(measured), asked),
+            "{map}"
+        );
+    }
+    let text = "Time (s),Sollstrom,Iststrom,Requested thrust (N),Thrust (N)\n0,1,2,3,4\n1,2,3,4,5\n";
+    let found = surveyed(text);
+    for (column, source) in [
+        ("current_cmd_a", "Sollstrom"),
+        ("current_a", "Iststrom"),
+        ("thrust_cmd_n", "Requested thrust (N)"),
+        ("thrust_n", "Thrust (N)"),
+    ] {
+        let said = lines(map_of(&found), column).unwrap();
+        assert!(said.starts_with(&format!("{source:?}")), "{column}: {said}");
+    }
+}
+
+#[test]
+fn electrical_turns_and_factors_are_asked_for_however_they_are_spelt() {
+    let of = |name: &str, column: &str| {
+        let found = surveyed(&format!("Time (s),{name}\n0,0\n1,700\n2,900\n"));
+        lines(map_of(&found), column).unwrap().to_owned()
+    };
+    for name in [
+        "erpm",
+        "eRPM",
+        "ESC eRPM",
+        "eRPM [1/min]",
+        "motor_eRPM",
+        "E-RPM",
+        "e_rpm",
+        "el. Drehzahl",
+        "elektrische Drehzahl [1/min]",
+    ] {
+        let said = of(name, "shaft_speed_rad_s");
+        assert!(said.contains("\n# unit") && said.contains("# divide_by = …"), "{said}");
+    }
+    assert!(of("eRPM cmd", "speed_cmd_rad_s").contains("# divide_by = …"));
+    for (name, column) in
+        [("rpm/100", "shaft_speed_rad_s"), ("RPM*10", "shaft_speed_rad_s"), ("Current x100 (A)", "current_a")]
+    {
+        let said = of(name, column);
+        assert!(said.contains("\n# unit") && said.contains("# scale = …"), "{said}");
+    }
+    assert!(of("thrust(kg)", "thrust_n").contains("\nunit = \"kgf\""));
+}
+
+#[test]
 fn a_command_in_per_cent_is_one() {
     let text = "time_ms,n_rpm,cmd_pct\n0,0,0\n100,10,25\n200,20,50\n";
     let found = surveyed(text);
@@ -217,7 +289,10 @@ fn stamps_that_cannot_be_read_are_said_to_be_so() {
     let found = surveyed("Time (s),RPM\n0.0,1\nlater,2\n,3\n0.5,4\n");
     assert_eq!(
         found.losses,
-        ["2 row(s) have no stamp that can be read and are left out, the first in line 3: \"later\""]
+        [
+            "1 row(s) have no stamp and are left out, in line 4: \"\"",
+            "1 row(s) have no stamp that can be read: left out here, and refused where the file is read, in line 3: \"later\""
+        ]
     );
     // What a column map says amiss of them is refused by key.
     for (time, part) in [
