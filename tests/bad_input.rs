@@ -43,7 +43,7 @@ fn every_kind_of_bad_recording_is_named() {
         (b"time_s,current_a\n", &["0 row(s)", "at least 2"]),
         (b"time_s,current_a\n0,1\n", &["1 row(s)"]),
         (b"time,current_a\n0,1\n1,1\n", &["time_s", "time"]),
-        (b"time_s;current_a\n0;1\n1;1\n", &["semicolons"]),
+        (b"time_s;current_a\n0,5;1\n1;1\n", &["line 2", "time_s", "\"0,5\"", "kort columns"]),
         (b"time_s,current_a,current_a\n0,1,1\n1,1,1\n", &["current_a", "twice", "2 and 3"]),
         (b"time_s,current_a,\n0,1,\n1,1,\n", &["position 3"]),
         (b"time_s,current\n0,1\n1,1\n", &["`current`", "current_a", "column map"]),
