@@ -9,9 +9,10 @@ use std::process::Command;
 
 use common::Stack;
 
-/// What no schema can say: which texts are a rig description or a controller file, and which fields exclude each other. Such a body is
-/// refused with 422 for its meaning. DELETE of a recording, a diagnosis, a fit or a calibration that runs ends it, and it stays. A command without `Lease-Id` is
-/// refused with 403 while nobody holds the lease, and with 409 and the holder's name while somebody does.
+/// What no schema can say: which texts are a rig description or a controller file, and which fields exclude each other. Such
+/// a body is refused with 422 for its meaning. DELETE of a recording, a diagnosis, a fit or a calibration that runs ends it,
+/// and it stays. A command without `Lease-Id` is refused with 403 while nobody holds the lease, and with 409 and the
+/// holder's name while somebody does.
 const BY_MEANING: &str = "[checks.missing_required_header]\nexpected-statuses = [\"400\", \"403\", \"409\", \"415\", \"422\"]\n\
     [[operations]]\ninclude-path = \"/v1/thrusters/{id}/rig\"\ninclude-method = \"POST\"\n\
     checks.positive_data_acceptance.enabled = false\n\

@@ -130,8 +130,9 @@ mod tests {
 
     use kort_thruster::models::ModelName;
     use kort_thruster::rig::Rig;
+    use rand::{Rng as _, SeedableRng};
 
-    use super::tells_nothing;
+    use super::{WINDOW, of_one_frequency, tells_nothing};
     use crate::data::Series;
     use crate::noise::Criterion;
     use crate::setup::Setup;
@@ -176,10 +177,22 @@ mod tests {
         assert_eq!(lost(|t| 5.0 * (TAU * 8.0 * t).sin()).0, None);
         assert_eq!(lost(|t| 5.0 * (TAU * t).sin() + 0.2 * (TAU * 45.0 * t).sin()).0, None);
         // Scattered by the digits of the row's number, evenly from -5 to 5.
-        let scattered = |t: f64| {
-            10.0 * ((100.0 * t).round() * 78.233).sin().mul_add(43_758.545, 0.0).rem_euclid(1.0) - 5.0
-        };
+        let scattered =
+            |t: f64| 10.0 * (((100.0 * t).round() * 78.233).sin() * 43_758.545).rem_euclid(1.0) - 5.0;
         assert_eq!(lost(scattered).0, None, "what a loop makes of noise has no slower likeness");
+    }
+
+    /// What [`super::STRAYS`] stands between.
+    #[test]
+    fn a_chirp_is_of_one_frequency_in_every_window_and_noise_hardly_ever() {
+        let windows = |course: &[f64]| course.windows(WINDOW + 2).map(of_one_frequency).collect::<Vec<_>>();
+        let chirp: Vec<f64> = (0..400).map(|k| (TAU * 0.00125 * f64::from(k * k)).sin()).collect();
+        // From a quarter of the rows' rate to nearly all of it.
+        assert!(windows(&chirp[100..380]).into_iter().all(|one| one));
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(1);
+        let noise: Vec<f64> = (0..100_000).map(|_| rng.random_range(-1.0..1.0)).collect();
+        let taken = windows(&noise).into_iter().filter(|one| *one).count();
+        assert!(taken < 10, "{taken} of 100,000");
     }
 
     #[test]
