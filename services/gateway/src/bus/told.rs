@@ -93,11 +93,14 @@ impl Bridge {
         let faultless = telemetry.faults == 0 && self.latched.iter().all(|faults| faults.unwrap_or(0) == 0);
         if was && !armed && !self.disarm_asked && faultless {
             let id = &self.link.thruster.id;
-            let led = self.link.thruster.desk().lease.current(Instant::now()).is_some();
-            let words = if led {
-                "disarmed, by none of this gateway's clients: the service stops, its servo is another, or another process asked for it"
-            } else {
-                "disarmed: nobody commands it any more"
+            let now = Instant::now();
+            let led = self.link.thruster.desk().lease.current(now).is_some();
+            let words = match self.link.thruster.calibration(now) {
+                Some(calibration) => format!("disarmed: calibration {} has driven it as far as it wants", calibration.id),
+                None if led => "disarmed, by none of this gateway's clients: the service stops, its servo is another, or another \
+                                process asked for it"
+                    .into(),
+                None => "disarmed: nobody commands it any more".into(),
             };
             self.link.events.tell(EventKind::Disarmed, Some(id), "servo", words);
         }
