@@ -40,7 +40,9 @@ impl Prepared {
             return self.unsampled.iter().copied().filter(|gap| !self.after_pause(gap.1)).collect();
         }
         let usual_s = median_interval(&self.time_s);
-        let turns = self.command.windows(3).filter(|w| (w[1] - w[0]) * (w[2] - w[1]) < 0.0).count();
+        // Of a stepwise command every turn is an edge.
+        let turn = |w: &&[f64]| !self.stepwise && (w[1] - w[0]) * (w[2] - w[1]) < 0.0;
+        let turns = self.command.windows(3).filter(turn).count();
         let often_1_s = (self.edges.len() + turns) as f64 / self.duration_s();
         (1..self.time_s.len())
             .filter(|row| self.after_gap(*row, usual_s) && !self.after_pause(*row))

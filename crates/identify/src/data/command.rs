@@ -36,7 +36,8 @@ impl Prepared {
                     if share > 0.0 {
                         let interval_s = self.time_s[row + 1] - self.time_s[row];
                         let rows = (self.time_s[row + 1] - t - at_tick_s) / interval_s;
-                        let after = before_its_row(c, row + 1, rows.max(0.0)).clamp(least, most);
+                        let came = if self.stepwise { b } else { before_its_row(c, row + 1, rows.max(0.0)) };
+                        let after = came.clamp(least, most);
                         a + (after - a) * share
                     } else {
                         a
@@ -119,13 +120,33 @@ fn before_its_row(command: &[f64], row: usize, rows: f64) -> f64 {
     command[row] - first * if told { (ratio.powf(-rows) - 1.0) / (1.0 - ratio) } else { rows }
 }
 
-/// Rows where the command jumps: it holds before and after, or goes other ways than the jump.
-pub(super) fn find_edges(command: &[f64]) -> Vec<usize> {
-    let range = command.iter().fold(0.0_f64, |m, c| m.max(c.abs()));
+/// Usual change of a command from row to row: noise of a measured one, zero for a logged one that stands.
+fn usual_change(command: &[f64]) -> f64 {
     let mut sizes: Vec<f64> = command.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
     sizes.sort_by(f64::total_cmp);
-    // Noise of a measured command; zero for a logged one that holds.
-    let usual = sizes.get(sizes.len() / 2).copied().unwrap_or(0.0);
+    sizes.get(sizes.len() / 2).copied().unwrap_or(0.0)
+}
+
+/// Whether a command stands from most rows to the next: what it does between is steps, and where it comes back at the next
+/// row it was set back.
+pub(super) fn is_stepwise(command: &[f64]) -> bool {
+    usual_change(command) == 0.0
+}
+
+/// Whether a change is one of three or more the same way: two may be two steps, and are no worse a slope of two rows.
+fn is_on_slope(command: &[f64], row: usize) -> bool {
+    let along = |by: isize| {
+        row.checked_add_signed(by).is_some_and(|other| change(command, other) * change(command, row) > 0.0)
+    };
+    along(-1) && (along(1) || along(-2)) || along(1) && along(2)
+}
+
+/// Rows where the command jumps: it holds before and after, or goes other ways than the jump; a stepwise one wherever it is
+/// on no slope.
+pub(super) fn find_edges(command: &[f64], stepwise: bool) -> Vec<usize> {
+    let range = command.iter().fold(0.0_f64, |m, c| m.max(c.abs()));
+    let usual = usual_change(command);
+    let returns = |jump: f64, after: f64| !stepwise && returns(jump, after);
     let mut edges: Vec<usize> = Vec::new();
     for row in 1..command.len() {
         let jump = change(command, row);
@@ -134,8 +155,12 @@ pub(super) fn find_edges(command: &[f64]) -> Vec<usize> {
         let rows_since = edges.last().map(|edge| row - edge);
         let follows = rows_since == Some(1) && returns(before, jump);
         let returned = rows_since == Some(2) && returns(change(command, row - 2), before);
-        let least =
-            if returned { before.abs() / SPIKE } else { beside(jump, before) }.max(beside(jump, after));
+        let least = if stepwise && !is_on_slope(command, row) {
+            0.0
+        } else {
+            let least = if returned { before.abs() / SPIKE } else { beside(jump, before) };
+            least.max(beside(jump, after))
+        };
         if !follows && jump.abs() > (0.004 * range).max(4.0 * usual).max(least) {
             edges.push(row);
         }
@@ -145,12 +170,12 @@ pub(super) fn find_edges(command: &[f64]) -> Vec<usize> {
 
 #[cfg(test)]
 mod tests {
-    use super::{before_its_row, find_edges, steps_of};
+    use super::{before_its_row, find_edges, is_stepwise, steps_of};
 
     #[test]
     fn a_loop_that_answers_a_step_jumps_once_and_keeps_every_sample() {
         let answer = [1.0, 1.0, 1.0, -7.0, -4.0, -2.5, -1.75, -1.375, -1.2, -1.1, -1.0, -1.0, -1.0];
-        assert_eq!(find_edges(&answer), [3]);
+        assert_eq!(find_edges(&answer, false), [3]);
         assert_eq!(steps_of(&answer), answer);
         let before = |rows| before_its_row(&answer, 3, rows);
         assert_eq!(before(0.0), -7.0);
@@ -160,10 +185,16 @@ mod tests {
     #[test]
     fn a_step_a_spike_and_a_slope_are_told_apart() {
         let step = [0.0, 0.0, 0.0, 3.0, 3.0, 3.0];
-        assert_eq!(find_edges(&step), [3]);
+        assert_eq!(find_edges(&step, true), [3]);
         assert_eq!(before_its_row(&step, 3, 0.7), 3.0);
-        assert!(find_edges(&[0.0, 0.0, 0.0, 3.0, 0.0, 0.0, 0.0]).is_empty(), "gone at the next row");
-        assert!(find_edges(&[0.0, 0.0, 1.0, 2.0, 3.0, 3.0]).is_empty());
+        let pulse = [0.0, 0.0, 0.0, 3.0, 0.0, 0.0, 0.0];
+        assert!(find_edges(&pulse, false).is_empty(), "gone at the next row");
+        assert!(is_stepwise(&pulse), "what is set stays");
+        assert_eq!(find_edges(&pulse, true), [3, 4]);
+        let slope = [0.0, 0.0, 1.0, 2.0, 3.0, 3.0];
+        assert!(!is_stepwise(&slope) && find_edges(&slope, false).is_empty());
+        assert!(find_edges(&slope, true).is_empty());
+        assert_eq!(find_edges(&[0.0, 0.0, 0.0, 1.0, 2.0, 2.0, 2.0, 2.0], true), [3, 4]);
         assert_eq!(
             steps_of(&[0.0, 0.0, 1.2, 3.0, 3.0, 3.0]),
             [0.0, 0.0, 3.0, 3.0, 3.0, 3.0],
@@ -174,6 +205,6 @@ mod tests {
     #[test]
     fn a_jump_is_seen_while_the_one_before_still_returns() {
         let twice = [1.0, 1.0, 1.0, -6.7, -4.5, 1.8, 1.0, 0.2, -0.2, -0.2, -0.2, -0.2, -0.2, -0.2];
-        assert_eq!(find_edges(&twice), [3, 5]);
+        assert_eq!(find_edges(&twice, false), [3, 5]);
     }
 }

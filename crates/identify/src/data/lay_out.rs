@@ -3,7 +3,7 @@
 use kort_thruster::plant::{Driven, Tick};
 use kort_thruster::rig::Rig;
 
-use super::command::find_edges;
+use super::command::{find_edges, is_stepwise};
 use super::counted::counted_angle;
 use super::fill::{filled, held, linear};
 use super::pauses::leap_to;
@@ -80,7 +80,8 @@ impl Prepared {
         self.stimulus.ticks = ticks;
         self.speed_between = speed.unwrap_or_default();
         if matches!(self.driving, Driving::Command(_) | Driving::Current) {
-            self.edges = find_edges(&self.command);
+            self.stepwise = matches!(self.driving, Driving::Command(_)) && is_stepwise(&self.command);
+            self.edges = find_edges(&self.command, self.stepwise);
         }
     }
 }

@@ -152,6 +152,8 @@ pub struct Prepared {
     pub edges: Vec<usize>,
     /// Command at each row.
     pub command: Vec<f64>,
+    /// Whether the command stands from most rows to the next.
+    pub stepwise: bool,
     /// Control ticks a log interval (nominal).
     pub ticks_per_row: usize,
     /// Ticks of the simulation a control period: over it an encoder's counts are differenced.
@@ -277,6 +279,7 @@ impl Prepared {
             channels,
             strides: Vec::new(),
             edges: Vec::new(),
+            stepwise: false,
             command: if driving == Driving::Current { steps_of(&recorded) } else { recorded },
             ticks_per_row: (row_s / tick_s).round() as usize,
             ticks_per_period: ticks_per_period(rig, row_s, tick_s),
