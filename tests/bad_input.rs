@@ -162,3 +162,104 @@ fn a_large_recording_needs_little_more_memory_than_its_columns() {
         .unwrap();
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
 }
+
+/// What is read is not written over, and what cannot be written is said before anything is done.
+#[test]
+fn outputs_are_looked_at_first() {
+    let folder = tempfile::tempdir().unwrap();
+    let recording = file(folder.path(), "run.csv", b"time_s,current_cmd_a,shaft_speed_rad_s\n0,1,0\n1,1,1\n");
+    let rig = folder.path().join("rig.toml");
+    std::fs::copy(concat!(env!("CARGO_MANIFEST_DIR"), "/config/thrusters/t200.toml"), &rig).unwrap();
+    let kept = [&recording, &rig].map(|path| std::fs::read(path).unwrap());
+    let (run, rig_file) = (recording.to_str().unwrap(), rig.to_str().unwrap());
+    for (args, words) in [
+        (vec!["diagnose", run, "--rig", rig_file, "--html", run], "recording that is read"),
+        (vec!["diagnose", run, "--rig", rig_file, "-o", rig_file], "rig description that is read"),
+        (vec!["fit", run, "--rig", rig_file, "-o", rig_file], "rig description that is read"),
+        (vec!["fit", run, "--rig", rig_file, "-o", "fitted.json"], "must end in .toml"),
+        (vec!["fit", run, "--rig", rig_file, "-o", "/no/such/fitted.toml"], "cannot be written"),
+        (vec!["convert", run, "-o", run], "recording that is read"),
+        (vec!["columns", run, "-o", "map.csv"], "must end in .toml"),
+        (
+            vec!["simulate", "--rig", rig_file, "--scenario", "chirp", "-o", "/no/such/a.csv"],
+            "cannot be written",
+        ),
+        (vec!["reproduce", "--html", "/proc"], "it is a folder"),
+        (vec!["soak", "soak-towed", "--html", "/no/such/page.html"], "cannot be written"),
+    ] {
+        let output = Command::new(env!("CARGO_BIN_EXE_kort")).args(&args).output().unwrap();
+        let said = stderr(&output);
+        assert_eq!(output.status.code(), Some(2), "{args:?}: {said}");
+        assert!(
+            said.contains(words) && said.contains("hint:") && output.stdout.is_empty(),
+            "{args:?}: {said}"
+        );
+    }
+    assert_eq!(kept, [&recording, &rig].map(|path| std::fs::read(path).unwrap()));
+}
+
+/// Nor is a recording that a scenario replays.
+#[test]
+fn what_is_replayed_is_not_written_over() {
+    let folder = tempfile::tempdir().unwrap();
+    let bytes = b"time_s,current_cmd_a\n0,1\n1,1\n";
+    let kept = file(folder.path(), "out.csv", bytes);
+    let output = replay(folder.path(), &kept, "current_cmd_a", None);
+    assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
+    assert!(stderr(&output).contains("replayed recording that is read"), "{}", stderr(&output));
+    assert_eq!(std::fs::read(kept).unwrap(), bytes);
+}
+
+/// A result that nobody gets is a failure, and is said.
+#[test]
+fn what_cannot_be_printed_is_a_failure() {
+    let folder = tempfile::tempdir().unwrap();
+    let tokens = folder.path().join("tokens.toml");
+    let config = folder.path().join("kort.toml");
+    let text = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/config/kort.toml")).unwrap();
+    std::fs::write(
+        &config,
+        text.replace("tokens = \"kort-state/tokens.toml\"", &format!("tokens = {tokens:?}")),
+    )
+    .unwrap();
+    let rig = concat!(env!("CARGO_MANIFEST_DIR"), "/config/thrusters/t200.toml");
+    for args in [
+        &["explain"][..],
+        &["explain", "--json"],
+        &["check", rig],
+        &["token", "new", "bridge", "--role", "viewer", "--config", config.to_str().unwrap()],
+        &["--version"],
+    ] {
+        let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let mut command = Command::new(env!("CARGO_BIN_EXE_kort"));
+        let output = command.args(args).stdout(full).output().unwrap();
+        let said = stderr(&output);
+        assert_eq!(output.status.code(), Some(1), "{args:?}: {said}");
+        assert!(said.contains("cannot be printed") && said.contains("hint:"), "{args:?}: {said}");
+        assert!(!said.contains("panicked"), "{args:?}: {said}");
+    }
+}
+
+/// What is shipped is built in, whatever folder it is used in; what is no address, no scenario of this command, or named twice is
+/// refused for that.
+#[test]
+fn shipped_scenarios_run_anywhere_and_wrong_usage_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    for (args, code, words) in [
+        (&["soak-recovery-lift", "soak-aged", "--live", "http://127.0.0.1:1"][..], 1, "http://127.0.0.1:1"),
+        (&["soak-towed", "--live", "notaurl"], 2, "--live notaurl"),
+        (&["chirp"], 2, "hint: kort simulate"),
+        (&["soak-towed", "soak-towed"], 2, "scenario soak-towed is given twice"),
+        (&["soak-towed", "--controllers", "default, default"], 2, "--controllers default is given twice"),
+    ] {
+        let run = Command::new(env!("CARGO_BIN_EXE_kort"))
+            .arg("soak")
+            .args(args)
+            .current_dir(folder.path())
+            .output()
+            .unwrap();
+        let said = stderr(&run);
+        assert_eq!(run.status.code(), Some(code), "{args:?}: {said}");
+        assert!(said.contains(words) && said.contains("hint:"), "{args:?}: {said}");
+    }
+}

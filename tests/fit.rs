@@ -281,8 +281,8 @@ fn wrong_usage_and_outputs_that_cannot_be_written() {
             assert!(output.stdout.is_empty());
         }
         let flag = if command == "fit" { "-o" } else { "--html" };
-        let output = kort(&[command, clean(), "--rig", STAND, flag, "/nonexistent/out"]);
-        assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+        let output = kort(&[command, clean(), "--rig", STAND, flag, "/nonexistent/out.toml"]);
+        assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
         assert!(stderr(&output).contains("/nonexistent/out") && stderr(&output).contains("hint:"));
         let help = kort(&[command, "--help"]);
         let help = String::from_utf8(help.stdout).unwrap();

@@ -199,7 +199,17 @@ fn errors_are_usage_errors_with_a_hint_and_leave_no_file() {
         assert!(stderr(&output).contains(words) && stderr(&output).contains("hint:"), "{}", stderr(&output));
     }
     let output = simulate(RIG, "torque-step-9.2", Path::new("/nonexistent/a.csv"), &[]);
-    assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+    assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
+    let output = simulate(RIG, "soak-towed", &out, &[]);
+    assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
+    assert!(stderr(&output).contains("hint: kort soak soak-towed"), "{}", stderr(&output));
+    for (option, value, words) in
+        [("--noise", "nan", "--noise NaN"), ("--noise", "-1", "--noise -1"), ("--seed", "-1", "0 or above")]
+    {
+        let output = simulate(RIG, "staircase", &out, &[option, value]);
+        assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
+        assert!(stderr(&output).contains(words) && stderr(&output).contains("hint:"), "{}", stderr(&output));
+    }
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use kort_lab::commands::{diagnose as diagnosing, fit as fitting, simulate as simulating, soak as soaking};
-use kort_lab::fitted_rig::{FITTED, with_fitted};
+use kort_lab::fitted_rig::with_fit;
 use kort_lab::input::{Input, Loaded};
 use kort_lab::{Failure, files, render};
 use kort_thruster::models::ModelName;
@@ -90,7 +90,7 @@ pub fn fit(
     }
     work(py, recordings, asked, progress, |input, loaded, told| {
         let report = fitting::fit(input, loaded, usize::from(starts), free_friction, told)?;
-        let (rig, _) = with_fitted(&loaded.rig_text, &report.parameters, FITTED).map_err(Failure::failed)?;
+        let (rig, _) = with_fit(&loaded.rig_text, &report).map_err(Failure::failed)?;
         Ok((json(&report)?, rig))
     })
 }

@@ -8,7 +8,7 @@ use kort_proto::complaint::Complaint;
 use kort_proto::config::{Config, DEFAULT_PATH, is_there, is_told_by};
 use serde::Serialize;
 
-use crate::{DONE, USAGE};
+use crate::{DONE, USAGE, print, said};
 
 /// Which files.
 #[derive(Args)]
@@ -78,7 +78,7 @@ impl Found {
 const HOLDS_NOTHING: &str = "holds no key at all\nhint: a deployment needs [thrusters.ID] with `rig` and `amplifier` (config/kort.toml explains every key); a rig, a scenario, a column map and a controller each their own sections";
 
 /// Checks and prints; exit code 2 if anything is wrong.
-pub fn run(args: &Check) -> ExitCode {
+pub fn run(args: &Check) -> Result<ExitCode, ExitCode> {
     let mut found = Found::default();
     if args.files.is_empty() {
         let default = Path::new(DEFAULT_PATH);
@@ -88,7 +88,12 @@ pub fn run(args: &Check) -> ExitCode {
         match std::fs::read_to_string(file) {
             Ok(text) => one(file, &text, &mut found),
             Err(error) => {
-                let words = format!("cannot be read: {error}");
+                let hint = if file.is_dir() {
+                    "it is a folder: name the files in it"
+                } else {
+                    "check the path, and that the file may be read"
+                };
+                let words = format!("cannot be read: {error}\nhint: {hint}");
                 found.problems.push(problem(&file.display().to_string(), &words));
             }
         }
@@ -97,29 +102,35 @@ pub fn run(args: &Check) -> ExitCode {
     if args.json {
         let (problems, warnings, unused_effects) = (&problems, &warnings, &unused);
         let report = Report { schema: "kort.check/1", problems, warnings, unused_effects };
-        println!("{}", serde_json::to_string_pretty(&report).unwrap_or_default());
+        let text = serde_json::to_string_pretty(&report).unwrap_or_default();
+        said(print(&(text + "\n")))?;
     } else {
-        for problem in &problems {
-            println!("{problem}");
-        }
-        for warning in &warnings {
-            println!("WARNING: {warning}");
-        }
-        for Unused { file, effect, why } in &unused {
-            println!("{file}: known {effect}: NOT USED: {why}");
-        }
+        let mut lines: Vec<String> = problems.iter().map(ToString::to_string).collect();
+        lines.extend(warnings.iter().map(|warning| format!("WARNING: {warning}")));
+        lines.extend(
+            unused
+                .iter()
+                .map(|Unused { file, effect, why }| format!("{file}: known {effect}: NOT USED: {why}")),
+        );
         if problems.is_empty() {
-            println!("nothing is wrong");
+            lines.push("nothing is wrong".into());
         }
+        said(print(&(lines.join("\n") + "\n")))?;
     }
-    ExitCode::from(if problems.is_empty() { DONE } else { USAGE })
+    Ok(ExitCode::from(if problems.is_empty() { DONE } else { USAGE }))
 }
 
 fn one(file: &Path, text: &str, found: &mut Found) {
     let name = file.display().to_string();
     let table: toml::Table = match text.parse() {
         Ok(table) => table,
-        Err(error) => return found.problems.push(problem(&name, &error.to_string())),
+        Err(error) => {
+            let words = format!(
+                "{}\nhint: mend that line; what stands behind it was not looked at",
+                error.to_string().trim_end()
+            );
+            return found.problems.push(problem(&name, &words));
+        }
     };
     if table.is_empty() {
         return found.problems.push(problem(&name, HOLDS_NOTHING));

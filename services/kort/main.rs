@@ -7,6 +7,7 @@
 mod check;
 #[cfg(feature = "servo")]
 mod job;
+mod options;
 #[cfg(feature = "gateway")]
 mod token;
 #[cfg(all(feature = "servo", feature = "controller", feature = "gateway"))]
@@ -15,7 +16,7 @@ mod up;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 use kort_proto::config::Config;
 #[cfg(feature = "servo")]
 use kort_proto::messages::Trip;
@@ -26,7 +27,6 @@ use rustix::process::Signal;
 /// Done.
 const DONE: u8 = 0;
 /// Failed.
-#[cfg(any(feature = "servo", feature = "controller", feature = "gateway"))]
 const FAILED: u8 = 1;
 /// Wrong usage or unreadable input.
 const USAGE: u8 = 2;
@@ -97,7 +97,7 @@ enum Command {
     Check(check::Check),
     /// Make a token: who may read, command or administer
     #[cfg(feature = "gateway")]
-    #[command(subcommand)]
+    #[command(subcommand, after_help = "Example: kort token new bridge --role pilot")]
     Token(token::Token),
     #[cfg(feature = "lab")]
     #[command(flatten)]
@@ -154,15 +154,20 @@ impl Service {
 }
 
 fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
+    let asked = options::with_negative_numbers(Cli::command()).try_get_matches();
+    let cli = match asked.and_then(|matches| Cli::from_arg_matches(&matches)) {
         Ok(cli) => cli,
         #[cfg(not(feature = "lab"))]
         Err(e) if e.kind() == clap::error::ErrorKind::InvalidSubcommand => {
             return fail(USAGE, &NO_LAB);
         }
         Err(e) => {
-            let _ = e.print();
-            return ExitCode::from(if e.use_stderr() { USAGE } else { DONE });
+            let printed = e.print();
+            if e.use_stderr() {
+                options::hint(&e);
+                return ExitCode::from(USAGE);
+            }
+            return said(printed).map_or_else(|code| code, |()| ExitCode::from(DONE));
         }
     };
     match cli.command {
@@ -171,7 +176,7 @@ fn main() -> ExitCode {
         None => dispatch(Command::Up(cli.up)),
         #[cfg(not(all(feature = "servo", feature = "controller", feature = "gateway")))]
         None => {
-            let _ = <Cli as clap::CommandFactory>::command().print_help();
+            let _ = Cli::command().print_help();
             Ok(ExitCode::from(USAGE))
         }
     }
@@ -209,7 +214,7 @@ fn dispatch(command: Command) -> Result<ExitCode, ExitCode> {
             let (config, deployment) = service.load()?;
             finish(kort_gateway::run(&config, &deployment))
         }
-        Command::Check(args) => Ok(check::run(&args)),
+        Command::Check(args) => check::run(&args),
         #[cfg(feature = "gateway")]
         Command::Token(command) => token::run(command),
         #[cfg(feature = "lab")]
@@ -272,6 +277,26 @@ fn fail(code: u8, error: &dyn std::fmt::Display) -> ExitCode {
     // Where nobody listens the exit code still speaks; eprintln! would panic.
     let _ = std::io::Write::write_all(&mut std::io::stderr(), format!("error: {error}\n").as_bytes());
     ExitCode::from(code)
+}
+
+/// Prints a result, all of it.
+fn print(text: &str) -> std::io::Result<()> {
+    use std::io::Write;
+    let mut out = std::io::stdout().lock();
+    out.write_all(text.as_bytes()).and_then(|()| out.flush())
+}
+
+/// Ends a command whose result could not be printed; where nobody wanted the rest (`kort … | head`), quietly.
+fn said(printed: std::io::Result<()>) -> Result<(), ExitCode> {
+    match printed {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(fail(
+            FAILED,
+            &format!(
+                "the result cannot be printed: {error}\nhint: check where standard output goes: is that disk full?"
+            ),
+        )),
+        _ => Ok(()),
+    }
 }
 
 /// Logs to stderr; `RUST_LOG` chooses how much, for example `RUST_LOG=debug`.

@@ -99,6 +99,20 @@ fn while_somebody_holds_the_lease_every_change_needs_it() {
     });
 }
 
+/// Whoever may stop without a token is not kept from it by a header that means nothing here.
+#[test]
+fn where_no_token_is_needed_no_header_refuses_a_stop() {
+    let stack = Stack::start();
+    for shown in ["Basic eHg6eHg=", "Bearer nobody.00", "Bearer", "", "\u{ff}"] {
+        for path in ["/v1/stop", &format!("{T1}/disarm")] {
+            let (status, answer) = ask(stack.site.port, "POST", path, &[("Authorization", shown)], "");
+            assert_eq!(status, 200, "{path} {shown:?}: {answer}");
+        }
+    }
+    let (status, _) = ask(stack.site.port, "GET", T1, &[("Authorization", "Bearer nobody.00")], "");
+    assert_eq!(status, 401, "anything else is told of its token");
+}
+
 #[test]
 fn a_crashed_clients_lease_is_taken_over_aloud_and_a_refused_command_renews_nothing() {
     common::in_real_time(|| {
@@ -187,7 +201,9 @@ fn where_tokens_are_asked_for_each_role_does_its_own() {
     assert_eq!(with(&viewer, "GET", T1, "").0, 200);
     assert_eq!(with(&viewer, "GET", "/metrics", "").0, 200);
     assert_eq!(with(&viewer, "POST", "/v1/stop", "").0, 403);
-    assert_eq!(with(&pilot, "POST", &format!("{T1}/arm"), "").0, 200);
+    let (_, lease) = with(&pilot, "POST", &format!("{T1}/lease"), r#"{"holder": "bridge", "ttl_ms": 10000}"#);
+    let under_it = [("Authorization", pilot.as_str()), ("Lease-Id", lease["lease_id"].as_str().unwrap())];
+    assert_eq!(ask(port, "POST", &format!("{T1}/arm"), &under_it, "").0, 200);
     assert_eq!(with(&pilot, "POST", "/v1/stop", "").0, 200);
     assert_eq!(with(&admin, "POST", "/v1/recordings", r#"{"name": "hers"}"#).0, 201);
     let (status, answer) = with(&pilot, "DELETE", "/v1/recordings/hers", "");

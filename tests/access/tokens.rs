@@ -44,6 +44,22 @@ fn a_gateway_on_loopback_says_why_it_asks_for_tokens() {
     }
 }
 
+/// They would stand in the event log for the service itself, or for whoever needs no token.
+#[test]
+fn no_token_is_called_as_the_event_log_calls_a_process() {
+    let site = Site::new();
+    for name in ["servo", "controller", "gateway", "supervisor", "local"] {
+        let mut command = std::process::Command::new(common::KORT);
+        command.args(["token", "new", name, "--role", "pilot", "--config"]).arg(site.config());
+        let out = common::run(command.current_dir(site.folder.path()));
+        let words = String::from_utf8_lossy(&out.stderr);
+        assert!(
+            out.status.code() == Some(2) && words.contains("what the event log calls"),
+            "{name}: {words}"
+        );
+    }
+}
+
 #[test]
 fn a_stream_ends_with_the_token_that_opened_it_and_commands_nothing_more() {
     common::in_real_time(|| {

@@ -167,7 +167,7 @@ fn a_bench_engineer_plays_signals_and_compares_runs() {
         page.click("play");
         page.until("state.excitation !== null");
         page.click("signal-end");
-        page.until(&text_is("log", "sine ended: local ended it"));
+        page.until(&text_is("log", "sine ended: console ended it"));
 
         for words in ["show first", "compare second"] {
             page.eval(&format!(

@@ -23,7 +23,7 @@ fn press(page: &mut Browser, key: &str) {
 
 /// Two runs as a recording gives them: A of 7.1 s, B of 13 s, 20 N more.
 const RUNS: &str = "(() => {
-  const made = (end_s, step_s, more) => { const c = new Columns(); for (let t = 0; t <= end_s + 1e-9; t += step_s) c.push(t, { thrust_n: more + t, thrust_cmd_n: more, shaft_speed_rad_s: 10 * more }); c.done = true; return c; };
+  const made = (end_s, step_s, more) => { const c = new Columns(); for (let t = 0; t <= end_s + 1e-9; t += step_s) c.push(t, { thrust_n: more + t, thrust_cmd_n: more, shaft_speed_rad_s: 10 * more, estimated_flow_low: more }); c.done = true; return c; };
   showRun({ a: made(7.1, 0.05, 10), b: made(13, 0.04, 30), names: ['first', 'second'], at_s: null, playing: null, difference: false });
 })()";
 
@@ -79,6 +79,14 @@ fn plots_go_by_keyboard_to_the_end_of_both_runs_and_are_saved_whole() {
             less.len() > 200 && less.iter().all(|newton| (newton - 20.0).abs() < 1e-9),
             "B is 20 N above A"
         );
+
+        let sides = "['estimated_flow_low', 'estimated_flow_high'].map((name) => [run.lines.b.of(name).some((v) => v !== null), run.lines.less.of(name).some((v) => v !== null)])";
+        assert_eq!(
+            page.eval(sides)[0],
+            json!([true, false]),
+            "of the sides of a doubt there is no difference"
+        );
+        assert!(!head.iter().any(|name| name == "difference_estimated_flow_low"), "{head:?}");
 
         // In a picture as narrow as a phone every word of the legend stands within it.
         page.eval("SIGNALS.filter((s) => s[1] === 'N' || s[1] === 'm/s').forEach(([name]) => shownSignals.add(name))");

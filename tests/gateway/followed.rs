@@ -24,7 +24,7 @@ fn operations_and_the_console_as_a_reader_follows_them() {
         let stack = Stack::start();
         let said = pages::follow("docs/operations.md", stack.site.port);
         assert!(said.contains("\"difference\":"), "{said}");
-        assert!(said.contains("\"ended_by\":\"local ended it\""), "the test signal is ended: {said}");
+        assert!(said.contains("\"ended_by\":\"bench ended it\""), "the test signal is ended: {said}");
         let said = pages::follow("docs/console.md", stack.site.port);
         let asked = pages::follow("docs/hardware.md", stack.site.port);
         assert!(asked.contains("\"asks\":\"listens to every sensor"), "{asked}");

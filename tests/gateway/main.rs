@@ -13,4 +13,5 @@ mod limits;
 mod pages;
 mod parts;
 mod recordings;
+mod retaken;
 mod stream;

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use crate::asking::{assert_problem, send};
+use crate::asking::{ARM, JSON, assert_problem, put_json, send};
 use crate::common::{self, Site, Stack, kill, wait};
 
 #[test]
@@ -14,8 +14,10 @@ fn a_gateway_alone_says_what_is_away_and_still_shows_its_console() {
     assert_eq!(send(site.port, "GET", "/healthz", &[], b"").status, 200);
     let state = send(site.port, "GET", "/v1/thrusters", &[], b"").json();
     assert_eq!((&state[0]["armed"], &state[0]["measured"]["thrust_n"]), (&json!(false), &Value::Null));
+    let lease = json!({"holder": "bench"}).to_string();
+    let lease = send(site.port, "POST", "/v1/thrusters/t1/lease", &[JSON], lease.as_bytes()).json();
     assert_problem(
-        &send(site.port, "POST", "/v1/thrusters/t1/arm", &[], b""),
+        &put_json(site.port, "POST", ARM, lease["lease_id"].as_str().unwrap(), ""),
         503,
         "not-ready",
         "arming nothing",
@@ -65,7 +67,30 @@ fn the_openapi_document_names_every_route_and_each_answers() {
         ] {
             assert!(document["paths"][route].is_object(), "{route} is not documented");
         }
+        let schemas = &document["components"]["schemas"];
+        let thrust = &schemas["Setpoint"]["oneOf"][0]["properties"]["thrust_n"];
+        let range = &stack.state().unwrap()["range"]["thrust_n"];
+        assert_eq!(&thrust["maximum"], range);
+        assert!(thrust["description"].as_str().unwrap().contains("range.thrust_n"), "{thrust}");
+        for side in ["before", "after"] {
+            assert!(
+                schemas["Change"]["properties"][side]["type"].is_null(),
+                "any value: {}",
+                schemas["Change"]
+            );
+        }
+        let texts = &document["paths"]["/v1/thrusters/{id}/rig"]["post"]["requestBody"]["content"];
+        assert!(texts["application/toml"].is_object() && texts["text/plain"].is_object(), "{texts}");
         for (path, methods) in document["paths"].as_object().unwrap() {
+            for (method, operation) in
+                methods.as_object().unwrap().iter().filter(|(_, o)| o["responses"].is_object())
+            {
+                for status in ["403", "408", "421"] {
+                    assert!(operation["responses"][status].is_object(), "{method} {path}: {status}");
+                }
+                let asks = operation["parameters"].is_array();
+                assert!(!asks || operation["responses"]["400"].is_object(), "{method} {path}: 400");
+            }
             let real = path
                 .replace("{id}", "t1")
                 .replace("{name}", "none")

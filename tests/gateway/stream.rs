@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use tokio_tungstenite::tungstenite::{self, Message};
 
 use crate::asking::{ARM, put_json};
-use crate::common::{self, Stack, wait};
+use crate::common::{self, Site, Stack, wait};
 
 #[test]
 fn the_stream_shows_the_state_at_the_asked_rate_and_takes_setpoints() {
@@ -109,6 +109,25 @@ fn who_breaks_the_protocol_is_closed_with_a_reason_and_who_loses_the_lease_is_to
     });
 }
 
+/// However often it is asked for: a client that draws each draws none twice.
+#[test]
+fn a_stream_faster_than_the_controller_sends_each_state_once() {
+    common::in_real_time(|| {
+        let stack = Stack::start_at(Site::new().with_a_fast_controller());
+        let url = format!("ws://127.0.0.1:{}/v1/thrusters/t1/stream?hz=500", stack.site.port);
+        let (mut socket, _) = tungstenite::connect(&url).unwrap();
+        let begun = Instant::now();
+        let (mut states, mut same) = (Vec::<String>::new(), 0);
+        while begun.elapsed() < Duration::from_secs(2) {
+            if let Message::Text(text) = socket.read().unwrap() {
+                same += u32::from(states.last().is_some_and(|last| *last == text.as_str()));
+                states.push(text.as_str().to_owned());
+            }
+        }
+        assert!(states.len() > 50 && same == 0, "{same} of {} twice", states.len());
+    });
+}
+
 /// Who closes is answered by a close of the same code, not by the end of the connection.
 #[test]
 fn a_close_is_answered() {
@@ -137,7 +156,7 @@ fn a_close_is_answered() {
 #[test]
 fn a_reader_that_paused_goes_on_with_the_newest_state() {
     common::in_real_time(|| {
-        let stack = Stack::start();
+        let stack = Stack::start_at(Site::new().with_a_fast_controller());
         for hz in [50, 500] {
             let url = format!("ws://127.0.0.1:{}/v1/thrusters/t1/stream?hz={hz}", stack.site.port);
             let (mut socket, _) = tungstenite::connect(&url).unwrap();

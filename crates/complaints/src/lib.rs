@@ -29,10 +29,71 @@ pub fn complaints<T: DeserializeOwned>(tree: Value) -> Vec<String> {
 
 /// The `T` of what is left once all that is wrong is taken out, as [`complaints`] tells it; none where a key that it needs is
 /// missing or wrong.
-pub fn read_with_all<T: DeserializeOwned>(mut tree: Value) -> (Option<T>, Vec<String>) {
+pub fn read_with_all<T: DeserializeOwned>(tree: Value) -> (Option<T>, Vec<String>) {
+    let read = as_far_as_it_goes(tree);
+    (read.value.filter(|_| read.whole), read.said)
+}
+
+/// A file as far as it can be read, and all that cannot be.
+pub struct Read<T> {
+    /// What is left, with something made up in the place of a key that it needs and that is missing or wrong. Whoever looks on for
+    /// what is wrong with its values asks [`Read::in_file`] which of that is true of the file.
+    pub value: Option<T>,
+    /// All that cannot be read, as [`complaints`] tells it.
+    pub said: Vec<String>,
+    /// Whether nothing that it needs is missing.
+    whole: bool,
+    /// Table and key of what is made up.
+    made_up: Vec<(String, String)>,
+    left: Left,
+}
+
+impl<T> Read<T> {
+    /// Whether something was made up for a key at the top.
+    pub fn made_up(&self, key: &str) -> bool {
+        self.made_up.iter().any(|(table, made_up)| table.is_empty() && made_up == key)
+    }
+
+    /// Words on a value, `` `segments[1].value` = … `` or `segments[1]: …`, by its place in the file; none if they may be due to
+    /// what is made up beside it, or to an entry that was left out.
+    pub fn in_file(&self, words: &str) -> Option<String> {
+        let quoted = words.strip_prefix('`');
+        let rest = quoted.unwrap_or(words);
+        let (key, behind) = rest.split_at(rest.find(if quoted.is_some() { '`' } else { ':' }).unwrap_or(0));
+        let key = self.left.file_place(key);
+        let within = |whole: &str| {
+            key == whole || key.strip_prefix(whole).is_some_and(|rest| rest.starts_with(['.', '[']))
+        };
+        let due = |(table, made_up): &(String, String)| {
+            if table.is_empty() { within(made_up) } else { within(table) }
+        };
+        let (table, last) = key.rsplit_once('.').unwrap_or(("", &key));
+        let doubtful = self.made_up.iter().any(due)
+            || self.left.entries.contains_key(&key)
+            || self.left.told(table, last);
+        (!doubtful).then(|| format!("{}{key}{behind}", if quoted.is_some() { "`" } else { "" }))
+    }
+}
+
+/// A `T` of what is left of a text's tree, and all that is wrong with the rest; the line where this is no TOML.
+pub fn text_as_far_as_it_goes<T: DeserializeOwned>(text: &str) -> Read<T> {
+    match text.parse() {
+        Ok(tree) => as_far_as_it_goes(Value::Table(tree)),
+        Err(error) => Read {
+            value: None,
+            said: vec![error.to_string().trim_end().to_owned()],
+            whole: false,
+            made_up: Vec::new(),
+            left: Left::default(),
+        },
+    }
+}
+
+/// The same of a tree.
+pub fn as_far_as_it_goes<T: DeserializeOwned>(mut tree: Value) -> Read<T> {
     let mut said = Vec::new();
     let mut left = Left::default();
-    let mut whole = true;
+    let (mut whole, mut made_up) = (true, Vec::new());
     while let Some(Complaint { path, found, words }) = complaint::<T>(&tree) {
         let place = left.place(&path);
         let missing = missing(&words);
@@ -40,7 +101,8 @@ pub fn read_with_all<T: DeserializeOwned>(mut tree: Value) -> (Option<T>, Vec<St
             said.push(told(&place, found.as_ref(), &words));
         }
         whole &= missing.is_none();
-        if missing.is_some_and(|key| filled::<T>(&mut tree, &path, key)) {
+        if let Some(key) = missing.filter(|key| filled::<T>(&mut tree, &path, key)) {
+            made_up.push((place, key.to_owned()));
             continue;
         }
         // Without a key that it needs a table can say no more.
@@ -48,8 +110,7 @@ pub fn read_with_all<T: DeserializeOwned>(mut tree: Value) -> (Option<T>, Vec<St
             break;
         }
     }
-    let read = if whole { tree.try_into().ok() } else { None };
-    (read, said)
+    Read { value: tree.try_into().ok(), said, whole, made_up, left }
 }
 
 /// The name that a word is a near spelling of; none where it is like no other.
@@ -110,6 +171,23 @@ impl Left {
                 format!("{place}[{at}]")
             }
         })
+    }
+
+    /// A place among what is left, `segments[1].value`, as it is in the file.
+    fn file_place(&self, place: &str) -> String {
+        let mut out = String::new();
+        for part in place.split_inclusive(']') {
+            let index = part.strip_suffix(']').and_then(|part| part.rsplit_once('['));
+            match index.and_then(|(list, at)| Some((list, at.parse::<usize>().ok()?))) {
+                Some((list, at)) => {
+                    out += list;
+                    let at = self.entries.get(&out).and_then(|left| left.get(at)).copied().unwrap_or(at);
+                    out += &format!("[{at}]");
+                }
+                None => out += part,
+            }
+        }
+        out
     }
 
     /// Whether a table lacks this key since it was taken out, or misspelt it.

@@ -95,6 +95,30 @@ fn every_switch_is_bumpless() {
     }
 }
 
+/// Thrust that has come to rest stays where it is through a switch, not only at its first tick.
+#[test]
+fn no_switch_lets_go_of_a_steady_thrust() {
+    for rig in rigs() {
+        let (servo, trimmed) = (LawKind::VelocityServo, LawKind::TrimmedModel2Inversion);
+        let pairs = LawKind::ALL.into_iter().flat_map(|law| [(servo, law), (law, trimmed)]);
+        for (from, to) in pairs {
+            let mut l = Loop::new(&rig, &ControllerConfig::with_law(from), 0.004);
+            let most = l.controller.model().thrust_max_n;
+            let thrust = Reference::Thrust(0.45 * most);
+            l.run(thrust, 4.0);
+            let before = l.thrust();
+            l.controller.configure(&ControllerConfig::with_law(to));
+            let mut off = 0.0_f64;
+            for _ in 0..150 {
+                l.tick(thrust);
+                off = off.max((l.thrust() - before).abs());
+            }
+            let who = format!("{} {} to {}", rig.name, from.name(), to.name());
+            assert!(off < 0.015 * most, "{who}: {off} of {most} off");
+        }
+    }
+}
+
 #[test]
 fn a_speed_reference_is_followed_under_every_law() {
     for rig in rigs() {

@@ -190,8 +190,14 @@ mod tests {
     fn verdicts_follow_from_the_posterior() {
         let usual = Circumstances::default();
         let left = Circumstances { left: 0.4, ..usual.clone() };
-        let thin = Circumstances { thin: Some(Thin { why: String::new(), still: false }), ..usual.clone() };
-        let still = Circumstances { thin: Some(Thin { why: String::new(), still: true }), ..usual.clone() };
+        let thin = Circumstances {
+            thin: Some(Thin { why: String::new(), still: false, of_the_log: false }),
+            ..usual.clone()
+        };
+        let still = Circumstances {
+            thin: Some(Thin { why: String::new(), still: true, of_the_log: false }),
+            ..usual.clone()
+        };
         let much = Circumstances { more_than_noise: true, ..usual.clone() };
         let one_point = Circumstances { steady: vec!["windage_drag"], ..thin.clone() };
         let broke_down = Circumstances { broke_down: true, ..usual.clone() };

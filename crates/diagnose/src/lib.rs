@@ -9,6 +9,7 @@ mod column;
 pub mod constants;
 pub mod decide;
 pub mod diagnose;
+mod differs;
 mod experiment;
 pub mod flexible;
 mod follows;

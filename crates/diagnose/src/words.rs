@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use kort_identify::fit::Fit;
 use kort_identify::scores::{self, ChannelReport, HeldOut, ParameterReport, parameters};
 use kort_identify::simulate::{Problem, Stack};
-use kort_thruster::effects::Descriptor;
+use kort_thruster::effects::{Descriptor, OF_THE_COMMAND};
+use kort_thruster::rig::AmplifierKind;
 
 use crate::choices::choices;
 use crate::flexible;
@@ -20,6 +21,17 @@ const STRAINED: f64 = 2.6;
 /// One sentence on an effect.
 pub fn statement(effect: &Descriptor) -> String {
     format!("The model leaves out {}: {}.", effect.id.replace('_', " "), effect.what)
+}
+
+/// Numbers of an effect with the unit that the rig's drive is told in, where they are in that of the command.
+pub fn in_units(mut values: Vec<ParameterReport>, drive: AmplifierKind) -> Vec<ParameterReport> {
+    let unit = match drive {
+        AmplifierKind::Current => "A",
+        AmplifierKind::Voltage => "V",
+        AmplifierKind::Speed => "rad/s",
+    };
+    values.iter_mut().filter(|p| p.unit == OF_THE_COMMAND).for_each(|p| p.unit = unit.into());
+    values
 }
 
 /// What speaks for an effect.
@@ -161,6 +173,8 @@ pub struct Told<'a> {
     pub alternatives: &'a [Alternative],
 }
 
+/// Standard deviations from which a mismatch that names might explain is real.
+const REAL_SIGMA: f64 = 3.0;
 /// From this probability on a name that is not stated cannot be excluded either.
 const POSSIBLE: f64 = 0.2;
 
@@ -231,8 +245,11 @@ pub fn summary(told: &Told) -> String {
             } else {
                 format!("no name is likely enough to be believed; nearest is {}", named(told.findings))
             };
+            let shows = |m: &Mismatch| m.significance_sigma >= REAL_SIGMA;
+            let real = told.findings.is_empty() || told.mismatch.first().is_none_or(shows);
+            let is = if real { "The mismatch is real" } else { "That something is missing is not sure" };
             let mut text = format!(
-                "The mismatch is real ({} path, most in {}, {}), and {explains}.",
+                "{is} ({} path, most in {}, {}), and {explains}.",
                 told.mismatch.first().map_or("?", |m| &m.path),
                 told.mismatch.first().map_or("?", |m| &m.channel),
                 told.mismatch.first().map_or("?", |m| &m.regime),

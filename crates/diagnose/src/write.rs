@@ -88,7 +88,7 @@ impl<'a, 'p> Writer<'a, 'p> {
     /// A fit taken further on the training rows, as residual on all.
     fn trained(&self, fit: &Fit) -> Stack {
         let trained = self.training.again(fit, TRAINING);
-        self.residual(&trained)
+        self.residual(if trained.ran_away() { fit } else { &trained })
     }
 
     fn score(&self, before: &Stack, after: &Stack) -> HeldOut {
@@ -243,9 +243,11 @@ impl<'a, 'p> Writer<'a, 'p> {
             parameters: scores::stated_parameters(self.baseline, &std_baseline),
             channels: scores::channels(problem, &self.held, &baseline_trained, &baseline_full, &self.floor),
         };
+        let misread = thin.as_ref().is_some_and(|thin| thin.of_the_log);
         let thin = thin.as_ref().map(|thin| thin.why.as_str());
         let open = Open::of(&decision, remainder.as_ref(), &mismatch, thin);
-        let next_experiment = experiment::next(self.search, &decision, &self.best, self.rig, open);
+        let next = || experiment::next(self.search, &decision, &self.best, self.rig, open);
+        let next_experiment = if misread { None } else { next() };
         let alternatives = self.alternatives(&decision, &circumstances.negligible, empty_cost);
         let summary = words::summary(&words::Told {
             verdict: decision.verdict,
@@ -314,6 +316,7 @@ impl<'a, 'p> Writer<'a, 'p> {
         let problem = self.problem;
         let slot = fit.hypothesis.effects.iter().position(|m| m.effect.id == named.effect);
         let values = parameters(fit, &problem.standard_errors(fit), slot);
+        let values = words::in_units(values, self.rig.amplifier.kind);
         let at_bound = values.iter().any(|p| p.at_bound == Some(true) && p.value != 0.0);
         let unconfirmed = heldout.interval_95[0] <= 0.0 || at_bound;
         let probability = if unconfirmed { named.probability.min(UNCONFIRMED) } else { named.probability };

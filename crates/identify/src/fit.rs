@@ -89,7 +89,12 @@ impl Fit {
 
     /// Whether the simulation broke down, or ran away.
     pub fn broke_down(&self) -> bool {
-        !self.cost().is_finite() || self.lines.amax() > RAN_AWAY
+        !self.cost().is_finite() || self.ran_away()
+    }
+
+    /// Whether the simulation ran away, whatever its numbers cost.
+    pub fn ran_away(&self) -> bool {
+        !self.lines.iter().all(|line| line.abs() <= RAN_AWAY)
     }
 
     /// The hypothesis, to start from where this fit ended.

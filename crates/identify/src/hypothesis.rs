@@ -16,11 +16,21 @@ use crate::data::{Prepared, Response};
 
 /// Relative uncertainty (two sigma) of a coefficient in a rig that states no tolerance at all.
 pub const UNSTATED_TOL: f64 = 0.5;
-
-/// Standard deviation over value beyond which a number is stated roughly: a straight line from it leads astray.
+/// The coefficients that are, then.
+const COEFFICIENTS: [P; 6] = [
+    P::LiftMax,
+    P::DragMax,
+    P::FluxCoefficient,
+    P::AddedMassCoefficient,
+    P::InertiaKgM2,
+    P::TorqueConstantNmA,
+];
+/// Standard deviation over value of what is stated roughly: a straight line from it leads astray.
 const ROUGH: f64 = 0.2;
 /// Rough numbers from which a fit is begun afar: a budget.
 const FELT: usize = 3;
+/// Least share of what is stated that a number can be which cannot be zero.
+const LEAST_SHARE: f64 = 0.02;
 /// How far a coefficient may move, in stated tolerances (two sigma each).
 const REACH: f64 = 1.5;
 
@@ -130,7 +140,8 @@ impl Member {
         };
         let Some(quantity) = self.stated.get(value) else { return catalogue };
         // How large it may be the rig says; which sign it has, the equation.
-        let (low, high) = reach(quantity, spec.low >= 0.0);
+        let least = if spec.low >= 0.0 { LEAST_SHARE * quantity.value } else { f64::NEG_INFINITY };
+        let (low, high) = reach(quantity, least);
         Free { stated: true, mean: quantity.value, sigma: quantity.sigma(), low, high, ..catalogue }
     }
 
@@ -252,12 +263,10 @@ fn stated(rig: &Rig, parameter: P, values: &Parameters) -> Option<Quantity> {
     }
 }
 
-/// From where to where a stated number may move; one that cannot be negative stays above zero.
-fn reach(stated: &Quantity, positive: bool) -> (f64, f64) {
+/// From where to where a stated number may move, and no further than to the `least` that it can be.
+fn reach(stated: &Quantity, least: f64) -> (f64, f64) {
     let reach = 2.0 * REACH * stated.sigma();
-    let low = stated.value - reach;
-    // No friction gives energy away.
-    (low.max(if positive { 0.02 * stated.value } else { 0.0 }), stated.value + reach)
+    ((stated.value - reach).max(least), stated.value + reach)
 }
 
 /// True when the rig gives no tolerance for any parameter: then coefficients are taken as
@@ -271,27 +280,18 @@ impl Hypothesis {
     pub fn baseline(model: ModelName, rig: &Rig, shaft_prescribed: bool, inputs: Arc<Inputs>) -> Self {
         let values = Parameters::stated(rig);
         let unstated = nothing_stated(rig);
-        let coefficient = |p: P| {
-            matches!(
-                p,
-                P::LiftMax
-                    | P::DragMax
-                    | P::FluxCoefficient
-                    | P::AddedMassCoefficient
-                    | P::InertiaKgM2
-                    | P::TorqueConstantNmA
-            )
-        };
         let (mut free, mut start) = (Vec::new(), Vec::new());
         for parameter in used(model, rig.propeller.is_none(), shaft_prescribed) {
             let Some(mut quantity) = stated(rig, parameter, &values) else { continue };
-            if unstated && coefficient(parameter) && quantity.tol.is_none() {
+            if unstated && COEFFICIENTS.contains(&parameter) && quantity.tol.is_none() {
                 quantity.tol = Some(UNSTATED_TOL);
             }
             if quantity.sigma() == 0.0 || !quantity.value.is_finite() {
                 continue;
             }
-            let (low, high) = reach(&quantity, parameter.positive());
+            // No friction gives energy away.
+            let least = if parameter.positive() { LEAST_SHARE * quantity.value } else { 0.0 };
+            let (low, high) = reach(&quantity, least);
             free.push(Free {
                 target: Target::Base(parameter),
                 name: parameter.name(),

@@ -18,6 +18,7 @@ pub mod identifiable;
 pub mod identify;
 mod lag_on_command;
 mod misread;
+mod mistaken;
 pub mod noise;
 mod over_the_top;
 mod quadratic;

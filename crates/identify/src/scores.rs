@@ -111,7 +111,7 @@ fn taken_as_given(member: &Member) -> Vec<ParameterReport> {
             unit: specs[j].unit.into(),
             std_error: 0.0,
             stated: None,
-            at_bound: None,
+            at_bound: Some(false),
         })
         .collect()
 }

@@ -29,19 +29,21 @@ pub struct Thin {
     pub why: String,
     /// Nothing moves at all, or nothing as the model does: what they show is the sensors' own, or comes from elsewhere.
     pub still: bool,
+    /// Something in the log is to be put right first; another run would show the same.
+    pub of_the_log: bool,
 }
 
 impl Thin {
     /// What is told of them follows no channel better than a shaft at rest does.
     pub fn unpredicted() -> Self {
         let why = "nothing that was recorded follows what drives: with all that would be told, no channel is followed better than by a thruster at rest. The log may be too slow for its command, or its columns may belong to different machines or times";
-        Self { why: why.into(), still: true }
+        Self { why: why.into(), still: true, of_the_log: false }
     }
 }
 
 /// Recordings without enough change to tell anything.
 pub fn too_thin(recordings: &[Prepared], rig: &Rig) -> Option<Thin> {
-    let thin = |why: String| Some(Thin { why, still: false });
+    let thin = |why: String| Some(Thin { why, still: false, of_the_log: false });
     let samples: usize = recordings.iter().map(|r| r.time_s.len()).sum();
     if samples < FEWEST_ROWS {
         return thin(format!("{samples} rows in all are too few to learn the noise and hold data out"));
@@ -52,7 +54,7 @@ pub fn too_thin(recordings: &[Prepared], rig: &Rig) -> Option<Thin> {
         let why = format!(
             "nothing moves: {driver} and what answers it show no more than sensors do at rest; record the thruster at work"
         );
-        return Some(Thin { why, still: true });
+        return Some(Thin { why, still: true, of_the_log: false });
     }
     if changes(recordings) < FEWEST_CHANGES {
         return thin(

@@ -121,6 +121,7 @@ pub fn tells_nothing(recordings: &[Prepared], rows: &[Vec<bool>]) -> Option<Thin
     (lost as f64 > NEARLY_ALL * f64::from(under_command)).then(|| Thin {
         why: "the command turns round faster than the log can follow: what drove the machine is not known. Log it at the control rate, or slow it down".into(),
         still: true,
+        of_the_log: false,
     })
 }
 

@@ -8,7 +8,7 @@ mod shipped;
 mod time;
 
 use std::collections::BTreeSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 use thiserror::Error;
@@ -163,6 +163,21 @@ impl From<MapError> for MapErrors {
     }
 }
 
+/// Name of a map, and what stands behind its colon.
+fn parted(wanted: &str) -> (&str, Option<&str>) {
+    match wanted.rsplit_once(':') {
+        Some((name, run)) if !Path::new(wanted).exists() && !name.is_empty() => (name, Some(run)),
+        _ => (wanted, None),
+    }
+}
+
+/// The file of a map by path or name, if there is one.
+fn file_of(name: &str) -> Option<PathBuf> {
+    let is_path = name.ends_with(".toml") || name.contains(['/', '\\']);
+    let path = if is_path { name.into() } else { Path::new("config/columns").join(format!("{name}.toml")) };
+    path.is_file().then_some(path)
+}
+
 impl ColumnMap {
     /// Finds a map: a path to a TOML file, or the name of one in `config/columns/` or of a shipped
     /// one. `NAME:VALUE` takes the run `VALUE` of a file that holds several; `NAME:KEY=VALUE,KEY=VALUE` says what
@@ -171,11 +186,7 @@ impl ColumnMap {
     /// # Errors
     /// No such map (naming the shipped ones), or all that is wrong with it.
     pub fn find(wanted: &str) -> Result<Self, MapErrors> {
-        let whole = Path::new(wanted);
-        let (name, run) = match wanted.rsplit_once(':') {
-            Some((name, run)) if !whole.exists() && !name.is_empty() => (name, Some(run)),
-            _ => (wanted, None),
-        };
+        let (name, run) = parted(wanted);
         let asked = Asked::parse(run.unwrap_or(""));
         let mut map = Self::load(name, &asked)?;
         if let Some(value) = asked.run() {
@@ -194,11 +205,13 @@ impl ColumnMap {
         Ok(map)
     }
 
+    /// The file that [`ColumnMap::find`] reads; none of a map that is built in, or not there.
+    pub fn file(wanted: &str) -> Option<PathBuf> {
+        file_of(parted(wanted).0)
+    }
+
     fn load(name: &str, asked: &Asked) -> Result<Self, MapErrors> {
-        let in_config = Path::new("config/columns").join(format!("{name}.toml"));
-        let is_path = name.ends_with(".toml") || name.contains(['/', '\\']);
-        let path = if is_path { Path::new(name) } else { in_config.as_path() };
-        if path.is_file() {
+        if let Some(path) = file_of(name) {
             let text = std::fs::read_to_string(path)
                 .map_err(|e| fail(name, format!("cannot be read: {e}"), "check the path"))?;
             return read::map(name, &text, Some(asked));

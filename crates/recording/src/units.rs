@@ -63,6 +63,7 @@ pub const UNITS: &[Unit] = &[
     unit("deg/s", "deg_s", "rad/s", DEGREE),
     unit("rev/s", "rev_s", "rad/s", TURN),
     unit("rpm", "rpm", "rad/s", TURN / 60.0),
+    unit("krpm", "krpm", "rad/s", TURN / 60.0 * 1e3),
     unit("rad/s^2", "rad_s2", "rad/s^2", 1.0),
     unit("C", "c", "C", 1.0),
     Unit { symbol: "K", suffix: "k", si: "C", factor: 1.0, offset: -273.15 },

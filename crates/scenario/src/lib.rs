@@ -238,6 +238,16 @@ impl Scenario {
         place::from_toml_with_all(text).map_err(syntax)
     }
 
+    /// A scenario as far as its text can be read, and all that is wrong with it, whatever the rig: `more` looks at what [`Self::check`]
+    /// does not. Nothing where it is sound.
+    pub fn all_wrong(text: &str, more: impl Fn(&Self) -> Vec<ScenarioError>) -> Vec<String> {
+        let mut read = place::text_as_far_as_it_goes::<Self>(text);
+        let scenario = read.value.take();
+        let values = scenario.iter().flat_map(|scenario| [scenario.check(), more(scenario)].concat());
+        let values: Vec<String> = values.filter_map(|error| read.in_file(&error.to_string())).collect();
+        syntax(read.said).iter().map(ToString::to_string).chain(values).collect()
+    }
+
     /// Reads a scenario file as people have it: TOML, JSON, or the JSON report of a diagnosis, whose next experiment it
     /// is then.
     ///

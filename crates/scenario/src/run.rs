@@ -242,9 +242,15 @@ pub fn scale(rig: &Rig, p: &Parameters, peak: f64, tick_s: f64, duration_s: f64)
             let a = r * cq / kt;
             let speed =
                 if a > 0.0 { ((kt * kt + 4.0 * a * peak).sqrt() - kt) / (2.0 * a) } else { peak / kt };
-            ((cq * speed * speed / kt).min(limit), speed)
+            // Out of the water current flows while the shaft is brought to speed: at first as much as at a stall.
+            let current = if cq > 0.0 || r <= 0.0 { cq * speed * speed / kt } else { peak / r };
+            (current.min(limit), speed)
         }
-        AmplifierKind::Speed => (cq * peak * peak / kt, peak),
+        AmplifierKind::Speed if cq > 0.0 => (cq * peak * peak / kt, peak),
+        AmplifierKind::Speed => {
+            let within_s = 0.1;
+            ((p.get(Parameter::InertiaKgM2) * peak / within_s / kt).min(limit), peak)
+        }
     };
     let thrust = ct * speed * speed;
     let flux = p.get(Parameter::FluxCoefficient) * p.get(Parameter::DensityKgM3) * p.area_m2();

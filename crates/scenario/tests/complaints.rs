@@ -89,6 +89,28 @@ fn all_values_that_cannot_be_meant_are_told() {
     assert_eq!(Scenario::from_toml(HEAD).unwrap().check(), []);
 }
 
+/// What cannot be read hides neither the values that cannot be meant nor their places; what was made up to read on is no fault.
+#[test]
+fn values_are_told_beside_what_cannot_be_read() {
+    let text = format!(
+        "noise = -1\nsede = 3\n{HEAD}[[segments]]\nkind = \"stairs\"\nvalue = 1\n[[segments]]\nkind = \"hold\"\nvalue = 1\nduration_s = -2\n\
+         [[segments]]\nkind = \"steps\"\neach_s = \"x\"\nvalues = []\n[turbulence]\nsigma_m_s = -1\n"
+    );
+    let said = Scenario::all_wrong(&text, |_| Vec::new());
+    for words in [
+        "`noise` = -1 is outside",
+        "`sede` = 3: unknown field",
+        "`segments[1].kind` = \"stairs\"",
+        "`segments[2].duration_s` = -2 is outside",
+        "`segments[3].each_s` = \"x\"",
+        "`turbulence`: missing field `time_constant_s`",
+    ] {
+        assert_eq!(said.iter().filter(|line| line.starts_with(words)).count(), 1, "{words} in {said:#?}");
+    }
+    assert_eq!(said.len(), 6, "{said:#?}");
+    assert_eq!(Scenario::all_wrong(HEAD, |_| Vec::new()), Vec::<String>::new());
+}
+
 /// Of a table that lacks several keys all are told.
 #[test]
 fn every_key_that_is_missing_is_told() {

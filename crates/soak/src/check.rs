@@ -1,14 +1,14 @@
 //! Checks of a scenario's values: each message names the key, the value and what is allowed.
 
-use crate::scenario::{Channel, Lie, Scenario, Segment};
+use crate::scenario::{Channel, LONGEST_S, Lie, Scenario, Segment};
 
 impl Scenario {
     /// All values that cannot be meant.
     pub(crate) fn check(&self) -> Vec<String> {
         let mut wrong = Wrong::default();
-        wrong.within("duration_s", self.duration_s, 1.0, 31.0 * 86_400.0, "seconds: 3600 for an hour");
+        wrong.within("duration_s", self.duration_s, 1.0, LONGEST_S, "seconds: 3600 for an hour");
         // What must lie within the run is told once there is one.
-        let run_s = if wrong.0.is_empty() { self.duration_s } else { f64::INFINITY };
+        let run_s = if wrong.said.is_empty() { self.duration_s } else { f64::INFINITY };
         wrong.within("settle_s", self.settle_s, 0.0, 0.9 * run_s, "shorter than the run");
         wrong.within("control_rate_hz", self.control_rate_hz, 50.0, 10_000.0, "1000 is usual");
         wrong.within("seeds", f64::from(self.seeds), 1.0, 1000.0, "4 gives a first interval");
@@ -29,17 +29,22 @@ impl Scenario {
             let hint = "what is scored must come after the last [[truth.change]], with time to adapt";
             wrong.within("settle_s", self.settle_s, last, 0.9 * run_s, hint);
         }
+        if self.rig == std::path::Path::new("") {
+            wrong.say("`rig` = \"\" names no rig\nhint: rig = \"../thrusters/t200.toml\", relative to the scenario's file");
+        }
         if self.controllers.is_empty() {
             wrong.say(
                 "`controllers` is empty\nhint: controllers = [\"velocity_servo\", \"model2_inversion\"]",
             );
         }
         if self.references.is_empty() {
-            wrong.say("there is no [[reference]]\nhint: [[reference]] with kind = \"steps\", levels = [0.5, -0.5], hold_s = 3");
+            wrong.say("`reference` is missing: nothing is asked for\nhint: [[reference]] with kind = \"steps\", levels = [0.5, -0.5], hold_s = 3");
         }
-        for segment in &self.references {
+        for (at, segment) in self.references.iter().enumerate() {
+            wrong.within_table = format!("reference[{at}].");
             segment.check(&mut wrong);
         }
+        wrong.within_table.clear();
         for (name, factor) in
             self.truth.factors.iter().chain(self.truth.change.iter().flat_map(|c| &c.factors))
         {
@@ -98,19 +103,32 @@ impl Scenario {
             hidden.check().into_iter().for_each(|words| wrong.say(&words));
         }
         self.check_events(run_s, &mut wrong);
-        wrong.0
+        wrong.said
     }
 
     /// What happens at a time, for a while, again and again.
     fn check_events(&self, run_s: f64, wrong: &mut Wrong) {
-        for change in &self.truth.change {
-            wrong.within("truth.change.at_s", change.at_s, 0.0, run_s, "seconds, within duration_s");
+        for (at, change) in self.truth.change.iter().enumerate() {
+            wrong.within(
+                &format!("truth.change[{at}].at_s"),
+                change.at_s,
+                0.0,
+                run_s,
+                "seconds, within duration_s",
+            );
         }
-        for sag in &self.supply_sags {
-            wrong.spell("supply_sag", run_s, (sag.at_s, sag.for_s, sag.every_s));
-            wrong.within("supply_sag.to", sag.to, 0.0, 1.0, "share of the nominal supply: 0.8");
+        for (at, sag) in self.supply_sags.iter().enumerate() {
+            wrong.spell(&format!("supply_sag[{at}]"), run_s, (sag.at_s, sag.for_s, sag.every_s));
+            wrong.within(
+                &format!("supply_sag[{at}].to"),
+                sag.to,
+                0.0,
+                1.0,
+                "share of the nominal supply: 0.8",
+            );
         }
-        for fault in &self.sensor_faults {
+        for (at, fault) in self.sensor_faults.iter().enumerate() {
+            let what = format!("sensor_fault[{at}]");
             let fitted = match fault.channel {
                 Channel::ShaftSpeedRadS => None,
                 Channel::CurrentA => Some(("current_a", "current", self.sensors.current)),
@@ -119,14 +137,16 @@ impl Scenario {
             };
             if let Some((channel, key, false)) = fitted {
                 wrong.say(&format!(
-                    "`sensor_fault.channel` = \"{channel}\", but `sensors.{key}` = false: what is not fitted cannot fail\nhint: take the fault away, or fit the sensor"
+                    "`{what}.channel` = \"{channel}\", but `sensors.{key}` = false: what is not fitted cannot fail\nhint: take the fault away, or fit the sensor"
                 ));
             }
-            wrong.spell("sensor_fault", run_s, (fault.at_s, fault.for_s, fault.every_s));
+            wrong.spell(&what, run_s, (fault.at_s, fault.for_s, fault.every_s));
             let hint = match fault.lie {
                 Lie::Dropout | Lie::Stuck if fault.size.is_none() => continue,
                 Lie::Dropout | Lie::Stuck => {
-                    wrong.say("`sensor_fault.size` means nothing for a dropout or a stuck sensor\nhint: leave it out");
+                    wrong.say(&format!(
+                        "`{what}.size` means nothing for a dropout or a stuck sensor\nhint: leave it out"
+                    ));
                     continue;
                 }
                 Lie::Bias => "what is added, share of full scale: 0.1",
@@ -134,30 +154,35 @@ impl Scenario {
                 Lie::Gain => "what the value is multiplied by: 1.2",
             };
             match fault.size {
-                Some(size) => wrong.within("sensor_fault.size", size, -10.0, 10.0, hint),
-                None => {
-                    wrong.say(&format!("`sensor_fault.size` is missing: this lie has a size\nhint: {hint}"))
-                }
+                Some(size) => wrong.within(&format!("{what}.size"), size, -10.0, 10.0, hint),
+                None => wrong.say(&format!("`{what}.size` is missing: this lie has a size\nhint: {hint}")),
             }
         }
-        for fault in &self.process_faults {
-            wrong.spell("process_fault", run_s, (fault.at_s, fault.for_s, fault.every_s));
+        for (at, fault) in self.process_faults.iter().enumerate() {
+            wrong.spell(&format!("process_fault[{at}]"), run_s, (fault.at_s, fault.for_s, fault.every_s));
         }
     }
 }
 
 /// What is wrong with a scenario's values.
 #[derive(Default)]
-struct Wrong(Vec<String>);
+struct Wrong {
+    said: Vec<String>,
+    /// Stands before each key.
+    within_table: String,
+}
 
 impl Wrong {
     fn say(&mut self, words: &str) {
-        self.0.push(words.to_owned());
+        self.said.push(words.to_owned());
     }
 
     fn within(&mut self, key: &str, value: f64, low: f64, high: f64, hint: &str) {
         if !(value >= low && value <= high) {
-            self.say(&format!("`{key}` = {value} is outside what is allowed: {low} to {high}\nhint: {hint}"));
+            let table = &self.within_table;
+            self.say(&format!(
+                "`{table}{key}` = {value} is outside what is allowed: {low} to {high}\nhint: {hint}"
+            ));
         }
     }
 
@@ -178,10 +203,13 @@ impl Segment {
         match self {
             Self::Steps { levels, hold_s, ramp_s } => {
                 if levels.is_empty() {
-                    wrong.say("`levels` of steps is empty\nhint: levels = [0.5, -0.5]");
+                    let table = &wrong.within_table;
+                    wrong.say(&format!("`{table}levels` is empty\nhint: levels = [0.5, -0.5]"));
                 }
                 wrong.within("hold_s", *hold_s, 0.01, 1e6, "seconds");
-                wrong.within("ramp_s", *ramp_s, 0.0, *hold_s, "seconds, at most hold_s");
+                // A hold that cannot be meant is no bound.
+                let longest = if *hold_s > 0.0 { *hold_s } else { 1e6 };
+                wrong.within("ramp_s", *ramp_s, 0.0, longest, "seconds, at most hold_s");
                 levels.iter().for_each(|l| wrong.within("levels", *l, -1.0, 1.0, share));
             }
             Self::Sine { amplitude, offset, period_s, for_s } => {
@@ -202,7 +230,8 @@ impl Segment {
             }
             Self::Replay { peak: Some(peak), .. } => wrong.within("peak", *peak, 0.0, 1.0, share),
             Self::Replay { column, .. } if !column.ends_with("_n") => wrong.say(&format!(
-                "`column` = \"{column}\" of a replay is not in newtons and has no `peak`\nhint: peak = 0.8 stretches it to 0.8 of the largest thrust"
+                "`{}column` = \"{column}\" of a replay is not in newtons and has no `peak`\nhint: peak = 0.8 stretches it to 0.8 of the largest thrust",
+                wrong.within_table
             )),
             Self::Replay { .. } => {}
         }

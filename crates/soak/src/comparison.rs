@@ -48,7 +48,8 @@ impl LawResult {
         let values: Option<Vec<f64>> =
             self.by_seed.iter().zip(&to.by_seed).map(|(a, b)| Some(a.get(score)? / b.get(score)?)).collect();
         let ratio = summarise_ratios(&values.filter(|v| !v.is_empty())?);
-        [ratio.mean, ratio.ci95[0], ratio.ci95[1]].iter().all(|x| x.is_finite()).then_some(ratio)
+        let [low, high] = ratio.ends();
+        [ratio.mean, low, high].iter().all(|x| x.is_finite()).then_some(ratio)
     }
 
     /// A score by name.

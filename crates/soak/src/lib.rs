@@ -16,6 +16,7 @@ mod faults;
 pub mod hidden;
 pub mod limits;
 mod log;
+mod read;
 mod reference;
 mod run;
 mod scenario;

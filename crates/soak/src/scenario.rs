@@ -9,13 +9,15 @@ use std::path::PathBuf;
 
 use kort_thruster::models::ModelName;
 use kort_thruster::parameters::Parameter;
-use kort_thruster::place;
 use serde::Deserialize;
 
 use crate::hidden::Hidden;
 
 /// A default law is never worse than the plain one by more than this factor.
 pub const NEVER_WORSE: f64 = 1.02;
+
+/// Longest run, s.
+pub(crate) const LONGEST_S: f64 = 31.0 * 86_400.0;
 
 /// A scenario as written.
 #[derive(Clone, Debug, Deserialize)]
@@ -366,19 +368,6 @@ pub fn is_on(at_s: f64, for_s: f64, every_s: Option<f64>, time_s: f64) -> bool {
 }
 
 impl Scenario {
-    /// A scenario from its text, checked.
-    ///
-    /// # Errors
-    /// All that is wrong: what cannot be read, else the values that cannot be meant. Each names the key, the value and what
-    /// is allowed, with a hint.
-    pub fn from_toml(text: &str) -> Result<Self, Vec<String>> {
-        let hinted = |said: String| format!("{said}\nhint: docs/control.md lists every key");
-        let scenario: Self = place::from_toml_with_all(text)
-            .map_err(|said| said.into_iter().map(hinted).collect::<Vec<_>>())?;
-        let wrong = scenario.check();
-        if wrong.is_empty() { Ok(scenario) } else { Err(wrong) }
-    }
-
     /// Virtual time that one law takes with one seed, s.
     pub fn virtual_s(&self) -> f64 {
         self.duration_s * if self.against_true_parameters { 2.0 } else { 1.0 }

@@ -10,10 +10,9 @@ use crate::summary::Score;
 const RECOVERED: f64 = 1.2;
 
 fn interval(s: Score) -> String {
-    if s.ci95[0] == s.ci95[1] {
-        format!("{:.3}", s.mean)
-    } else {
-        format!("{:.3} ({:.3} to {:.3})", s.mean, s.ci95[0], s.ci95[1])
+    match s.ci95 {
+        Some([low, high]) if low != high => format!("{:.3} ({low:.3} to {high:.3})", s.mean),
+        _ => format!("{:.3}", s.mean),
     }
 }
 
@@ -26,7 +25,7 @@ pub(crate) fn verdict(laws: &[LawResult]) -> String {
     let mut words = format!(
         "{} has the least thrust error: {} N RMS",
         best.name,
-        interval(best.score("thrust_rms_n").unwrap_or(Score { mean: 0.0, ci95: [0.0; 2] }))
+        interval(best.score("thrust_rms_n").unwrap_or(Score { mean: 0.0, ci95: None }))
     );
     let plain = laws.iter().find(|l| l.name == PLAIN);
     if let Some(plain) = plain.filter(|p| p.name != best.name) {
@@ -57,7 +56,7 @@ pub(crate) fn verdict(laws: &[LawResult]) -> String {
                 ". Next is {} at {:.3} of it; one seed gives no interval, so how sure this is cannot be said",
                 next.name, lead.mean
             );
-        } else if lead.ci95[0] > 1.0 {
+        } else if lead.ends()[0] > 1.0 {
             let _ = write!(
                 words,
                 ". Next is {} at {} of it: the order is beyond the doubt of {} seeds",
@@ -101,13 +100,13 @@ fn why_more_energy(best: &LawResult, plain: &LawResult) -> String {
     else {
         return String::new();
     };
-    if energy.ci95[0] <= 1.0 {
+    if energy.ends()[0] <= 1.0 {
         return String::new();
     }
     // Within a hundredth is the same: one seed has no interval.
-    let efficiency = if ideal.ci95[1] < 0.99 {
+    let efficiency = if ideal.ends()[1] < 0.99 {
         "better"
-    } else if ideal.ci95[0] <= 1.01 {
+    } else if ideal.ends()[0] <= 1.01 {
         "the same"
     } else {
         "worse"

@@ -37,6 +37,11 @@ impl Slew {
         self.value
     }
 
+    /// Goes on from another value of the same kind: something else led it there.
+    pub fn goes_on_from(&mut self, value: f64) {
+        self.value = value;
+    }
+
     /// The setpoint to act on now, and whether it still moves. `full` is the largest of its kind; `from` where
     /// the thruster is, from which another kind of setpoint starts.
     pub fn step(

@@ -13,6 +13,8 @@ use proptest::prelude::*;
 
 use crate::tick::Tick;
 
+mod retaken;
+
 const PERIOD: u64 = 4_000_000;
 const START: u64 = 1_000_000_000;
 const RIG: &str = include_str!("../../../config/thrusters/whitcomb-yoerger-1999.toml");

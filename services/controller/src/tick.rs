@@ -14,17 +14,14 @@ mod end;
 mod request;
 mod revision;
 mod state;
+use end::Ending;
 pub use revision::Revision;
 
-/// After the lease's end the setpoint falls to zero in this time, then the servo is stopped: all
-/// within 500 ms.
-const LEASE_RAMP_NS: u64 = 400_000_000;
 /// Silent controller periods after which a peer counts as lost.
 const GATEWAY_PERIODS: u64 = 3;
 /// A gateway may be silent this long before the setpoint is ramped down: it serves a network, and a hiccup of
 /// it is no reason to stop. With a shorter ramp all is over within 500 ms of its last word, at 50 Hz too.
 const GATEWAY_SILENCE_NS: u64 = 100_000_000;
-const GATEWAY_RAMP_NS: u64 = 300_000_000;
 const SERVO_PERIODS: u64 = 10;
 /// A reading stands that long for what its sensor would say: the slow ones are read at 20 Hz. After
 /// that the value is not measured, and laws and observers go on without it.
@@ -44,6 +41,8 @@ pub struct Tick {
     servo: Freshness,
     servo_stamp_ns: u64,
     lease_until_ns: u64,
+    /// Generation of the newest message, accepted or not.
+    asked: u64,
     setpoint: Option<Accepted>,
     ending: Option<Ending>,
     slew: Slew,
@@ -66,17 +65,6 @@ pub struct Tick {
     in_force: f64,
     /// Until when somebody else commands the servo, on CLOCK_MONOTONIC, ns.
     aside_until_ns: u64,
-}
-
-/// The setpoint goes to zero, and why.
-#[derive(Clone, Copy, Debug)]
-struct Ending {
-    /// When it began, on CLOCK_MONOTONIC, ns.
-    since_ns: u64,
-    /// Fault to latch when zero is reached; none for a lease that ended.
-    cause: Option<Fault>,
-    /// At zero the law goes on holding it, until somebody disarms: the service is about to end.
-    hold: bool,
 }
 
 /// A setpoint that counts.
@@ -111,6 +99,7 @@ impl Tick {
             servo: Freshness::default(),
             servo_stamp_ns: 0,
             lease_until_ns: 0,
+            asked: 0,
             setpoint: None,
             ending: None,
             slew: Slew::default(),
@@ -192,16 +181,17 @@ impl Tick {
         }
         self.gateway_stamp_ns = message.header.stamp_ns;
         self.lease_until_ns = message.lease_until_ns;
-        // Only a setpoint given under a living lease, after the arming, before any end of lease.
+        self.asked = message.generation;
+        let kind = SetpointKind::from_u32(message.kind);
+        // Only a setpoint given under a living lease, after the arming.
         let counts = self.armed
-            && self.ending.is_none()
+            && self.ending.is_none_or(|ending| ending.gives_way_to(kind))
             && message.given_at_ns > self.armed_at_ns
             && message.given_at_ns <= message.header.stamp_ns
             && now_ns < message.lease_until_ns;
         if !counts || self.setpoint.is_some_and(|s| s.generation == message.generation) {
             return;
         }
-        let kind = SetpointKind::from_u32(message.kind);
         let model = self.controller.model();
         let largest = match kind {
             Some(SetpointKind::Thrust) => model.thrust_max_n * (1.0 + 1e-9),
@@ -214,6 +204,7 @@ impl Tick {
         match kind {
             Some(kind) if value.is_finite() && value.abs() <= largest => {
                 let session = message.header.session;
+                self.end_ramp();
                 self.setpoint = Some(Accepted { kind, value, session, generation: message.generation });
             }
             _ => {
@@ -285,17 +276,13 @@ impl Tick {
         }
         let mut share = 1.0;
         if let Some(ending) = self.ending {
-            let since = now_ns.saturating_sub(ending.since_ns);
             let nothing = self.setpoint.is_none_or(|s| s.value == 0.0);
-            let ramp_ns = if ending.cause.is_some() { GATEWAY_RAMP_NS } else { LEASE_RAMP_NS };
-            if !ending.hold && (nothing || since >= ramp_ns) {
-                if let Some(fault) = ending.cause {
-                    self.trip(fault);
-                }
-                return (Reference::Off, true);
+            if !ending.hold && (nothing || ending.is_over(now_ns)) {
+                let stop = self.end_over(ending.cause, now_ns);
+                return (Reference::Off, stop);
             }
             self.limits |= Limit::LeaseRamp.bit();
-            share = (1.0 - since as f64 / ramp_ns as f64).max(0.0);
+            share = ending.share(now_ns);
         }
         let Some(setpoint) = self.setpoint else {
             self.slew.reset();
@@ -331,14 +318,6 @@ impl Tick {
             self.limits |= Limit::SetpointRise.bit();
         }
         value
-    }
-
-    /// Lets the setpoint end; the first reason stays, but a fault is not forgotten for a lease that ends too.
-    fn end(&mut self, now_ns: u64, cause: Option<Fault>) {
-        match &mut self.ending {
-            Some(ending) => ending.cause = ending.cause.or(cause.filter(|_| !ending.hold)),
-            None => self.ending = Some(Ending { since_ns: now_ns, cause, hold: false }),
-        }
     }
 
     /// The law with its observer and estimator.

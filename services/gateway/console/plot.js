@@ -96,10 +96,13 @@ function bridge(t, values) {
   return line;
 }
 // Two runs over the instants of both, and B − A.
+// The sides of an estimate's standard error: their difference is that of two values and of two doubts, and says neither.
+const isSide = (name) => /_(low|high)$/.test(name);
 function side(a, b) {
   const t = [...new Set([...a.t, ...b.t])].sort((x, y) => x - y), lines = { a: a.over(t), b: b.over(t), less: new Columns() };
   lines.less.t = t;
   for (const [name] of SIGNALS) {
+    if (isSide(name)) { lines.less.c[name] = t.map(() => null); continue; }
     const mine = lines.a.of(name);
     lines.less.c[name] = lines.b.of(name).map((v, k) => (v === null || mine[k] === null ? null : v - mine[k]));
   }
@@ -240,7 +243,7 @@ class Chart {
     const shown = `${names}|${both}|${difference}`;
     if (this.shown !== shown) {
       this.signals.forEach(([name, , label], i) => {
-        const on = shownSignals.has(name);
+        const on = shownSignals.has(name) && !(difference && isSide(name));
         this.plot.setSeries(i + 1, { show: on && !difference }, false);
         this.plot.setSeries(i + 1 + this.signals.length, { show: on && both }, false);
         this.plot.series[i + 1 + this.signals.length].dash = difference ? [] : SECOND_DASH; // alone it needs no dash

@@ -99,10 +99,10 @@ function namedBy(from_s) {
 }
 function tableOf({ a, b, difference, less }, from_s, to_s) {
   const names = SIGNALS.map(([name]) => name).filter((name) => shownSignals.has(name));
-  const parts = [["", a], ...(b ? [["b_", b]] : []), ...(difference ? [["difference_", less]] : [])];
-  const rows = [["time_s", ...parts.flatMap(([before]) => names.map((name) => `${before}${name}`))].join(",")];
+  const parts = [["", a, names], ...(b ? [["b_", b, names]] : []), ...(difference ? [["difference_", less, names.filter((name) => !isSide(name))]] : [])];
+  const rows = [["time_s", ...parts.flatMap(([before, , theirs]) => theirs.map((name) => `${before}${name}`))].join(",")];
   for (let i = lowerBound(a.t, from_s); i < a.t.length && a.t[i] <= to_s; i += 1) {
-    rows.push([a.t[i], ...parts.flatMap(([, of]) => names.map((name) => of.of(name)[i]))].map((v) => v ?? "").join(","));
+    rows.push([a.t[i], ...parts.flatMap(([, of, theirs]) => theirs.map((name) => of.of(name)[i]))].map((v) => v ?? "").join(","));
   }
   return `${rows.join("\n")}\n`;
 }
@@ -123,7 +123,7 @@ function pictureOf({ b, difference }, from_s, to_s) {
   const font = `${13 * scale}px system-ui, sans-serif`, shown = charts.filter((chart) => !chart.figure.hidden && chart.plot);
   pen.font = font;
   const parts = shown.map((chart) => {
-    const { canvas } = chart.plot.ctx, signals = chart.signals.filter((signal) => shownSignals.has(signal[0]));
+    const { canvas } = chart.plot.ctx, signals = chart.signals.filter(([name]) => shownSignals.has(name) && !(difference && isSide(name)));
     const words = inLines(pen, [[`${chart.title} [${chart.unit}]${of}`, "--ink"], ...signals.flatMap(([, , label, hue]) => [...(difference ? [] : [[label, hue]]), ...(b ? [[`${label}, ${difference ? "B − A" : "B"}`, `${hue}-b`]] : [])])], canvas.width, 6 * scale, 12 * scale);
     return { canvas, words, above: (words.at(-1)[3] + 1) * line + 4 * scale };
   });

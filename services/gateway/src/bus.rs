@@ -121,6 +121,8 @@ struct Bridge {
     /// And before it was ramped down: a lost gateway's stop begins there.
     before_ramp: Option<Before>,
     ramping: bool,
+    /// When it was last heard ramped down.
+    ramped: Option<Instant>,
     /// As the servo said last, and whether somebody asked since the arming for its end.
     armed: bool,
     disarm_asked: bool,
@@ -146,6 +148,7 @@ impl Bridge {
             before: None,
             before_ramp: None,
             ramping: false,
+            ramped: None,
             armed: false,
             disarm_asked: false,
             errands_until: None,
@@ -265,6 +268,7 @@ impl Bridge {
         if let Some(state) = &state {
             self.link.tally.controller(state);
             self.ramping = state.limits & Limit::LeaseRamp.bit() != 0;
+            self.ramped = if self.ramping { Some(now) } else { self.ramped };
             self.tell_tripped(1, state.faults);
             self.tell_mismatch(state);
             if let Some(telemetry) = &last {

@@ -116,14 +116,22 @@ impl Desk {
         Ok(lease)
     }
 
+    /// Is this the lease in force? One whose time is over ends first, with its setpoint.
+    pub fn check(&mut self, id: Option<&str>, now: Instant) -> Result<(), Problem> {
+        self.expire(now);
+        self.lease.check(&self.thruster, id, now)
+    }
+
     /// Renews the lease.
     pub fn renew(&mut self, id: Option<&str>, now: Instant) -> Result<Lease, Problem> {
+        self.expire(now);
         self.version += 1;
         self.lease.renew(&self.thruster, id, now)
     }
 
     /// Gives command up: at rest. `token` is what it was asked with, here and below.
     pub fn give(&mut self, token: &str, id: Option<&str>, now: Instant) -> Result<(), Problem> {
+        self.expire(now);
         let By { who, words } = self.lease.by(token, id);
         self.lease.give(&self.thruster, id, now)?;
         self.version += 1;
@@ -168,7 +176,7 @@ impl Desk {
         if self.lease.current(now).is_none() && id.is_none() {
             return Ok(());
         }
-        self.lease.check(&self.thruster, id, now)
+        self.check(id, now)
     }
 
     /// A change was made by the lease's holder: it lives on.
@@ -317,6 +325,26 @@ mod tests {
     }
 
     const RANGE: SetpointRange = SetpointRange { thrust_n: 200.0, speed_rad_s: 120.0 };
+
+    /// Whoever looks first after its end, the bus or a command: the old setpoint must not wait for the next lease.
+    #[test]
+    fn a_command_that_comes_too_late_ends_the_setpoint_too() {
+        type Late = fn(&mut Desk, &str, Instant);
+        let late: [Late; 4] = [
+            |desk, id, t| drop(desk.check(Some(id), t).unwrap_err()),
+            |desk, id, t| drop(desk.renew(Some(id), t).unwrap_err()),
+            |desk, id, t| drop(desk.give("local", Some(id), t).unwrap_err()),
+            |desk, id, t| drop(desk.command("local", Some(id), Setpoint::ThrustN(30.0), t).unwrap_err()),
+        ];
+        for late in late {
+            let (mut desk, t0) = (Desk::new("t1"), Instant::now());
+            let lease = desk.take(&wants("bench"), t0).unwrap();
+            desk.command("local", Some(&lease.id), Setpoint::ThrustN(25.0), t0).unwrap();
+            late(&mut desk, &lease.id, t0 + Duration::from_millis(500));
+            assert_eq!(desk.setpoint(), None);
+            assert!(desk.notes().iter().any(|note| note.kind == EventKind::LeaseExpired));
+        }
+    }
 
     #[test]
     fn a_setpoint_ends_with_its_lease() {

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use utoipa::ToSchema;
 
+use crate::thin::Due;
 use crate::view::ParameterEstimate;
 
 /// Estimates over time.
@@ -164,10 +165,9 @@ impl KeptEstimates {
 
     /// Those from an instant on, so many a second at most.
     pub fn since(&self, from_ns: u64, hz: f64) -> Estimates {
-        let (mut all, mut next_ns) = (Estimates::default(), from_ns);
+        let (mut all, mut due) = (Estimates::default(), Due::new(hz));
         for (time_ns, names, values) in &self.rows {
-            if *time_ns >= next_ns {
-                next_ns = time_ns + (0.9e9 / hz) as u64;
+            if *time_ns >= from_ns && due.is(*time_ns) {
                 let finite = |value: &f32| Some(f64::from(*value)).filter(|value| value.is_finite());
                 all.push(*time_ns as f64 * 1e-9, names, values.iter().map(finite));
             }

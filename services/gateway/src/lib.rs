@@ -201,6 +201,9 @@ async fn serve(
     for rig in &app.rigs {
         tokio::spawn(Arc::clone(rig).keep_in_force());
     }
+    for thruster in &app.thrusters {
+        tokio::spawn(Arc::clone(thruster).keep_law());
+    }
 
     #[cfg(feature = "foxglove")]
     if let Some(bind) = settings.foxglove {

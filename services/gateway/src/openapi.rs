@@ -75,12 +75,22 @@ fn secure(document: &mut OpenApi, app: &App) {
     for (path, item) in &mut document.paths.paths {
         let open = crate::gate::is_open(path);
         for operation in operations(item) {
+            let has_parameters =
+                !open || operation.parameters.as_ref().is_some_and(|parameters| !parameters.is_empty());
             let answers = &mut operation.responses.responses;
             let mut add = |status: &str, words: &str| {
                 answers.entry(status.into()).or_insert_with(|| refusal(words).into());
             };
             add("421", "`foreign-host`: header Host names no gateway we know");
+            add("408", "`request-timeout`: it took over 10 s");
+            if has_parameters {
+                add(
+                    "400",
+                    "`malformed-path`, `malformed-header`: what stands in the path or in a header is not readable",
+                );
+            }
             if open {
+                add("403", "`foreign-origin`: a page of another site asks");
                 operation.security = Some(vec![nobody.clone()]);
                 continue;
             }
@@ -107,10 +117,10 @@ fn description() -> String {
     text
 }
 
-/// What only the configuration knows: the range of setpoints, and which thrusters there are.
+/// What only the configuration knows: how far setpoints go, of whichever thruster goes farthest, and which thrusters there are.
 pub fn finish(document: &mut OpenApi, app: &App) {
     let range = |pick: fn(&SetpointRange) -> f64| {
-        app.thrusters().iter().map(|thruster| pick(&thruster.range())).fold(f64::INFINITY, f64::min)
+        app.thrusters().iter().map(|thruster| pick(&thruster.range())).fold(0.0, f64::max)
     };
     let ids: Vec<&str> = app.thrusters().iter().map(|thruster| thruster.id.as_str()).collect();
     for item in document.paths.paths.values_mut() {
@@ -130,6 +140,11 @@ pub fn finish(document: &mut OpenApi, app: &App) {
         let RefOr::T(Schema::Object(object)) = item else { continue };
         for (name, bound) in bounds {
             if let Some(RefOr::T(Schema::Object(number))) = object.properties.get_mut(name) {
+                let words = number.description.take().unwrap_or_default();
+                let own = format!(
+                    "The bounds are those of the thruster that goes farthest; its own are in each one's state, `range.{name}`."
+                );
+                number.description = Some(format!("{words} {own}").trim().to_owned());
                 number.minimum = Some(utoipa::Number::Float(-bound));
                 number.maximum = Some(utoipa::Number::Float(bound));
                 object.additional_properties = Some(Box::new(AdditionalProperties::FreeForm(false)));

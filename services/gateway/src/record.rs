@@ -7,6 +7,7 @@
 mod counts;
 mod info;
 mod kept;
+mod lost;
 mod names;
 mod set;
 mod write;
@@ -35,6 +36,7 @@ use crate::token::{Identity, Role};
 pub use counts::Totals;
 pub use info::{RecordingInfo, RecordingState};
 pub use kept::{TAGS_MAX, check_tags};
+use lost::known_of;
 use names::is_word;
 pub use names::{check_new_name, is_name};
 pub use set::{RecordingSet, Together};
@@ -283,9 +285,8 @@ impl Recorder {
             .into_iter()
             .flatten()
             .flatten()
-            .filter(|entry| entry.path().extension().is_some_and(|extension| extension == "json"))
-            .filter_map(|entry| serde_json::from_slice(&fs::read(entry.path()).ok()?).ok())
-            .map(|info: RecordingInfo| (info.name.clone(), info))
+            .filter_map(|entry| known_of(&entry.path()))
+            .map(|info| (info.name.clone(), info))
             .collect();
         known.extend(lock(&self.unwritten).clone());
         for running in lock(&self.running).iter() {

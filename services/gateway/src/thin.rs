@@ -41,9 +41,49 @@ impl Thin {
     }
 }
 
+/// Which of the rows that are kept are shown: no more a second than asked for.
+#[derive(Clone, Copy, Debug)]
+pub struct Due {
+    gap_ns: u64,
+    next_ns: u64,
+}
+
+impl Due {
+    /// At most so many rows a second.
+    pub fn new(rate_hz: f64) -> Due {
+        Due { gap_ns: (1e9 / rate_hz) as u64, next_ns: 0 }
+    }
+
+    /// Is a row of this time one of them? To be asked in their order.
+    pub fn is(&mut self, time_ns: u64) -> bool {
+        // Rows are not quite evenly spaced: one may come a little early.
+        let due = time_ns + self.gap_ns / 10 >= self.next_ns;
+        if due {
+            // On the grid of the first one, which early rows do not move; after a gap it begins anew.
+            let next_ns = self.next_ns + self.gap_ns;
+            self.next_ns = if time_ns >= next_ns { time_ns + self.gap_ns } else { next_ns };
+        }
+        due
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn no_more_rows_are_shown_than_were_asked_for() {
+        for hz in [1.0, 5.0, 7.0, 10.0, 25.0, 100.0] {
+            let mut due = Due::new(hz);
+            let begins = 77_000_000_000;
+            let rows =
+                |span_s: u64| (0..span_s * 100).map(|row| begins + row * 10_000_000 + row % 3 * 200_000);
+            let shown = rows(60).filter(|at| due.is(*at)).count() as f64;
+            assert!(shown <= 60.0 * hz + 1.0 && shown >= 59.0 * hz.min(90.0), "{hz}: {shown}");
+            // After a gap there is no more at once.
+            assert!(due.is(begins + 600_000_000_000) && !due.is(begins + 600_000_000_001));
+        }
+    }
 
     #[test]
     fn rows_come_at_their_rate_and_a_slow_sensor_is_not_lost_between_them() {

@@ -4,12 +4,14 @@ mod analysis;
 mod calibration;
 mod command;
 mod faults;
+mod kept_law;
 mod law;
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, mpsc};
 use std::time::{Duration, Instant};
 
 use axum::body::Bytes;
+use kept_law::KeptLaw;
 use kort_proto::events::EventKind;
 use kort_proto::faults::{Fault, Names};
 use kort_proto::limits::Limit;
@@ -24,7 +26,7 @@ use crate::desk::Desk;
 use crate::events::Events;
 use crate::excitation::ExcitationStep;
 use crate::heard::Heard;
-use crate::lease::{By, Lease, Wanted};
+use crate::lease::By;
 use crate::problem::{Kind, Problem};
 use crate::rig::Trial;
 use crate::view::{
@@ -66,6 +68,8 @@ pub struct Thruster {
     /// The calibration that runs, and when it began.
     calibration: Mutex<Option<(CalibrationInfo, Instant)>>,
     trial: Mutex<Trial>,
+    /// Held by whoever has the controller run another law.
+    law: tokio::sync::Mutex<KeptLaw>,
 }
 
 /// What a rendered state was made of: sample, desk, and whether the servo was silent.
@@ -97,6 +101,7 @@ impl Thruster {
             analysis: Mutex::default(),
             calibration: Mutex::default(),
             trial: Mutex::new(Trial::new(range.thrust_n)),
+            law: tokio::sync::Mutex::default(),
             rendered: Mutex::new(((u64::MAX, u64::MAX, false), Bytes::new())),
         };
         (thruster, inbox)
@@ -151,27 +156,11 @@ impl Thruster {
             .hint("`kort up` restarts a process that died; its log says why it did"))
     }
 
-    /// Takes command.
-    pub fn take_lease(&self, wanted: &Wanted) -> Result<(Lease, Instant), Problem> {
-        let now = Instant::now();
-        self.desk().take(wanted, now).map(|lease| (lease, now))
-    }
-
-    /// Renews the lease.
-    pub fn renew_lease(&self, id: Option<&str>) -> Result<(Lease, Instant), Problem> {
-        let now = Instant::now();
-        self.desk().renew(id, now).map(|lease| (lease, now))
-    }
-
-    /// Gives command up.
-    pub fn give_lease(&self, who: &str, id: Option<&str>) -> Result<(), Problem> {
-        self.desk().give(who, id, Instant::now())
-    }
-
-    /// Arms, at rest. `who` asks, for the event log; `lease` must be the one in force, if there is one.
+    /// Arms, at rest. `who` asks, for the event log; `lease` must be the one in force.
     pub async fn arm(&self, who: &str, lease: Option<&str>) -> Result<(), Problem> {
         let now = Instant::now();
-        self.desk().may(lease, now)?;
+        // Without a lease the controller has it disarmed at once.
+        self.desk().check(lease, now)?;
         self.ready()?;
         self.not_calibrated()?;
         if let Some(fault) = Fault::in_set(self.heard().faults(now)).next() {
@@ -219,8 +208,9 @@ impl Thruster {
         .await?;
         self.settle(|heard, now| heard.faults(now) == 0).await;
         self.hear(|heard| heard.own_faults = 0);
-        if before != 0 {
-            self.did(who, lease, EventKind::FaultsCleared, &format!("cleared {}", Names(before)));
+        match before {
+            0 => self.desk().done(lease, Instant::now()),
+            before => self.did(who, lease, EventKind::FaultsCleared, &format!("cleared {}", Names(before))),
         }
         Ok(())
     }

@@ -56,6 +56,18 @@ pub struct Identity {
     pub hash: Option<Arc<str>>,
 }
 
+impl Identity {
+    /// Whoever asks where no token is asked for.
+    pub fn local() -> Identity {
+        Identity { name: LOCAL.into(), role: Role::Admin, hash: None }
+    }
+}
+
+/// Who the event log names where no token is asked for.
+pub const LOCAL: &str = "local";
+/// Who the event log says did what a process of the service does.
+pub const PROCESSES: [&str; 4] = ["servo", "controller", "gateway", "supervisor"];
+
 /// Why the file of tokens cannot be used.
 #[derive(Debug, Error)]
 #[error("{}: {why}\nhint: {hint}", file.display())]
@@ -144,6 +156,14 @@ pub fn make(file: &Path, name: &str, role: Role) -> Result<String, TokenError> {
         return Err(fail(
             format!("token name {name:?}; allowed are 1 to 32 letters, digits, `-` or `_`"),
             "the name stands in the event log: bridge, bench-2, grafana",
+        ));
+    }
+    if PROCESSES.contains(&name) || name == LOCAL {
+        return Err(fail(
+            format!(
+                "token name {name:?} is what the event log calls a process of the service, or whoever needs no token; allowed is any other"
+            ),
+            "a name that others recognise: bridge, bench-2, grafana",
         ));
     }
     let mut book = Book::read(file)?;

@@ -58,15 +58,11 @@ impl Kind {
                     wrong.iter().map(ToString::to_string).map(bare).collect()
                 })
             }
-            Kind::Scenario => match Scenario::from_toml_with_all(text) {
-                Ok(scenario) => {
-                    let mut wrong = scenario.check();
-                    wrong.extend(replays(&scenario, path));
-                    wrong.extend(values(&scenario));
-                    if wrong.is_empty() { Ok(()) } else { Err(all(wrong)) }
-                }
-                Err(wrong) => Err(all(wrong)),
-            },
+            Kind::Scenario => {
+                let more = |scenario: &Scenario| [replays(scenario, path), values(scenario)].concat();
+                let wrong = Scenario::all_wrong(text, more);
+                if wrong.is_empty() { Ok(()) } else { Err(wrong) }
+            }
             Kind::Columns => {
                 let name = path.file_stem().unwrap_or_default().to_string_lossy();
                 ColumnMap::from_toml(&name, text).map(drop).map_err(|wrong| all(wrong.0))
@@ -226,6 +222,31 @@ mod tests {
             assert!(said.len() == 3 && said[0].contains("hint: "), "{rig}: {said:?}");
         }
         assert!(of_rig("t20")[0].starts_with("`rig` = \"../thrusters/t20.toml\""), "{:?}", of_rig("t20"));
+    }
+
+    #[test]
+    fn what_cannot_be_read_hides_nothing_else() {
+        let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../config/scenarios/soak-towed.toml"));
+        let text = "name = \"x\"\nwhat = 3\nrig = \"../thrusters/t20.toml\"\nduration_s = \"long\"\ncontrollers = [\"modle2_inversion\"]\n\
+            [[reference]]\nkind = \"stairs\"\n[[reference]]\nkind = \"steps\"\nlevels = [2.0]\nhold_s = -2\nramp_s = 1\n\
+            [[supply_sag]]\nat_s = 90\nfor_s = 1\nto = 3\n";
+        let said = Kind::Soak.check(text, path).unwrap_err();
+        for words in [
+            "`what` = 3",
+            "`duration_s` = \"long\"",
+            "`reference[0].kind` = \"stairs\"",
+            "`reference[1].levels` = 2 is outside",
+            "`reference[1].hold_s` = -2 is outside",
+            "`supply_sag[0].to` = 3 is outside",
+            "`rig` = \"../thrusters/t20.toml\"",
+            "controller `modle2_inversion`",
+        ] {
+            assert_eq!(said.iter().filter(|line| line.starts_with(words)).count(), 1, "{words} in {said:#?}");
+        }
+        assert_eq!(said.len(), 8, "{said:#?}");
+        let map = "descripton = \"x\"\n[time]\nsource = \"t\"\nunit = \"sec\"\n[columns.thrust_n]\nsource = \"Force\"\nunit = \"kg\"\n";
+        let said = Kind::Columns.check(map, Path::new("a.toml")).unwrap_err();
+        assert_eq!(said.len(), 3, "{said:#?}");
     }
 
     #[test]

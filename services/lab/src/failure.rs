@@ -102,31 +102,26 @@ pub fn write_text(path: &Path, text: &str) -> Result<(), Failure> {
     std::fs::write(path, text).map_err(|e| Failure::unwritten(path, e))
 }
 
-/// Whether a file can be written, asked before a long run: what is there already stays, and nothing new is left behind by
-/// a run that fails.
+/// Prints to stdout; a closed pipe (`kort … | head`) ends the output quietly.
 ///
 /// # Errors
-/// Names the file.
-pub fn check_writable(path: &Path) -> Result<(), Failure> {
-    let there = path.exists();
-    let opened = std::fs::OpenOptions::new().append(true).create(true).open(path);
-    opened.map(drop).map_err(|e| Failure::unwritten(path, e))?;
-    if !there { std::fs::remove_file(path).map_err(|e| Failure::unwritten(path, e)) } else { Ok(()) }
-}
-
-/// Prints to stdout; a closed pipe (`kort … | head`) ends the output quietly.
-pub fn print(text: &str) {
-    use std::io::Write;
+/// Not all of it could be printed.
+pub fn print(text: &str) -> Result<(), Failure> {
+    use std::io::{ErrorKind, Write};
     let mut out = std::io::stdout().lock();
-    let _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(Failure::failed(format!(
+            "the result cannot be printed: {error}\nhint: check where standard output goes: is that disk full?"
+        ))),
+        _ => Ok(()),
+    }
 }
 
 /// Prints exactly one JSON document to stdout.
 ///
 /// # Errors
-/// The value cannot be JSON: an error of the program.
+/// Not all of it could be printed.
 pub fn print_json(value: &impl serde::Serialize) -> Result<(), Failure> {
     let text = serde_json::to_string_pretty(value).map_err(Failure::failed)?;
-    print(&(text + "\n"));
-    Ok(())
+    print(&(text + "\n"))
 }

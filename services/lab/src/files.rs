@@ -19,6 +19,17 @@ struct Rigs;
 #[folder = "../../config/scenarios"]
 struct Scenarios;
 
+/// Controllers built in, which scenarios name.
+#[derive(Embed)]
+#[folder = "../../config/controllers"]
+struct Controllers;
+
+/// The text of a controller built in, by its name.
+pub fn controller_text(name: &str) -> Option<String> {
+    let file = Controllers::get(&format!("{name}.toml"))?;
+    Some(String::from_utf8_lossy(&file.data).into_owned())
+}
+
 /// Scenarios of `kort soak` have this before their name.
 pub const SOAK: &str = "soak-";
 
@@ -44,16 +55,30 @@ pub fn soak_scenarios() -> Vec<String> {
 const RECORDINGS: &[(&str, &[u8])] =
     &[("vortex-auv-pool-heave-1", include_bytes!("../../../tests/recordings/vortex-auv-pool-heave-1.csv"))];
 
+/// Folders in which what is named without a path is looked for before what is built in.
+const RIGS: &str = "config/thrusters";
+const SCENARIOS: &str = "config/scenarios";
+
+/// The file meant: a path, or in `folder` a name.
+fn file_of(wanted: &Path, folder: &str) -> Option<PathBuf> {
+    if wanted.is_file() {
+        return Some(wanted.to_owned());
+    }
+    let named = Path::new(folder).join(format!("{}.toml", wanted.to_string_lossy()));
+    (wanted.components().count() == 1 && named.is_file()).then_some(named)
+}
+
+/// The file of a rig description by path or name; none of one that is built in, or not there.
+pub fn rig_file(wanted: &Path) -> Option<PathBuf> {
+    file_of(wanted, RIGS)
+}
+
 /// A text by path, else in `folder` by name, else built in.
 fn text_of<E: Embed>(wanted: &Path, folder: &str, what: &str, offered: &[String]) -> Result<String, Failure> {
-    if wanted.is_file() {
-        return read_text(wanted);
+    if let Some(file) = file_of(wanted, folder) {
+        return read_text(&file);
     }
     let name = wanted.to_string_lossy();
-    let named = Path::new(folder).join(format!("{name}.toml"));
-    if wanted.components().count() == 1 && named.is_file() {
-        return read_text(&named);
-    }
     if let Some(text) = E::get(&format!("{name}.toml")) {
         return Ok(String::from_utf8_lossy(&text.data).into_owned());
     }
@@ -80,7 +105,7 @@ pub fn read_rig(wanted: &Path) -> Result<Rig, Failure> {
 /// # Errors
 /// There is no such file or rig.
 pub fn rig_text(wanted: &Path) -> Result<String, Failure> {
-    text_of::<Rigs>(wanted, "config/thrusters", "rig description", &rigs())
+    text_of::<Rigs>(wanted, RIGS, "rig description", &rigs())
 }
 
 /// The text of a scenario of `kort simulate`, by path or name.
@@ -90,7 +115,7 @@ pub fn rig_text(wanted: &Path) -> Result<String, Failure> {
 pub fn scenario_text(wanted: &Path) -> Result<String, Failure> {
     let offered: Vec<String> =
         names::<Scenarios>().into_iter().filter(|name| !name.starts_with(SOAK)).collect();
-    text_of::<Scenarios>(wanted, "config/scenarios", "scenario", &offered)
+    text_of::<Scenarios>(wanted, SCENARIOS, "scenario", &offered)
 }
 
 /// The text of a scenario of `kort soak`, by path or name.
@@ -98,7 +123,7 @@ pub fn scenario_text(wanted: &Path) -> Result<String, Failure> {
 /// # Errors
 /// There is no such file or scenario.
 pub fn soak_scenario_text(wanted: &Path) -> Result<String, Failure> {
-    text_of::<Scenarios>(wanted, "config/scenarios", "soak scenario", &soak_scenarios())
+    text_of::<Scenarios>(wanted, SCENARIOS, "soak scenario", &soak_scenarios())
 }
 
 /// A column map by path or name; `None` stays `None`.

@@ -2,14 +2,46 @@
 //! they are. The comment behind a stated value told where that came from, and makes room for where the new one does.
 
 use kort_diagnose::report::ParameterReport;
-use kort_identify::identify::FittedEffect;
+use kort_identify::identify::{FitReport, FittedEffect};
+use kort_thruster::effects::{self, Scale};
+use kort_thruster::parameters::Parameter;
 use kort_thruster::rig::{FoundEffect, Quantity, Rig};
 use toml_edit::{Decor, DocumentMut, InlineTable, Item, TableLike, Value};
 
 /// What stands behind each value that `kort fit` writes.
 pub const FITTED: &str = "fitted by kort fit";
-/// Least and largest tolerance written.
+/// Least and largest tolerance written: what a rig may state.
 const TOL: (f64, f64) = (1e-4, 2.0);
+/// Begins the lines at the head of a fitted rig that say what is not in it.
+const NOT_WRITTEN: &str = "# not written by kort fit: ";
+
+/// A rig description with what a fit of it found, and at its head what was not written of that, which is also returned.
+///
+/// # Errors
+/// The text is no rig description (it was one when the fit read it).
+pub fn with_fit(text: &str, report: &FitReport) -> Result<(String, Vec<String>), String> {
+    let (kept, fixed) = parted(report);
+    let (text, mut left_out) = with_fitted(text, &fixed, FITTED)?;
+    left_out.extend(kept.iter().map(|p| format!("{} stays as stated: the recordings do not fix it", p.name)));
+    let (text, effects_left_out) = with_fitted_effects(&text, &report.effects, FITTED)?;
+    left_out.extend(effects_left_out);
+    let head: String =
+        left_out.iter().map(|why| format!("{NOT_WRITTEN}{}\n", why.replace('\n', " "))).collect();
+    // Those of a fit before told of that one.
+    let rest = text.split_inclusive('\n').filter(|line| !line.starts_with(NOT_WRITTEN));
+    Ok((head + &rest.collect::<String>(), left_out))
+}
+
+/// Parameters that the recordings leave to what the rig states, and those that they fix: a fitted value of the first is the
+/// statement's, pulled about by the rest, and is not written as if it had been measured.
+pub fn parted(report: &FitReport) -> (Vec<ParameterReport>, Vec<ParameterReport>) {
+    let open =
+        |name: &str| report.not_identifiable.iter().any(|group| group.parameters.iter().any(|p| p == name));
+    let of_rig = |name: &str| Parameter::ALL.iter().any(|of_rig| of_rig.name() == name);
+    let (mut kept, fixed): (Vec<_>, Vec<_>) = report.parameters.iter().cloned().partition(|p| open(&p.name));
+    kept.retain(|p| of_rig(&p.name));
+    (kept, fixed)
+}
 
 /// Puts fitted values into a rig description, each with its unit and `by` behind it. Also returned: which could not be written, and why.
 ///
@@ -35,6 +67,10 @@ pub fn with_fitted(
             ));
             continue;
         };
+        if let Some(why) = untold(p) {
+            left_out.push(format!("{} stays as stated: {why}", p.name));
+            continue;
+        }
         let before = document.to_string();
         let in_one_line = document[table].is_inline_table();
         // A comment amid a line would swallow the rest of it.
@@ -61,24 +97,83 @@ pub fn with_fitted_effects(
 ) -> Result<(String, Vec<String>), String> {
     let (mut text, mut left_out) = (text.to_owned(), Vec::new());
     for fitted in effects {
-        let mut document: DocumentMut = text.parse().map_err(|e: toml_edit::TomlError| e.to_string())?;
-        let written = if let Some((table, in_one_line)) = standing(&mut document, &fitted.effect) {
-            for p in &fitted.parameters {
-                let told = if in_one_line { String::new() } else { format!(" # {}, {by}", p.unit) };
-                table.insert(&p.name, item(p, &told));
-            }
-            let written = document.to_string();
-            Rig::from_toml(&written).map(|_| written)
-        } else {
-            let parameters = fitted.parameters.iter().map(|p| (p.name.as_str(), quantity(p))).collect();
-            Rig::with_effects_toml(&text, &[FoundEffect { effect: &fitted.effect, parameters }], by)
-        };
-        match written {
+        let id = &fitted.effect;
+        let (parameters, unsure) = of_a_size(fitted);
+        if !unsure.is_empty() && parameters.is_empty() {
+            let mut document: DocumentMut = text.parse().map_err(|e: toml_edit::TomlError| e.to_string())?;
+            let stays = if standing(&mut document, id).is_some() { "stays as stated" } else { "is left out" };
+            left_out.push(format!("{id} {stays}: {}", unsure.join("; ")));
+            continue;
+        }
+        left_out.extend(unsure.into_iter().map(|why| format!("{id}: {why}")));
+        match with_one(&text, id, &parameters, by) {
             Ok(written) => text = written,
-            Err(e) => left_out.push(format!("{}: {}", fitted.effect, e.to_string().replace('\n', "; "))),
+            Err(why) => left_out.push(format!("{id}: {}", why.replace('\n', "; "))),
         }
     }
     Ok((text, left_out))
+}
+
+/// Puts one effect's values among a rig description's `[[effects]]`.
+fn with_one(text: &str, id: &str, parameters: &[&ParameterReport], by: &str) -> Result<String, String> {
+    let parse = |text: &str| text.parse().map_err(|e: toml_edit::TomlError| e.to_string());
+    let mut document: DocumentMut = parse(text)?;
+    if standing(&mut document, id).is_none() {
+        let parameters = parameters.iter().map(|p| (p.name.as_str(), quantity(p))).collect();
+        let found = FoundEffect { effect: id, parameters };
+        document = parse(&Rig::with_effects_toml(text, &[found], by).map_err(|e| e.to_string())?)?;
+    }
+    let Some((table, in_one_line)) = standing(&mut document, id) else { return Ok(document.to_string()) };
+    for p in parameters {
+        let why = untold(p).map_or_else(String::new, |why| format!("; {why}"));
+        let told = if in_one_line { String::new() } else { format!(" # {}, {by}{why}", p.unit) };
+        table.insert(&p.name, item(p, &told));
+    }
+    let written = document.to_string();
+    Rig::from_toml(&written).map(|_| written).map_err(|e| e.to_string())
+}
+
+/// What of an effect is written, and why its other strengths are not: one that may as well be zero is no knowledge, and what
+/// a rig states as zero has no tolerance and would count as exact. None where no strength is left: the effect is not known to
+/// be there at all.
+fn of_a_size(fitted: &FittedEffect) -> (Vec<&ParameterReport>, Vec<String>) {
+    let specs = effects::find(&fitted.effect).map_or_else(Vec::new, |e| (e.parameters)(&Scale::ANY));
+    let is_shape = |p: &ParameterReport| specs.iter().any(|spec| spec.name == p.name && spec.shape);
+    let nothing = |p: &ParameterReport| p.value == 0.0 || tolerance(p) > TOL.1;
+    let (unsure, mut known): (Vec<_>, Vec<_>) =
+        fitted.parameters.iter().partition(|p| !is_shape(p) && nothing(p));
+    let why: Vec<String> = unsure
+        .iter()
+        .map(|p| {
+            let (value, error) = (short(p.value), short(p.std_error));
+            format!("{} = {value} {}, standard error {error}, may as well be zero", p.name, p.unit)
+        })
+        .collect();
+    if known.iter().all(|p| is_shape(p)) && !why.is_empty() {
+        known.clear();
+    }
+    (known, why)
+}
+
+/// Why no tolerance says how well a value is known, if none does.
+fn untold(fitted: &ParameterReport) -> Option<String> {
+    match fitted.at_bound {
+        Some(true) => Some(format!(
+            "{} {} is at the bound of what is allowed, no measurement",
+            short(fitted.value),
+            fitted.unit
+        )),
+        _ if fitted.value == 0.0 && fitted.std_error > 0.0 => {
+            Some("a tolerance is relative, and zero has none".into())
+        }
+        _ if tolerance(fitted) > TOL.1 => Some(format!(
+            "{} {} has a standard error of {}, more than the largest tolerance of a rig",
+            short(fitted.value),
+            fitted.unit,
+            short(fitted.std_error)
+        )),
+        _ => None,
+    }
 }
 
 /// The table of an effect that stands in a rig description, and whether the whole of it stands in one line.
@@ -102,8 +197,7 @@ fn standing<'a>(document: &'a mut DocumentMut, effect: &str) -> Option<(&'a mut 
 fn item(fitted: &ParameterReport, told: &str) -> Item {
     let mut both = InlineTable::new();
     both.insert("value", short(fitted.value).into());
-    let tol = tolerance(fitted);
-    if tol.is_finite() {
+    if let Some(tol) = quantity(fitted).tol {
         both.insert("tol", short(tol.clamp(TOL.0, TOL.1)).into());
     }
     let mut value = Value::InlineTable(both);
@@ -111,9 +205,10 @@ fn item(fitted: &ParameterReport, told: &str) -> Item {
     Item::Value(value)
 }
 
-/// A fitted value, with twice its standard error as tolerance.
+/// A fitted value, with twice its standard error as tolerance: the largest there is at a bound, where the error says nothing.
 pub fn quantity(fitted: &ParameterReport) -> Quantity {
-    Quantity { value: fitted.value, tol: Some(tolerance(fitted)).filter(|t| t.is_finite() && *t > 0.0) }
+    let tol = if fitted.at_bound == Some(true) && fitted.value != 0.0 { TOL.1 } else { tolerance(fitted) };
+    Quantity { value: fitted.value, tol: Some(tol).filter(|t| t.is_finite() && *t > 0.0) }
 }
 
 /// Twice its standard error, over its value.
@@ -187,6 +282,50 @@ mod tests {
         );
         assert!(text.contains("stribeck_rise = 0.2 # from the maker\n"), "{text}");
         assert!(left_out.len() == 1 && left_out[0].contains("gremlins"), "{left_out:?}");
+    }
+
+    #[test]
+    fn what_may_as_well_be_zero_is_not_written_as_known() {
+        let one = |effect: &str, parameters: Vec<ParameterReport>| FittedEffect {
+            effect: effect.into(),
+            path: "drive".into(),
+            equation: String::new(),
+            parameters,
+        };
+        let at_bound = |p: ParameterReport| ParameterReport { at_bound: Some(true), ..p };
+        let none = one("transport_delay", vec![at_bound(fitted("delay_s", 0.0, 1e-3))]);
+        let unsure = one(
+            "coulomb_friction",
+            vec![
+                fitted("coulomb_torque_n_m", 0.02, 0.03),
+                fitted("stribeck_rise", 0.2, 0.01),
+                fitted("stribeck_speed_rad_s", 2.0, 0.1),
+            ],
+        );
+        let (text, left_out) = with_fitted_effects(RIG, &[none.clone(), unsure], FITTED).unwrap();
+        assert!(
+            left_out.len() == 2 && left_out.iter().all(|why| why.contains("may as well be zero")),
+            "{left_out:?}"
+        );
+        assert!(!text.contains("transport_delay") && !text.contains("coulomb_torque_n_m"), "{text}");
+        // What stands there already stays.
+        let known = format!(
+            "{RIG}[[effects]]\neffect = \"transport_delay\"\ndelay_s = {{ value = 0.03, tol = 2 }}\n"
+        );
+        let (text, left_out) = with_fitted_effects(&known, &[none], FITTED).unwrap();
+        assert!(text == known && left_out[0].contains("stays as stated"), "{text} {left_out:?}");
+    }
+
+    #[test]
+    fn a_value_at_its_bound_or_unknown_stays_as_stated() {
+        let bound = ParameterReport { at_bound: Some(true), ..fitted("lift_max", 1.2, 1e-5) };
+        let (text, left_out) =
+            with_fitted(RIG, &[bound, fitted("inertia_kg_m2", 0.02, 0.05)], FITTED).unwrap();
+        assert_eq!(text, RIG);
+        assert!(
+            left_out[0].contains("at the bound") && left_out[1].contains("largest tolerance"),
+            "{left_out:?}"
+        );
     }
 
     #[test]

@@ -12,6 +12,7 @@ use kort_thruster::rig::Rig;
 
 use crate::failure::Failure;
 use crate::files::rig_text;
+use crate::outputs::Named;
 
 /// Arguments that `fit` and `diagnose` share.
 #[derive(Debug, Args)]
@@ -55,12 +56,20 @@ pub struct Loaded {
 }
 
 impl Input {
+    /// The files that are read.
+    pub fn named(&self) -> Named {
+        let recordings = self.recordings.iter();
+        let named = recordings.fold(Named::default(), |named, path| named.reads("recording", path));
+        named.reads_rig(self.rig.as_deref()).reads_map(self.columns.as_deref())
+    }
+
     /// The effects named by `--with`.
     ///
     /// # Errors
     /// An id that the catalogue does not have, with the nearest that it has.
     pub fn known_effects(&self) -> Result<Vec<&'static Descriptor>, Failure> {
-        let one = |id: &String| {
+        // After a comma people put a space.
+        let one = |id: &str| {
             effects::find(id).ok_or_else(|| {
                 let near = effects::ALL
                     .iter()
@@ -71,7 +80,7 @@ impl Input {
                 ))
             })
         };
-        self.with.iter().map(one).collect()
+        self.with.iter().map(|id| one(id.trim())).collect()
     }
 
     /// Reads all files.

@@ -11,6 +11,7 @@ pub mod failure;
 pub mod files;
 pub mod fitted_rig;
 pub mod input;
+pub mod outputs;
 pub mod progress;
 pub mod render;
 pub mod soak;

@@ -121,8 +121,8 @@ impl Usage {
 /// Those of a rig's known effects that no law and no observer uses, with why: whoever puts a rig to use names them.
 /// Empty where no controller can be designed for the rig at all, which is refused in other words.
 pub fn left_out(rig: &Rig, period_s: f64) -> Vec<(&'static str, &'static str)> {
-    let known = of_rig(rig, period_s).unwrap_or_default();
-    known.into_iter().filter_map(|usage| Some((usage.effect, usage.left?))).collect()
+    let known = of_rig(rig, period_s).unwrap_or_default().into_iter().zip(&rig.effects);
+    known.filter_map(|(usage, known)| Some((usage.effect, known.idle().or(usage.left)?))).collect()
 }
 
 /// Control period that a rig is looked at for where nothing else says one, s.

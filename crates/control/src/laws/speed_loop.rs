@@ -114,8 +114,8 @@ impl MatchedTarget {
         self.seen_rad_s
     }
 
-    /// Starts again from a measured speed.
-    pub fn reset(&mut self, speed_rad_s: f64) {
-        (self.shaft_rad_s, self.seen_rad_s) = (speed_rad_s, speed_rad_s);
+    /// Starts again from what is measured.
+    pub fn reset(&mut self, measured: f64) {
+        (self.shaft_rad_s, self.seen_rad_s) = (measured, measured);
     }
 }

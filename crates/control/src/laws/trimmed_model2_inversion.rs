@@ -51,6 +51,7 @@ pub struct TrimmedModel2Inversion {
     asked_n_m: f64,
     limited: bool,
     gated: u64,
+    began: bool,
 }
 
 impl TrimmedModel2Inversion {
@@ -66,11 +67,16 @@ impl TrimmedModel2Inversion {
             asked_n_m: 0.0,
             limited: false,
             gated: 0,
+            began: false,
         }
     }
 
     /// Torque of the inverted model at the trimmed reference.
     pub fn tick(&mut self, input: &LawInput) -> Demand {
+        if !std::mem::replace(&mut self.began, true) {
+            // What is expected rises from the thrust that is there: one from nothing would be learnt as a surplus of all of it.
+            self.matched.reset(input.measured.thrust_n.unwrap_or(input.thrust_n));
+        }
         let expected = self.matched.step(input.thrust_n, input.dt_s);
         let rejected = input.estimate.gated != std::mem::replace(&mut self.gated, input.estimate.gated);
         let mut at_authority = false;

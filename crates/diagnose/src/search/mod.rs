@@ -357,7 +357,9 @@ impl<'a, 'p> Search<'a, 'p> {
         let all = self.problem.members(&from.hypothesis, &from.values);
         let members: Vec<Member> = all.into_iter().filter(|m| m.effect.id != member).collect();
         let (hypothesis, columns) = self.problem.recompose(from, &members);
-        self.problem.fit(&hypothesis, &columns, &from.floor, steps)
+        let fit = self.problem.fit(&hypothesis, &columns, &from.floor, steps);
+        // Where the rest runs away without it, nothing but the baseline stands without it.
+        if fit.ran_away() { self.fits[&Set::new()].clone() } else { fit }
     }
 
     fn keep(&mut self, set: Set, fit: Fit) {

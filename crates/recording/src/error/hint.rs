@@ -13,7 +13,7 @@ impl Problem {
             Problem::Folder { inside: Some(log) } => format!("name {log}; the files of a bag in several parts are read one by one, and all recordings of a folder at once by `fit` and `diagnose` only"),
             Problem::Folder { inside: None } => "name the log itself; no file in this folder is called like a recording or a log (.csv, .mcap, .ulg, .bin, .db3, .bfl, .bbl, .log; plain or .gz)".into(),
             Problem::Packed { hint, .. } => (*hint).into(),
-            Problem::UnknownFormat { .. } => "name the file REC.csv, REC.csv.gz or REC.mcap".into(),
+            Problem::UnknownFormat { .. } => "name the file REC.csv, REC.csv.gz, REC.mcap or REC.parquet".into(),
             Problem::Empty => "was the logger stopped before its first row?".into(),
             Problem::NotText { .. } => {
                 "a table, or a spreadsheet, must be saved as CSV in UTF-8; a log of another format must be converted to one of these".into()
@@ -94,6 +94,9 @@ impl Problem {
             Problem::ClockWanted { .. } => "such a map has [time] clock = \"log\"; `kort columns LOG` proposes one".into(),
             Problem::TableWanted { .. } => {
                 "a map for tables names the column of stamps: [time] source and unit; `kort columns LOG` proposes one".into()
+            }
+            Problem::Broken { format: crate::formats::CANDUMP, .. } => {
+                "log frames with their time stamps: `candump -L can0 > FILE`, `candump -l can0`, or `candump -t a can0 > FILE`".into()
             }
             Problem::Broken { .. } => "was the file copied whole? A log that was cut off is read up to where it ends".into(),
             Problem::NoChannel { .. } => "`kort columns LOG` lists what can be read; else export the signals with JSON messages, or as CSV".into(),

@@ -11,16 +11,16 @@ use super::stream::bytes;
 use crate::error::Problem;
 use crate::log::{Gather, Log};
 
-const NAME: &str = "candump";
+pub(crate) const NAME: &str = "candump";
 /// A line of candump is shorter; CAN FD has 64 bytes a frame.
 const LONGEST: u64 = 4096;
 /// Numbers that a survey shows of every frame, at every place where they fit.
 const SHOWN: &[(&str, usize)] = &[("u8", 1), ("i16le", 2), ("i16be", 2)];
 
-/// Whether a file begins like a log of candump.
+/// Whether a file begins like a log of candump, or like what candump prints without stamps, which is refused for lack of them.
 pub(super) fn begins(start: &[u8]) -> bool {
     let line = start.split(|b| *b == b'\n').next().unwrap_or_default();
-    std::str::from_utf8(line).is_ok_and(|line| frame(line.trim()).is_some())
+    std::str::from_utf8(line).is_ok_and(|line| frame(line.trim()).is_some() || unstamped(line).is_some())
 }
 
 /// A frame as a line has it.
@@ -36,6 +36,11 @@ struct Frame<'l> {
 fn frame(line: &str) -> Option<Frame<'_>> {
     let (stamp, rest) = line.strip_prefix('(')?.split_once(')')?;
     let stamp_s = stamp.trim().parse::<f64>().ok().filter(|s| s.is_finite())?;
+    Some(Frame { stamp_s, ..unstamped(rest)? })
+}
+
+/// A frame without its stamp.
+fn unstamped(rest: &str) -> Option<Frame<'_>> {
     let mut words = rest.split_whitespace();
     let interface = words.next()?;
     let what = words.next()?;
@@ -59,7 +64,7 @@ fn frame(line: &str) -> Option<Frame<'_>> {
         .step_by(2)
         .map(|at| u8::from_str_radix(&data[at..at + 2], 16).ok())
         .collect::<Option<_>>()?;
-    Some(Frame { stamp_s, interface, id: format!("0x{}", id.to_uppercase()), data })
+    Some(Frame { stamp_s: f64::NAN, interface, id: format!("0x{}", id.to_uppercase()), data })
 }
 
 /// A number within a frame: `i16le[2]`.
@@ -166,7 +171,9 @@ pub(super) fn log(mut input: impl BufRead, wanted: Option<&[String]>) -> Result<
     if gather.is_empty() {
         return Err(Problem::Broken {
             format: NAME,
-            message: format!("not one of {number} line(s) is a frame with a time stamp"),
+            message: format!(
+                "not one of {number} line(s) is a frame with a time stamp, as candump prints them without -L, -l or -t a"
+            ),
         });
     }
     if bad > 0 {
@@ -229,6 +236,10 @@ mod tests {
         assert_eq!(names.iter().filter(|n| n.starts_with("i16le")).count(), 5);
         let own = topic.fields.iter().find(|f| f.name == "i16le[4]").unwrap();
         assert_eq!(own.range, Some((-3.0, -1.0)));
+        let plain = "  can0  181   [4]  10 27 00 00\n";
+        assert!(begins(plain.as_bytes()));
+        let refused = super::log(plain.as_bytes(), None).unwrap_err();
+        assert!(refused.to_string().contains("time stamp") && refused.hint().contains("-L"), "{refused}");
         assert!(begins(LOG.as_bytes()) && !begins(b"time_s,thrust_n\n0,1\n"));
     }
 }

@@ -12,6 +12,7 @@ mod ros;
 mod stream;
 mod ulog;
 
+pub(crate) use candump::NAME as CANDUMP;
 pub use mcap::{Rows as LiveMcap, schema as message_schema, state_schema};
 
 use std::io::{self, BufRead, Seek, Write};

@@ -157,6 +157,8 @@ pub(crate) fn symbol(text: &str) -> Option<&'static Unit> {
     }
     let ours = match text {
         "RPM" | "r/min" | "rev/min" | "U/min" | "1/min" | "min^-1" | "min-1" | "tr/min" | "giri/min" => "rpm",
+        "kRPM" | "KRPM" => "krpm",
+        "Kgf" | "KGF" | "kg f" | "Kg f" | "kg-f" | "kp" => "kgf",
         "turn" | "turns" | "revs" => "rev",
         "turn/s" | "turns/s" | "revs/s" | "rps" => "rev/s",
         "°C" | "degC" | "℃" => "C",
@@ -173,6 +175,18 @@ pub(crate) fn symbol(text: &str) -> Option<&'static Unit> {
         other => other,
     };
     units::find(ours)
+}
+
+/// What a log says of a field's unit that no unit of ours is: its own word, or what stands in brackets behind the name.
+pub(super) fn unknown_unit(field: &Field) -> Option<&str> {
+    let in_brackets = || {
+        let name = field.name.trim();
+        let inside = |(open, close)| Some(name.strip_suffix(close)?.rsplit_once::<char>(open)?.1.trim());
+        [('(', ')'), ('[', ']')].into_iter().find_map(inside)
+    };
+    let said = field.unit.as_deref().map(str::trim).or_else(in_brackets)?;
+    let digits = said.bytes().all(|b| b.is_ascii_digit());
+    (!digits && symbol(said).is_none()).then_some(said)
 }
 
 pub(super) fn unit_of(field: &Field) -> Option<&'static Unit> {
@@ -196,6 +210,8 @@ mod tests {
             ("RPM", "rpm"),
             ("thrust_gf", "gf"),
             ("Thrust (g)", "gf"),
+            ("Speed (krpm)", "krpm"),
+            ("Thrust (Kg f)", "kgf"),
             ("t_ms", "ms"),
             ("cmd_pct", "%"),
             ("Batt. Volts", "V"),

@@ -4,9 +4,9 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-use super::names::{has_factor, unit_of};
+use super::names::{has_factor, unit_of, unknown_unit};
 use super::rules::{
-    COMMANDS, RULES, by_unit, fit, is_asked, is_electrical, is_of_motor, is_of_supply, is_pulse,
+    COMMANDS, RULES, by_unit, fit, is_asked, is_electrical, is_of_motor, is_of_supply, is_pulse, is_turns,
     is_unchanging,
 };
 use super::survey::{Example, Proposal};
@@ -183,12 +183,21 @@ fn unit_lines(column: &str, topic: &Topic, field: &Field, doubts: bool) -> Strin
             "# unit = \"1\"\n# table = [[1000, 0.0], [2000, 1.0]]   pulses of {seen}: write which of them ask for nothing and for all ([1500, 0.0] in the middle of a drive that reverses), and take out both #\n"
         );
     }
+    if is_turns(column, field) {
+        return format!(
+            "# unit = \"rev/s\"   the log says Hz: turns of the shaft per second? {seen}; then take out the #\n"
+        );
+    }
     let Some(unit) = unit_of(field) else {
         let factor = if has_factor(&field.name) { FACTOR } else { "" };
         let poles = if is_electrical(column, field) { POLES } else { "" };
         let more: String =
             [factor, poles].iter().filter(|line| !line.is_empty()).map(|line| format!("\n{line}")).collect();
-        return format!("# unit = \"…\"   the log does not say it; {seen}{more}\n");
+        let why = match unknown_unit(field) {
+            Some(unit) => format!("the log says {unit:?}, which is no unit that kort knows"),
+            None => "the log does not say it".into(),
+        };
+        return format!("# unit = \"…\"   {why}; {seen}{more}\n");
     };
     let whence = match (&field.unit, by_unit(column, field)) {
         (_, true) => "only its unit speaks for it",

@@ -235,6 +235,11 @@ fn qualified(rule: &Rule, field: &Field) -> usize {
     }
 }
 
+/// Whether a shaft's speed is given in hertz, which may be its turns per second.
+pub(super) fn is_turns(column: &str, field: &Field) -> bool {
+    column == "shaft_speed_rad_s" && unit_of(field).is_some_and(|unit| unit.symbol == "Hz")
+}
+
 /// How well a field suits a rule, if it does.
 pub(super) fn fit(rule: &Rule, topic: &Topic, field: &Field, table: bool) -> Option<Fit> {
     if !possible(rule, topic, field, table) {
@@ -262,7 +267,8 @@ pub(super) fn fit(rule: &Rule, topic: &Topic, field: &Field, table: bool) -> Opt
     let place = place.or_else(|| unit_tells().then_some(0))?;
     let si = columns::find(rule.column)
         .map_or_else(|| units::of_column(rule.column).map_or("1", |u| u.si), |k| k.unit);
-    if unit.is_some_and(|unit| unit.si != si) && !pulse {
+    let turns = table && is_turns(rule.column, field);
+    if unit.is_some_and(|unit| unit.si != si) && !pulse && !turns {
         return None;
     }
     let supply = matches!(rule.column, "supply_v" | "supply_current_a");
@@ -272,5 +278,5 @@ pub(super) fn fit(rule: &Rule, topic: &Topic, field: &Field, table: bool) -> Opt
     }
     let steady = field.range.is_none_or(|(low, high)| low == high);
     let electrical = is_electrical(rule.column, field);
-    Some((by_unit, steady, unit.is_none(), electrical, qualified(rule, field), place, elsewhere))
+    Some((by_unit, steady, unit.is_none() || turns, electrical, qualified(rule, field), place, elsewhere))
 }

@@ -161,7 +161,11 @@ fn of(name: &str, log: &Log) -> Survey {
         true => format!("{lost}; a recording of kort is refused for it: leave such a cell empty"),
         false => lost.clone(),
     };
-    let losses = log.losses.iter().cloned().chain(lost_in.map(said)).collect();
+    let refused = |lost: &String| match proposal.native && lost.contains("are stamped no later") {
+        true => format!("{lost}; a recording of kort is refused for it"),
+        false => lost.clone(),
+    };
+    let losses = log.losses.iter().map(refused).chain(lost_in.map(said)).collect();
     let stretch = log.longest(0..log.topics.len());
     let topics: Vec<TopicSurvey> = log
         .topics

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use kort_complaints::from_toml_with_all;
+use kort_complaints::text_as_far_as_it_goes;
 use serde::Deserialize;
 
 use super::ask::{Ask, Asked, Given};
@@ -44,13 +44,17 @@ impl Wrong {
 
 /// Reads a map, with what the user said where it is to be used.
 pub(super) fn map(name: &str, text: &str, asked: Option<&Asked>) -> Result<ColumnMap, MapErrors> {
-    let raw: RawMap = from_toml_with_all(text).map_err(|said| {
-        let keys = "docs/recordings.md lists the keys of a column map";
-        MapErrors(said.into_iter().map(|words| fail(name, words, keys)).collect())
-    })?;
+    let mut read = text_as_far_as_it_goes::<RawMap>(text);
+    let raw = read.value.take();
     let mut wrong = Wrong(Vec::new());
-    let map = raw.check(name, asked, &mut wrong);
-    map.filter(|_| wrong.0.is_empty()).ok_or(MapErrors(wrong.0))
+    let map = raw.and_then(|raw| raw.check(name, asked, &mut wrong));
+    // What may be due to a key that could not be read is told once it can.
+    let mut values = wrong.0;
+    values.retain(|error| read.in_file(&error.message).is_some());
+    let keys = "docs/recordings.md lists the keys of a column map";
+    let said = read.said.iter().map(|words| fail(name, words.clone(), keys));
+    let wrong: Vec<MapError> = said.chain(values).collect();
+    map.filter(|_| wrong.is_empty()).ok_or(MapErrors(wrong))
 }
 
 impl RawMap {

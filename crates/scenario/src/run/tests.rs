@@ -95,6 +95,21 @@ fn every_effect_runs_at_its_usual_size() {
 }
 
 #[test]
+fn a_dry_drive_has_the_torque_that_brings_it_to_speed() {
+    for (drive, torque_n_m) in
+        [("voltage", 0.5 * 12.0 / 2.0), ("current", 0.5 * 12.0), ("speed", 0.01 * 12.0 / 0.1)]
+    {
+        let text = format!(
+            "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = 0.01\ntorque_constant_nm_a = 0.5\n\
+             winding_resistance_ohm = 2.0\n[amplifier]\nkind = \"{drive}\"\n"
+        );
+        let rig = Rig::from_toml(&text).unwrap();
+        let scale = scale(&rig, &Parameters::stated(&rig), 12.0, 0.002, 1.5);
+        assert!((scale.torque_n_m - torque_n_m).abs() < 1e-9, "{drive}: {}", scale.torque_n_m);
+    }
+}
+
+#[test]
 fn errors_name_the_key() {
     let rig = rig();
     let error = |s: &Scenario| Run::new(s, &rig, &mut NoReplays).err().unwrap()[0].to_string();

@@ -1,6 +1,6 @@
 //! The drive's throttle is not linear in what it drives.
 
-use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, commanded};
+use super::{Descriptor, Effect, Hooks, OF_THE_COMMAND, Path, Scale, Spec, commanded};
 use crate::plant::{Drive, Tick};
 use crate::real::Real;
 
@@ -51,7 +51,7 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
     vec![
         Spec::strength("second_degree_share", "1", 0.05, -0.6, 0.95).sigma(0.2),
         Spec::strength("third_degree_share", "1", 0.03, -0.3, 0.6).sigma(0.1),
-        Spec::held("full_command", "of the command", full, 0.01 * full, 100.0 * full),
+        Spec::held("full_command", OF_THE_COMMAND, full, 0.01 * full, 100.0 * full),
         point("point_at_0_2"),
         point("point_at_0_4"),
         point("point_at_0_6"),

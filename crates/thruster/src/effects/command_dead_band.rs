@@ -1,6 +1,6 @@
 //! The drive ignores small commands.
 
-use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, commanded};
+use super::{Descriptor, Effect, Hooks, OF_THE_COMMAND, Path, Scale, Spec, commanded};
 use crate::plant::{Drive, Tick};
 use crate::real::Real;
 
@@ -40,8 +40,8 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 fn parameters(scale: &Scale) -> Vec<Spec> {
     let full = scale.command;
     vec![
-        Spec::strength("half_width", "of the command", 0.02 * full, 0.0, 0.5 * full).sigma(0.07 * full),
-        Spec::shape("centre", "of the command", 0.0, -0.2 * full, 0.2 * full).sigma(0.03 * full),
+        Spec::strength("half_width", OF_THE_COMMAND, 0.02 * full, 0.0, 0.5 * full).sigma(0.07 * full),
+        Spec::shape("centre", OF_THE_COMMAND, 0.0, -0.2 * full, 0.2 * full).sigma(0.03 * full),
         Spec::shape("kept_outside", "1", 0.0, 0.0, 1.0).prior(0.0, 0.6),
     ]
 }

@@ -228,7 +228,7 @@ pub use needs::{
     ANGLE_KNOWN, Available, EXTRA, always, angle_known, commanded, flow_measured, free_shaft, geared,
     speaks_of_a_gear, speed_measured, thrust_measured, turns_round, wet,
 };
-pub use spec::{Scale, Spec, Stretch};
+pub use spec::{OF_THE_COMMAND, Scale, Spec, Stretch};
 
 macro_rules! catalogue {
     ($($name:ident),* $(,)?) => {

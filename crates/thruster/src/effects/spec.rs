@@ -1,5 +1,9 @@
 //! What an effect is given to go by: the sizes of a rig in use, and its parameters with bounds and priors.
 
+/// Unit of what is in that of the command: what a rig's drive is told, A, V or rad/s (of a duty, the volts that it makes of the
+/// supply).
+pub const OF_THE_COMMAND: &str = "of the command";
+
 /// Sizes of a rig in use, from which an effect takes the scale of its parameters.
 #[derive(Clone, Copy, Debug)]
 pub struct Scale {

@@ -1,6 +1,6 @@
 //! Constant offsets of torque and current: drive zero, current sensor, torque transducer.
 
-use super::{Descriptor, Effect, Hooks, Path, Scale, Spec, always, one_start};
+use super::{Descriptor, Effect, Hooks, OF_THE_COMMAND, Path, Scale, Spec, always, one_start};
 use crate::plant::{Balance, Drive, Local, Sensed, Tick};
 use crate::real::Real;
 
@@ -48,7 +48,7 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
             .sigma(0.05 * torque),
         Spec::strength(
             "command_offset",
-            "of the command",
+            OF_THE_COMMAND,
             0.02 * scale.command,
             -0.5 * scale.command,
             0.5 * scale.command,

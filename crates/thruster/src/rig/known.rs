@@ -30,6 +30,14 @@ impl KnownEffect {
         self.parameters.iter().map(|(_, quantity)| quantity.value)
     }
 
+    /// Why it does nothing, where every strength is stated as zero.
+    pub fn idle(&self) -> Option<&'static str> {
+        let specs = self.descriptor().map_or_else(Vec::new, |effect| (effect.parameters)(&Scale::ANY));
+        let mut strengths = specs.iter().zip(self.values()).filter(|(spec, _)| !spec.shape).peekable();
+        let idle = strengths.peek().is_some() && strengths.all(|(_, value)| value == 0.0);
+        idle.then_some("its size is zero: as the rig states it, it does nothing")
+    }
+
     /// A value by its name; zero if it has none of that name.
     pub fn value(&self, name: &str) -> f64 {
         self.parameters.iter().find(|(n, _)| *n == name).map_or(0.0, |(_, quantity)| quantity.value)

@@ -128,12 +128,12 @@ impl Reader<'_> {
         Sensors {
             log_rate_hz: self.number("sensors", "log_rate_hz"),
             control_rate_hz: self.number("sensors", "control_rate_hz"),
-            encoder_counts_per_rev: self.number("sensors", "encoder_counts_per_rev"),
+            encoder_counts_per_rev: self.count("sensors", "encoder_counts_per_rev"),
             speed_filter_time_constant_s: speed_filter.map(|filter| filter.value),
             speed_filter_tol: speed_filter.and_then(|filter| filter.tol),
             thrust_filter_hz: self.number("sensors", "thrust_filter_hz"),
             thrust_full_scale_n: self.number("sensors", "thrust_full_scale_n"),
-            thrust_bits: self.number("sensors", "thrust_bits").map(|b| b as u32),
+            thrust_bits: self.count("sensors", "thrust_bits").map(|b| b as u32),
             torque_filter_hz: self.number("sensors", "torque_filter_hz"),
             flow_rate_hz: self.number("sensors", "flow_rate_hz"),
             torque_transducer: self.choice("sensors", "torque", &torque, torque_hint).unwrap_or(false),
@@ -192,6 +192,22 @@ impl Reader<'_> {
 
     fn number(&mut self, table: &str, key: &str) -> Option<f64> {
         self.quantity(table, key).map(|q| q.value)
+    }
+
+    /// A number that counts something.
+    fn count(&mut self, table: &str, key: &str) -> Option<f64> {
+        let found = self.number(table, key)?;
+        if found.fract() != 0.0 {
+            let name = format!("{table}.{key}");
+            self.wrong.push(value_error(
+                &name,
+                found,
+                "a whole number",
+                "what is counted is whole: 4096, 12",
+            ));
+            return None;
+        }
+        Some(found)
     }
 
     /// What stands there and is allowed.

@@ -3,7 +3,8 @@
 use kort_control::{EstimatorKind, LawKind, ObserverKind};
 use kort_proto::messages::{ASIDE_NS, Outcome, Process, REQUEST_LIFE_NS, Reply, Request, RequestKind};
 
-use super::{Ending, Tick};
+use super::Tick;
+use super::end::Ending;
 
 impl Tick {
     /// Is a request meant for now, and for this controller?

@@ -14,6 +14,9 @@ use crate::view::MismatchView;
 /// between them somebody starts processes anew, arms and asks for thrust.
 const ONE_STOP: Duration = Duration::from_secs(1);
 
+/// A ramp that was heard of so lately came to its end with the disarming.
+const RAMP_OVER: Duration = Duration::from_millis(200);
+
 /// Is it this stop that the log tells of? A fault that nobody cleared stands there though processes and shared memory were
 /// started anew since and know nothing of it; then the same fault comes again. The supervisor says since when it is latched.
 /// Where there is none the servo says when it was stopped last: that no thruster is armed while a fault is latched dates
@@ -97,6 +100,10 @@ impl Bridge {
             let led = self.link.thruster.desk().lease.current(now).is_some();
             let words = match self.link.thruster.calibration(now) {
                 Some(calibration) => format!("disarmed: calibration {} has driven it as far as it wants", calibration.id),
+                // Its controller may not have heard of the lease in force.
+                None if led && self.ramped.is_some_and(|at| now.duration_since(at) < RAMP_OVER) => {
+                    "disarmed at the end of a ramp to zero: the lease before was over, or the service stops".into()
+                }
                 None if led => "disarmed, by none of this gateway's clients: the service stops, its servo is another, or another \
                                 process asked for it"
                     .into(),

@@ -20,8 +20,7 @@ impl Desk {
         recording: Option<String>,
         now: Instant,
     ) -> Result<u64, Problem> {
-        self.expire(now);
-        self.lease.check(&self.thruster, id, now)?;
+        self.check(id, now)?;
         if let Some(playing) = self.playing() {
             let words = format!("{} plays on {} already", playing.signal.name, self.thruster);
             return Err(Problem::new(Kind::ExcitationActive, words).hint("DELETE …/excitation ends it"));

@@ -12,7 +12,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 pub use follow::{After, follow};
-pub use prepare::{Commanded, Prepared, Wanted, from_scenario};
+pub use prepare::{Commanded, Prepared, Wanted, from_scenario, without_replay};
 pub use view::{ExcitationStep, ExcitationView};
 
 use crate::view::Setpoint;

@@ -193,7 +193,12 @@ pub fn from_scenario(scenario: Scenario, commanded: Option<Commanded>, limit: Op
     }
 }
 
-/// Refuses what would only cost time and memory here.
+/// What a parser expects, but for a kind that is not played here.
+pub fn without_replay(words: &str) -> String {
+    words.replace(", `replay`", "")
+}
+
+/// Refuses what would only cost time and memory here, and what is not played at all.
 fn modest(at: usize, segment: &Segment) -> Result<(), Problem> {
     let refused = |key: &str, found: String, allowed: String| {
         Err(Problem::new(
@@ -202,6 +207,11 @@ fn modest(at: usize, segment: &Segment) -> Result<(), Problem> {
         )
         .hint("correct the value"))
     };
+    if let Segment::Replay { .. } = segment {
+        let words = format!("segments[{at}].kind = \"replay\": replays are not played on a thruster");
+        let hint = "kort simulate plays them on a plant; here any other kind of segment is played";
+        return Err(Problem::new(Kind::InvalidField, words).hint(hint));
+    }
     let too_fast = |key: &str, hz: f64| refused(key, hz.to_string(), format!("at most {FASTEST_HZ}"));
     match segment {
         Segment::Prbs { each_s: s, .. } | Segment::RandomLevels { shortest_s: s, .. } if *s < SHORTEST_S => {
@@ -257,6 +267,17 @@ mod tests {
             Wanted { command: Command::Share, commanded: Some(Commanded::SpeedRadS), ..wanted(half()) };
         assert_eq!(Prepared::new(speed, RANGE).unwrap().setpoint(1.0), Setpoint::SpeedRadS(60.0));
         assert_eq!(Prepared::new(wanted(half()), RANGE).unwrap().setpoint(1.0), Setpoint::ThrustN(0.5));
+    }
+
+    #[test]
+    fn a_replay_is_not_played_and_nobody_is_told_to_try_one() {
+        let replay = "[[segments]]\nkind = \"replay\"\nrecording = \"a.csv\"\ncolumn = \"thrust_cmd_n\"\n";
+        let scenario = Scenario::from_text_with_all(replay).unwrap();
+        let told = refusal(from_scenario(scenario, Some(Commanded::ThrustN), None));
+        assert!(told.contains("replays are not played on a thruster"), "{told}");
+        let unknown = Scenario::from_text_with_all("[[segments]]\nkind = \"replai\"\n").unwrap_err();
+        let words = without_replay(&unknown[0].to_string());
+        assert!(words.contains("`prbs`") && !words.contains("`replay`"), "{words}");
     }
 
     #[test]

@@ -14,10 +14,10 @@ pub struct Change {
     #[schema(example = "effects.coulomb_friction.coulomb_torque_n_m")]
     pub key: String,
     /// What stood there: a number, a text, or a number with its tolerance; null if nothing did.
-    #[schema(value_type = Object, nullable)]
+    #[schema(value_type = Value)]
     pub before: Option<Value>,
     /// What stands there now; null if nothing does.
-    #[schema(value_type = Object, nullable, example = json!({"value": 0.31, "tol": 0.1}))]
+    #[schema(value_type = Value, example = json!({"value": 0.31, "tol": 0.1}))]
     pub after: Option<Value>,
 }
 

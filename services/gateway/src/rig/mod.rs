@@ -154,6 +154,11 @@ impl RigDesk {
         let (before, text_before) = self.book.current();
         let checked = self.check(text)?;
         if dry_run || *text_before == *text {
+            if !dry_run {
+                let (mut desk, lease, now) = (self.thruster.desk(), asker.lease.as_deref(), Instant::now());
+                desk.may(lease, now)?;
+                desk.done(lease, now);
+            }
             let difference = difference::between(&text_before, text);
             let unused_effects = checked.unused();
             return Ok(Revised { applied: false, in_force: before, difference, unused_effects });

@@ -17,13 +17,14 @@ pub fn routes() -> OpenApiRouter<Arc<App>> {
     OpenApiRouter::new().routes(routes!(arm)).routes(routes!(disarm)).routes(routes!(clear_faults))
 }
 
-/// Arms the drive, at zero: only a setpoint that comes after moves it. Needs the `Lease-Id` in force while somebody holds one.
+/// Arms the drive, at zero: only a setpoint that comes after moves it. Needs the `Lease-Id` in force.
 #[utoipa::path(post, path = "/v1/thrusters/{id}/arm", tag = "command",
     params(("id" = String, Path, description = "Name of the thruster", example = "t1"),
-           ("Lease-Id" = Option<String>, Header, pattern = "^[!-~]+$", description = "The lease_id of the lease in force, if there is one")),
+           ("Lease-Id" = String, Header, pattern = "^[!-~]+$", description = "The lease_id of the lease in force")),
     responses(
         (status = 200, description = "Armed", body = ThrusterState),
         (status = 400, description = "`malformed-header`", body = Problem, content_type = "application/problem+json"),
+        (status = 403, description = "`lease-required`: header `Lease-Id` is missing", body = Problem, content_type = "application/problem+json"),
         (status = 404, description = "`unknown-thruster`", body = Problem, content_type = "application/problem+json"),
         (status = 409, description = "`fault-latched`, `lease-held`, `lease-lost`", body = Problem, content_type = "application/problem+json"),
         (status = 503, description = "`not-ready`: servo or controller is away", body = Problem, content_type = "application/problem+json")))]

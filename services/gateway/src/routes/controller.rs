@@ -8,7 +8,7 @@ use kort_control::{EstimatorKind, LawKind, ObserverKind, TUNABLES};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 use utoipa::openapi::RefOr;
-use utoipa::openapi::schema::{AdditionalProperties, ObjectBuilder, Schema, Type};
+use utoipa::openapi::schema::{AdditionalProperties, ObjectBuilder, Schema, SchemaType, Type};
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 use crate::App;
@@ -56,19 +56,19 @@ pub struct LawParameter {
 }
 
 /// A law to switch to, parameters to change, or both.
-#[derive(Deserialize, ToSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 #[schema(example = json!({"controller": "velocity_servo"}))]
 pub struct ControllerRequest {
-    /// Law to switch to; left out keeps the present one.
+    /// Law to switch to; left out or null keeps the present one.
     #[serde(default, alias = "name")]
     #[schema(schema_with = law_schema)]
     pub controller: Option<String>,
-    /// Observer to switch to; left out keeps the present one.
+    /// Observer to switch to; left out or null keeps the present one.
     #[serde(default)]
     #[schema(schema_with = observer_schema)]
     pub observer: Option<String>,
-    /// Estimator to switch to; left out keeps the present one.
+    /// Estimator to switch to; left out or null keeps the present one.
     #[serde(default)]
     #[schema(schema_with = estimator_schema)]
     pub estimator: Option<String>,
@@ -79,7 +79,9 @@ pub struct ControllerRequest {
 }
 
 fn names_schema(names: impl Iterator<Item = &'static str>) -> RefOr<Schema> {
-    ObjectBuilder::new().schema_type(Type::String).enum_values(Some(names)).into()
+    let names = names.map(serde_json::Value::from).chain([serde_json::Value::Null]);
+    let kinds = SchemaType::from_iter([Type::String, Type::Null]);
+    ObjectBuilder::new().schema_type(kinds).enum_values(Some(names)).into()
 }
 
 fn law_schema() -> RefOr<Schema> {

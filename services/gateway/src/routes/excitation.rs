@@ -7,13 +7,16 @@ use axum::extract::{Extension, State};
 use axum::http::StatusCode;
 use kort_scenario::{Command, Scenario, Segment};
 use kort_thruster::models::ModelName;
-use serde::Deserialize;
+use serde::de::Error;
+use serde::{Deserialize, Deserializer};
 use utoipa::{IntoParams, ToSchema};
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 use crate::App;
 use crate::analysis::{DiagnosisInfo, Options};
-use crate::excitation::{After, Commanded, ExcitationView, Prepared, Wanted, follow, from_scenario};
+use crate::excitation::{
+    After, Commanded, ExcitationView, Prepared, Wanted, follow, from_scenario, without_replay,
+};
 use crate::extract::{Json, LeaseId, Path, Query};
 use crate::problem::{Kind, Problem};
 use crate::record::check_new_name;
@@ -34,10 +37,11 @@ pub fn routes() -> OpenApiRouter<Arc<App>> {
 pub struct ExcitationRequest {
     /// Segments as in a scenario (`hold`, `steps`, `staircase`, `ramp`, `reversals`, `sine`, `chirp`, `multisine`, `prbs`,
     /// `random_levels`, `points`), one after the other; values in N or rad/s.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "played")]
     #[schema(value_type = Option<Vec<Object>>)]
     segments: Option<Vec<Segment>>,
-    /// A whole scenario file, TOML or JSON, by thrust, shaft speed or shares; shares are shares of `limit`.
+    /// A whole scenario file, TOML or JSON, by thrust, shaft speed or shares; shares are shares of `limit`. One with a
+    /// `replay` is refused: replays are not played on a thruster.
     #[serde(default)]
     toml: Option<String>,
     /// Name of a diagnosis: the next experiment that it proposes is played and recorded, and the recording diagnosed
@@ -56,11 +60,21 @@ pub struct ExcitationRequest {
     seed: Option<u32>,
     /// Name of a recording made along with it.
     #[serde(default)]
-    #[schema(pattern = "^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")]
+    #[schema(pattern = r"^(?!.*\.(csv|mcap|parquet)$)[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")]
     record: Option<String>,
     /// Record it, and diagnose the recording once the signal is complete.
     #[serde(default)]
     diagnose: Option<bool>,
+}
+
+/// Segments; who writes an unknown kind is not told of the one that is not played here.
+fn played<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Vec<Segment>>, D::Error> {
+    let segments = Option::<Vec<serde_json::Value>>::deserialize(deserializer)?;
+    let read = |one| {
+        serde_json::from_value(one)
+            .map_err(|error: serde_json::Error| D::Error::custom(without_replay(&error.to_string())))
+    };
+    segments.map(|all| all.into_iter().map(read).collect()).transpose()
 }
 
 /// How.
@@ -196,9 +210,10 @@ fn wanted(app: &App, id: &str, request: ExcitationRequest) -> Result<Wanted, Pro
         }
         (None, Some(text), None) => {
             let scenario = Scenario::from_text_with_all(&text).map_err(|wrong| {
+                let wrong: Vec<_> = wrong.iter().map(|wrong| without_replay(&wrong.to_string())).collect();
                 Problem::of_many(Kind::InvalidField, &wrong, "")
                     .within("toml")
-                    .hint("`kort simulate` runs the same files; docs/recordings.md lists their keys")
+                    .hint("`kort simulate` runs the same files, and replays, which are not played on a thruster; docs/recordings.md lists their keys")
             })?;
             from_scenario(scenario, command, limit)
         }

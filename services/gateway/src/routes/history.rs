@@ -13,6 +13,7 @@ use crate::App;
 use crate::estimates::Estimates;
 use crate::extract::{Path, Query};
 use crate::problem::{Kind, Problem};
+use crate::thin::Due;
 
 const LAST_MAX_S: f64 = 3600.0;
 const HZ_MAX: f64 = 100.0;
@@ -76,14 +77,8 @@ async fn history(
         }
     }
     let (mut rows, estimates) = (ring.last(last_s).await, ring.estimates(last_s, hz).await);
-    let (gap_ns, mut next_ns) = ((1e9 / hz) as u64, 0);
-    rows.retain(|(at_ns, _)| {
-        let due = *at_ns >= next_ns;
-        if due {
-            next_ns = at_ns + gap_ns - gap_ns / 10; // rows are not quite evenly spaced
-        }
-        due
-    });
+    let mut due = Due::new(hz);
+    rows.retain(|(at_ns, _)| due.is(*at_ns));
     let column = |get: fn(&kort_proto::signals::Signals) -> f64| -> Vec<Option<f64>> {
         rows.iter().map(|(_, signals)| Some(get(signals)).filter(|value| value.is_finite())).collect()
     };

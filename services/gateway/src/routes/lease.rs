@@ -13,11 +13,9 @@ use crate::App;
 use crate::extract::{Json, LeaseId, Path};
 use crate::lease::{Lease, TTL_DEFAULT_MS, TTL_MAX_MS, Wanted};
 use crate::problem::{Kind, Problem};
-use crate::token::Identity;
+use crate::token::{Identity, PROCESSES};
 
 const HOLDER_CHARS_MAX: usize = 64;
-/// Who the event log says did what a process of the service does.
-const PROCESSES: [&str; 4] = ["servo", "controller", "gateway", "supervisor"];
 
 pub fn routes() -> OpenApiRouter<Arc<App>> {
     OpenApiRouter::new().routes(routes!(take, renew, give))
@@ -112,12 +110,8 @@ async fn take(
         )
         .hint("a lease is renewed by every accepted command; it need not be long"));
     };
-    let (lease, now) = thruster.take_lease(&Wanted {
-        holder: &request.holder,
-        token: &who.name,
-        ttl_ms,
-        takeover: request.takeover,
-    })?;
+    let wanted = Wanted { holder: &request.holder, token: &who.name, ttl_ms, takeover: request.takeover };
+    let (lease, now) = thruster.take_lease(&wanted).await?;
     Ok((StatusCode::CREATED, axum::Json(LeaseGrant::of(&lease, now))))
 }
 

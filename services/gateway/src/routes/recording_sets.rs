@@ -29,7 +29,7 @@ pub fn routes() -> OpenApiRouter<Arc<App>> {
 pub struct RecordingSetRequest {
     /// Name of the set; made of the time if left out. Its recordings are called `NAME-THRUSTER`.
     #[serde(default)]
-    #[schema(pattern = "^[A-Za-z0-9][A-Za-z0-9._-]{0,46}$")]
+    #[schema(pattern = r"^(?!.*\.(csv|mcap|parquet)$)[A-Za-z0-9][A-Za-z0-9._-]{0,46}$")]
     name: Option<String>,
     /// Largest rate of rows, Hz; the servo's own rate if that is smaller.
     #[serde(default)]

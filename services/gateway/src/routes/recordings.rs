@@ -44,7 +44,7 @@ pub struct RecordingRequest {
     thruster: Option<String>,
     /// Name of the recording; made of thruster and time if left out.
     #[serde(default)]
-    #[schema(pattern = "^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")]
+    #[schema(pattern = r"^(?!.*\.(csv|mcap|parquet)$)[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")]
     name: Option<String>,
     /// Largest rate of rows, Hz; the servo's own rate if that is smaller.
     #[serde(default)]

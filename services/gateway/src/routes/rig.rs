@@ -20,7 +20,7 @@ use crate::token::Identity;
 /// Largest rig description, bytes: the shipped ones have up to four thousand.
 const RIG_BYTES_MAX: usize = 256 * 1024;
 /// Longest note, bytes.
-const NOTE_BYTES_MAX: usize = 500;
+const NOTE_CHARS_MAX: usize = 500;
 
 pub fn routes() -> OpenApiRouter<Arc<App>> {
     OpenApiRouter::new()
@@ -190,7 +190,7 @@ async fn one(
 /// differs is shown. The body is the text itself (`text/plain` or `application/toml`), or JSON that names a revision.
 /// With `dry_run=true` nothing changes. Needs the role admin, and the `Lease-Id` in force while somebody holds one.
 #[utoipa::path(post, path = "/v1/thrusters/{id}/rig", tag = "rig",
-    request_body(content((RigRequest = "application/json"), (String = "text/plain"))),
+    request_body(content((RigRequest = "application/json"), (String = "text/plain"), (String = "application/toml"))),
     params(("id" = String, Path, description = "Name of the thruster", example = "t1"), How,
            ("Lease-Id" = Option<String>, Header, pattern = "^[!-~]+$", description = "The lease_id of the lease in force, if there is one")),
     responses(
@@ -212,11 +212,13 @@ async fn revise(
     RigBody(body): RigBody,
 ) -> Result<axum::Json<Revised>, Problem> {
     let desk = app.rig(&id)?;
-    if let Some(long) = body.note.as_ref().map(String::len).filter(|length| *length > NOTE_BYTES_MAX) {
+    let chars = body.note.as_ref().map(|note| note.chars().count());
+    if let Some(long) = chars.filter(|chars| *chars > NOTE_CHARS_MAX) {
         return Err(Problem::new(
             Kind::OutOfRange,
-            format!("note has {long} bytes; at most {NOTE_BYTES_MAX} are allowed"),
-        ));
+            format!("note has {long} characters; at most {NOTE_CHARS_MAX} are allowed"),
+        )
+        .hint("make it shorter"));
     }
     let (text, source) = wanted(&app, &id, &body)?;
     let making = Making { source, who: who.name.clone(), note: body.note };

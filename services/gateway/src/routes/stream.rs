@@ -3,6 +3,7 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use axum::body::Bytes;
 use axum::extract::ws::{
     CloseFrame, Message, Utf8Bytes, WebSocket, WebSocketUpgrade, rejection::WebSocketUpgradeRejection,
 };
@@ -52,7 +53,7 @@ pub fn routes() -> OpenApiRouter<Arc<App>> {
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 struct Rate {
-    /// States a second.
+    /// States a second; each is sent once, so that no more come than the controller makes (`controller.rate_hz` of kort.toml).
     #[serde(default = "hz_default")]
     #[param(minimum = 0.1, maximum = 500, default = 50, example = 50)]
     hz: f64,
@@ -72,7 +73,7 @@ pub struct Incoming {
     stop: bool,
 }
 
-/// The thruster's state as a WebSocket stream: one text message with a `ThrusterState` per period.
+/// The thruster's state as a WebSocket stream: one text message with a `ThrusterState` per period, each state once.
 ///
 /// The client may send `{"setpoint": {"thrust_n": 25.0}, "lease_id": "…"}`; what is refused is answered by one
 /// problem document. `{"stop": true}` stops every thruster and is answered by `{"stopped": [ids]}`. The gateway pings
@@ -119,7 +120,8 @@ async fn stream(
             let upgrade = upgrade.max_message_size(MESSAGE_BYTES_READ).max_frame_size(MESSAGE_BYTES_READ);
             let session = move |socket| {
                 let period = Duration::from_secs_f64(1.0 / hz);
-                Session { app, thruster, who, lease: None, asked_at: None, away: None }.serve(socket, period)
+                Session { app, thruster, who, lease: None, asked_at: None, away: None, sent: None }
+                    .serve(socket, period)
             };
             Ok(upgrade.protocols([PROTOCOL]).on_upgrade(session).into_response())
         }
@@ -145,6 +147,8 @@ struct Session {
     asked_at: Option<Instant>,
     /// How quick its quickest answer to a ping was.
     away: Option<Duration>,
+    /// The state that was sent last.
+    sent: Option<Bytes>,
 }
 
 impl Session {
@@ -211,7 +215,11 @@ impl Session {
                 return told.err().map(|problem| problem_text(&problem));
             }
         }
-        Some(text(&self.thruster.state_json()))
+        let state = self.thruster.state_json();
+        // It is rendered once: the same bytes are the same state, which this client has.
+        let known = self.sent.as_ref().is_some_and(|sent| sent.as_ptr() == state.as_ptr());
+        self.sent = Some(state.clone());
+        (!known).then(|| text(&state))
     }
 
     /// What a client's message is answered with.

@@ -1,18 +1,51 @@
-//! What a lease's holder commands: setpoints and test signals.
+//! The lease, and what its holder commands: setpoints and test signals.
 
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use kort_proto::faults::Fault;
 
 use super::{Thruster, latched};
 use crate::desk::{Desk, check_range};
 use crate::excitation::Prepared;
-use crate::lease::Lease;
+use crate::lease::{Lease, Wanted};
 use crate::problem::{Kind, Problem};
 use crate::view::Setpoint;
 
+/// Within so many heartbeats the controller hears of a lease, and what it asks of the servo then shows here.
+const TURNS_TO_HEAR: u32 = 5;
+
 impl Thruster {
+    /// Takes command. Where the drive is armed and nobody had it, the ramp of the lease before runs: by the answer its
+    /// controller has heard of this one, or the drive shows disarmed, so that what is accepted then is not lost.
+    pub async fn take_lease(&self, wanted: &Wanted<'_>) -> Result<(Lease, Instant), Problem> {
+        let now = Instant::now();
+        let (mut lease, led) = {
+            let mut desk = self.desk();
+            desk.expire(now);
+            let led = desk.lease.current(now).is_some();
+            (desk.take(wanted, now)?, led)
+        };
+        let heard_within = TURNS_TO_HEAR * self.heard().turn;
+        while !led && self.heard().armed(Instant::now()) && now.elapsed() < heard_within {
+            tokio::time::sleep(Duration::from_millis(2)).await;
+            // The wait is none of its life.
+            lease = self.desk().renew(Some(&lease.id), Instant::now())?;
+        }
+        Ok((lease, Instant::now()))
+    }
+
+    /// Renews the lease.
+    pub fn renew_lease(&self, id: Option<&str>) -> Result<(Lease, Instant), Problem> {
+        let now = Instant::now();
+        self.desk().renew(id, now).map(|lease| (lease, now))
+    }
+
+    /// Gives command up.
+    pub fn give_lease(&self, who: &str, id: Option<&str>) -> Result<(), Problem> {
+        self.desk().give(who, id, Instant::now())
+    }
+
     /// Puts a setpoint in force. `who` asks, for the event log, here and below.
     pub fn command(
         &self,
@@ -30,7 +63,7 @@ impl Thruster {
     /// May this lease command now? Under it, armed, without a fault.
     pub fn may_command(&self, desk: &mut Desk, lease: Option<&str>, now: Instant) -> Result<(), Problem> {
         let heard = self.heard();
-        desk.lease.check(&self.id, lease, now)?;
+        desk.check(lease, now)?;
         self.ready()?;
         self.not_calibrated()?;
         if let Some(fault) = Fault::in_set(heard.faults(now)).next() {
@@ -69,7 +102,8 @@ impl Thruster {
             return Err(Problem::new(Kind::NoExcitation, format!("no test signal plays on {}", self.id))
                 .hint("POST …/excitation begins one"));
         }
-        desk.end_excitation_at_zero(now, Some(&format!("{who} ended it")));
+        let by = desk.lease.by(who, lease).words;
+        desk.end_excitation_at_zero(now, Some(&format!("{by} ended it")));
         desk.done(lease, now);
         Ok(())
     }

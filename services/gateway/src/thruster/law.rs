@@ -2,11 +2,12 @@
 
 use std::time::Instant;
 
-use kort_control::{EstimatorKind, ObserverKind};
+use kort_control::{ConfigError, ControllerConfig, EstimatorKind, ObserverKind};
 use kort_proto::events::EventKind;
-use kort_proto::messages::{ControllerState, PARAMETERS, Parameter, Process, RequestKind};
+use kort_proto::messages::{ControllerState, PARAMETERS, Parameter, Process, Request, RequestKind};
 use kort_proto::text::Text;
 
+use super::kept_law::words;
 use super::{Thruster, finite, request};
 use crate::problem::{Kind, Problem};
 use crate::routes::{ControllerRequest, ControllerView, LawParameter};
@@ -59,61 +60,71 @@ impl Thruster {
                 .hint(format!("choose one of {}", now.available.join(", ")))
                 .allowed(now.available));
         }
-        if wanted.parameters.len() > PARAMETERS {
-            return Err(Problem::new(
-                Kind::OutOfRange,
-                format!(
-                    "parameters has {} entries; at most {PARAMETERS} are allowed",
-                    wanted.parameters.len()
-                ),
-            ));
+        let mut kept = self.law.lock().await;
+        self.ask_law(wanted).await?;
+        kept.set(wanted);
+        match words(wanted) {
+            nothing if nothing.is_empty() => self.desk().done(lease, Instant::now()),
+            changed => self.did(who, lease, EventKind::ControllerChanged, &format!("set {changed}")),
         }
-        let mut message = request(RequestKind::SetController);
-        for (field, slot, name) in [
-            ("controller", &mut message.law, &wanted.controller),
-            ("observer", &mut message.observer, &wanted.observer),
-            ("estimator", &mut message.estimator, &wanted.estimator),
-        ] {
-            let Some(name) = name else { continue };
-            *slot = Text::new(name);
-            if name.is_empty() || slot.as_str() != name {
-                return Err(Problem::new(
-                    Kind::OutOfRange,
-                    format!("{field} = {name:?} must have 1 to 32 bytes"),
-                )
-                .hint("leave it out to keep the present one"));
-            }
-        }
-        message.parameter_count = wanted.parameters.len() as u32;
-        for (slot, (name, value)) in message.parameters.iter_mut().zip(&wanted.parameters) {
-            if Text::<32>::new(name).as_str() != name {
-                return Err(Problem::new(
-                    Kind::InvalidField,
-                    format!("parameters names {name:?}, which no law has"),
-                ));
-            }
-            *slot = Parameter { name: Text::new(name), value: *value, ..Parameter::default() };
-        }
-        self.ask(message, &[Process::Controller], Kind::Refused).await?;
+        Ok(())
+    }
+
+    /// Has the controller run this, and waits until it says so itself.
+    pub async fn ask_law(&self, wanted: &ControllerRequest) -> Result<(), Problem> {
+        self.ask(message(wanted)?, &[Process::Controller], Kind::Refused).await?;
         // The answer tells what is in force: not before it is heard of.
         self.settle(|heard, now| heard.controller(now).is_some_and(|state| follows(state, wanted))).await;
-        let parts = [
-            ("controller", wanted.controller.as_deref()),
-            ("observer", wanted.observer.as_deref()),
-            ("estimator", wanted.estimator.as_deref()),
-        ];
-        let mut changed: Vec<String> =
-            parts.into_iter().filter_map(|(part, name)| Some(format!("{part} = {}", name?))).collect();
-        changed.extend(wanted.parameters.iter().map(|(name, value)| format!("{name} = {value}")));
-        if !changed.is_empty() {
-            self.did(who, lease, EventKind::ControllerChanged, &format!("set {}", changed.join(", ")));
-        }
         Ok(())
     }
 }
 
+/// What the controller is asked.
+fn message(wanted: &ControllerRequest) -> Result<Request, Problem> {
+    if wanted.parameters.len() > PARAMETERS {
+        let words =
+            format!("parameters has {} entries; at most {PARAMETERS} are allowed", wanted.parameters.len());
+        return Err(Problem::new(Kind::OutOfRange, words).hint("send the others with another request"));
+    }
+    let mut message = request(RequestKind::SetController);
+    for (field, slot, name) in [
+        ("controller", &mut message.law, &wanted.controller),
+        ("observer", &mut message.observer, &wanted.observer),
+        ("estimator", &mut message.estimator, &wanted.estimator),
+    ] {
+        let Some(name) = name else { continue };
+        *slot = Text::new(name);
+        if name.is_empty() || slot.as_str() != name {
+            return Err(Problem::new(
+                Kind::OutOfRange,
+                format!("{field} = {name:?} must have 1 to 32 bytes"),
+            )
+            .hint("leave it out to keep the present one"));
+        }
+    }
+    message.parameter_count = wanted.parameters.len() as u32;
+    for (slot, (name, value)) in message.parameters.iter_mut().zip(&wanted.parameters) {
+        ControllerConfig::default().set(name, *value).map_err(|error| not_tunable(&error))?;
+        *slot = Parameter { name: Text::new(name), value: *value, ..Parameter::default() };
+    }
+    Ok(message)
+}
+
+/// A parameter that no law has, or a value that it must not have.
+fn not_tunable(error: &ConfigError) -> Problem {
+    let kind = match error {
+        ConfigError::Range { .. } => Kind::OutOfRange,
+        ConfigError::UnknownParameter { .. } | ConfigError::Syntax { .. } => Kind::InvalidField,
+    };
+    let words = error.to_string();
+    match words.split_once("\nhint: ") {
+        Some((detail, hint)) => Problem::new(kind, detail).hint(hint),
+        None => Problem::new(kind, words),
+    }
+}
+
 /// Whether a controller runs what was wanted of it.
-fn follows(state: &ControllerState, wanted: &ControllerRequest) -> bool {
+pub fn follows(state: &ControllerState, wanted: &ControllerRequest) -> bool {
     let parts = [
         (&state.law, &wanted.controller),
         (&state.observer, &wanted.observer),

@@ -8,11 +8,10 @@ use kort_diagnose::diagnose::{Diagnosis, Options, diagnose};
 use kort_identify::identify::FittedEffect;
 use kort_recording::{Column, Recording};
 use kort_thruster::models::ModelName;
-use kort_thruster::parameters::Parameter;
 use kort_thruster::rig::Rig;
 
 use crate::failure::Failure;
-use crate::fitted_rig::{with_fitted, with_fitted_effects};
+use crate::fitted_rig::{parted, with_fitted, with_fitted_effects};
 
 /// What stands behind each value in the rig description.
 const MEASURED: &str = "measured by kort calibrate";
@@ -39,13 +38,9 @@ pub fn estimated(
 /// The text is no rig description.
 pub fn rig_text(text: &str, estimate: &Estimate) -> Result<(String, Vec<String>), Failure> {
     let fit = &estimate.fit;
-    let open =
-        |name: &str| fit.not_identifiable.iter().any(|group| group.parameters.iter().any(|p| p == name));
-    let (kept, fixed): (Vec<_>, Vec<_>) = fit.parameters.iter().cloned().partition(|p| open(&p.name));
+    let (kept, fixed) = parted(fit);
     let (mut text, mut left_out) = with_fitted(text, &fixed, MEASURED).map_err(Failure::failed)?;
-    // Whose fitted value is the statement's, pulled about by the rest, is not written as if it had been measured.
-    let kept = kept.iter().filter(|p| Parameter::ALL.iter().any(|of_rig| of_rig.name() == p.name));
-    left_out.extend(kept.map(|p| format!("{} stays as stated: the session does not fix it", p.name)));
+    left_out.extend(kept.iter().map(|p| format!("{} stays as stated: the session does not fix it", p.name)));
     let rig = Rig::from_toml(&text).map_err(Failure::failed)?;
     let (effects, not_seen) = standing_out(estimate, &rig);
     left_out.extend(not_seen);

@@ -9,7 +9,8 @@ use kort_thruster::rig::Rig;
 use rustix::process::nice;
 
 use crate::calibrate::{conclude, live, rehearse};
-use crate::failure::{Failure, Outcome, check_writable, print, print_json, write_text};
+use crate::failure::{Failure, Outcome, print, print_json, write_text};
+use crate::outputs::Named;
 use crate::{files, progress, render};
 
 const EXAMPLE: &str = "\
@@ -67,6 +68,22 @@ pub struct Calibrate {
 }
 
 impl Calibrate {
+    /// The files that it reads, and those that it writes.
+    pub fn named(&self) -> Named {
+        if self.rehearse.is_some() {
+            return Named::default();
+        }
+        let named = Named::default().reads_rig(self.rig.as_deref());
+        let named = self.config.iter().fold(named, |named, file| named.reads("deployment", file));
+        let recording = self.output.as_deref().map(|output| self.recorded(output));
+        named.writes_toml("-o", self.output.as_deref()).writes("--recording", recording.as_deref())
+    }
+
+    /// The recording to write.
+    fn recorded(&self, output: &Path) -> PathBuf {
+        self.recording.clone().unwrap_or_else(|| output.with_extension("csv.gz"))
+    }
+
     /// The service's process that this is a job of.
     pub fn job_of(&self) -> Option<u32> {
         self.job
@@ -112,9 +129,7 @@ fn session(
     rig: &Rig,
     output: &Path,
 ) -> Result<Outcome, Failure> {
-    let recording = args.recording.clone().unwrap_or_else(|| output.with_extension("csv.gz"));
-    check_writable(output)?;
-    check_writable(&recording)?;
+    let recording = args.recorded(output);
     let root = args.root.as_deref().unwrap_or(&config.transport.root);
     let deployment = Deployment::new(Some(root));
     let bench = live::Bench {
@@ -155,7 +170,7 @@ fn session(
         if args.json {
             print_json(&report)?;
         } else {
-            print(&render::calibration::text(&report));
+            print(&render::calibration::text(&report))?;
         }
         return Err(Failure::failed(why));
     }
@@ -181,8 +196,8 @@ fn session(
     if args.json {
         print_json(&report)?;
     } else {
-        print(&render::calibration::text(&report));
-        print(&render::verdict::text(&diagnosis.report, &calibrated));
+        print(&render::calibration::text(&report))?;
+        print(&render::verdict::text(&diagnosis.report, &calibrated))?;
     }
     Ok(Outcome::Done)
 }
@@ -212,7 +227,7 @@ fn rehearsal(args: &Calibrate, rig: &Rig, rigs: u64) -> Result<Outcome, Failure>
     if args.json {
         print_json(&rehearsal)?;
     } else {
-        print(&render::calibration::rehearsal(&rehearsal));
+        print(&render::calibration::rehearsal(&rehearsal))?;
     }
     Ok(Outcome::Done)
 }

@@ -6,7 +6,8 @@ use std::path::PathBuf;
 use kort_recording::Recording;
 use kort_recording::log::{FieldSurvey, Survey, TopicSurvey, survey};
 
-use crate::failure::{Failure, Outcome, check_writable, print, print_json, write_text};
+use crate::failure::{Failure, Outcome, print, print_json, write_text};
+use crate::outputs::Named;
 use crate::progress;
 
 const EXAMPLE: &str = "\
@@ -37,14 +38,18 @@ pub struct Args {
     json: bool,
 }
 
+impl Args {
+    /// The files that it reads, and those that it writes.
+    pub fn named(&self) -> Named {
+        Named::default().reads("log", &self.log).writes_toml("-o", self.output.as_deref())
+    }
+}
+
 /// Does it.
 ///
 /// # Errors
 /// The log cannot be read, or nothing in it can be proposed where a map was asked for.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
-    if let Some(path) = &args.output {
-        check_writable(path)?;
-    }
     let file = Recording::open(&args.log).map_err(Failure::input)?;
     let size = file.metadata().map_or(0, |m| m.len());
     let name = args.log.display().to_string();
@@ -58,7 +63,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     if args.json {
         print_json(&found)?;
     } else {
-        print(&text(&found, args.fields));
+        print(&text(&found, args.fields))?;
     }
     if let Some(path) = &args.output {
         let map = found.proposal.map.as_deref().ok_or_else(|| {
@@ -153,8 +158,15 @@ fn short(value: f64) -> String {
 fn proposal(found: &Survey) -> String {
     let mut out = String::from("\n");
     if found.proposal.native {
-        let _ =
-            writeln!(out, "a recording of kort: no map is needed\n  kort diagnose {} --rig RIG", found.file);
+        let refused = found.resets > 0 || found.losses.iter().any(|lost| lost.contains("is refused for it"));
+        let _ = if refused {
+            writeln!(
+                out,
+                "a recording of kort: it needs no map, and is refused as it is for what is said above"
+            )
+        } else {
+            writeln!(out, "a recording of kort: no map is needed\n  kort diagnose {} --rig RIG", found.file)
+        };
     }
     for name in &found.proposal.shipped {
         let file = &found.file;

@@ -2,12 +2,13 @@
 
 use std::path::PathBuf;
 
-use kort_recording::columns::known;
+use kort_recording::columns::{find, known};
 use kort_recording::{Format, Recording};
 use serde::Serialize;
 
-use crate::failure::{Failure, Outcome, check_writable, print, print_json};
+use crate::failure::{Failure, Outcome, print, print_json};
 use crate::files;
+use crate::outputs::Named;
 
 const EXAMPLE: &str = "\
 Example: kort convert flight.ulg --columns px4:motor=2 -o flight.parquet
@@ -33,6 +34,14 @@ pub struct Args {
     json: bool,
 }
 
+impl Args {
+    /// The files that it reads, and those that it writes.
+    pub fn named(&self) -> Named {
+        let named = Named::default().reads("recording", &self.recording).reads_map(self.columns.as_deref());
+        named.writes("-o", Some(&self.output))
+    }
+}
+
 /// What was written.
 #[derive(Debug, Serialize)]
 struct Written<'r> {
@@ -45,8 +54,8 @@ struct Written<'r> {
     from_s: Option<f64>,
     to_s: Option<f64>,
     columns: Vec<WrittenColumn<'r>>,
-    /// Columns of the log that the map does not take.
-    unused: &'r [String],
+    /// Columns of the log that the map does not take, and those that stay and nothing knows.
+    unused: Vec<&'r str>,
     notes: &'r [String],
     losses: &'r [String],
 }
@@ -75,11 +84,20 @@ impl<'r> Written<'r> {
             from_s: recording.time_s.first().copied(),
             to_s: recording.time_s.last().copied(),
             columns: columns.collect(),
-            unused: &recording.unused,
+            unused: unused(recording).collect(),
             notes: &recording.notes,
             losses: &recording.losses,
         }
     }
+}
+
+/// Columns that nothing uses: left out by the map, or kept under a name of their own.
+fn unused(recording: &Recording) -> impl Iterator<Item = &str> {
+    let columns = recording.columns.iter().map(|column| column.name.as_str());
+    let left_out = recording.unused.iter().map(String::as_str);
+    // What a log states that was measured beside the drive has names that the contract leaves out.
+    let beside = |name: &str| matches!(name, "supply_current_a" | "power_w" | "torque_enable");
+    left_out.chain(columns.filter(move |name| find(name).is_none() && !beside(name)))
 }
 
 /// Does it.
@@ -88,11 +106,11 @@ impl<'r> Written<'r> {
 /// The log cannot be read, or the file cannot be written.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     Format::of(&args.output).map_err(Failure::input)?;
-    check_writable(&args.output)?;
     let map = files::read_columns(args.columns.as_deref())?;
     let recording = files::read_recording(&args.recording, map.as_ref())?;
-    if !recording.unused.is_empty() {
-        eprintln!("columns not used: {}", recording.unused.join(", "));
+    let unknown: Vec<&str> = unused(&recording).collect();
+    if !unknown.is_empty() {
+        eprintln!("columns not used: {}", unknown.join(", "));
     }
     recording.save(&args.output).map_err(Failure::failed)?;
     if args.json {
@@ -100,6 +118,6 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         return Ok(Outcome::with_loss(!recording.losses.is_empty()));
     }
     let names: Vec<&str> = recording.columns.iter().map(|column| column.name.as_str()).collect();
-    print(&format!("{}: {} rows of {}\n", args.output.display(), recording.rows(), names.join(", ")));
+    print(&format!("{}: {} rows of {}\n", args.output.display(), recording.rows(), names.join(", ")))?;
     Ok(Outcome::with_loss(!recording.losses.is_empty()))
 }

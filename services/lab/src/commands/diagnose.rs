@@ -10,6 +10,7 @@ use kort_thruster::rig::Rig;
 use crate::believed::{DIAGNOSED, believed};
 use crate::failure::{Failure, Outcome, print, print_json, write_text};
 use crate::input::{Input, Loaded};
+use crate::outputs::Named;
 use crate::progress::Steps;
 use crate::render;
 
@@ -70,6 +71,12 @@ impl Diagnose {
         self.job
     }
 
+    /// The files that it reads, and those that it writes.
+    pub fn named(&self) -> Named {
+        let named = self.input.named().writes_toml("-o", self.output.as_deref());
+        named.writes("--html", self.html.as_deref())
+    }
+
     /// Does it.
     ///
     /// # Errors
@@ -79,8 +86,19 @@ impl Diagnose {
         let steps = Steps::new(self.job);
         let diagnosis = diagnosis(&self.input, &loaded, &|step: &str| steps.tell(step))?;
         drop(steps);
+        // The result is printed whatever becomes of its files.
+        let written = self.write(&diagnosis, &loaded);
+        if self.json {
+            print_json(&diagnosis.report)?;
+        } else {
+            print(&render::verdict::text(&diagnosis.report, &loaded.rig))?;
+        }
+        written.map(|()| Outcome::with_loss(loaded.lossy))
+    }
+
+    fn write(&self, diagnosis: &Diagnosis, loaded: &Loaded) -> Result<(), Failure> {
         if let Some(path) = &self.html {
-            write_text(path, &render::diagnosis::page(&diagnosis, &loaded.rig))?;
+            write_text(path, &render::diagnosis::page(diagnosis, &loaded.rig))?;
             eprintln!("wrote {}", path.display());
         }
         if let Some(path) = &self.output {
@@ -89,11 +107,6 @@ impl Diagnose {
             let names = if names.is_empty() { "nothing".to_string() } else { names.join(", ") };
             eprintln!("wrote {} with {names}", path.display());
         }
-        if self.json {
-            print_json(&diagnosis.report)?;
-        } else {
-            print(&render::verdict::text(&diagnosis.report, &loaded.rig));
-        }
-        Ok(Outcome::with_loss(loaded.lossy))
+        Ok(())
     }
 }

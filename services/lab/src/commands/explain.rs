@@ -70,13 +70,13 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         let effects = chosen.iter().map(|effect| Entry::of(effect)).collect();
         print_json(&Document { schema: "kort.explain/1", effects, controllers })?;
     } else if let Some(about) = controller {
-        print(&controllers::Entry::of(about).in_full());
+        print(&controllers::Entry::of(about).in_full())?;
     } else if args.markdown {
-        print(&markdown(&chosen));
+        print(&markdown(&chosen))?;
     } else if args.effect.is_some() {
-        print(&in_full(&Entry::of(chosen[0])));
+        print(&in_full(&Entry::of(chosen[0])))?;
     } else {
-        print(&format!("{}\n{}\nOne in full: kort explain NAME\n", table(&chosen), controllers::table()));
+        print(&format!("{}\n{}\nOne in full: kort explain NAME\n", table(&chosen), controllers::table()))?;
     }
     Ok(Outcome::Done)
 }

@@ -1,14 +1,17 @@
 //! `kort fit`: the parameters of a model from recordings.
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use clap::Args;
 use kort_diagnose::constants::Constants;
 use kort_identify::identify::{FitReport, Options, identify};
+use kort_recording::columns::find;
 
 use crate::failure::{Failure, Outcome, print, print_json, write_text};
-use crate::fitted_rig::{FITTED, with_fitted, with_fitted_effects};
+use crate::fitted_rig::with_fit;
 use crate::input::{Input, Loaded};
+use crate::outputs::Named;
 use crate::progress::Steps;
 use crate::render;
 
@@ -19,6 +22,9 @@ Example: kort fit tests/recordings/example-cases/clean.csv.gz \\
 Exit code 3 means that the fit was done but rows were lost in reading or left out
 because a sensor misbehaves there; the notes say which.";
 
+/// A column that is none of the contract's and that the model reads all the same.
+const ENABLED: &str = "torque_enable";
+
 /// Identify a model's parameters, with standard errors and a held-out score
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLE)]
@@ -26,7 +32,7 @@ pub struct Fit {
     #[command(flatten)]
     input: Input,
     /// Write the rig description with the fitted values, those of effects among its [[effects]]; tol = two
-    /// standard errors
+    /// standard errors; what the recordings do not fix stays as stated
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Fits from this many starts within the stated tolerances
@@ -65,6 +71,15 @@ pub fn fit(
     let report = input.on_threads(|| identify(&loaded.series, &loaded.rig, &options, told))?;
     let mut report = report.map_err(Failure::input)?;
     report.notes.splice(0..0, loaded.notes.iter().cloned());
+    let columns = loaded.series.iter().flat_map(|series| &series.columns);
+    let unknown: BTreeSet<&str> = columns
+        .map(|(name, _)| name.as_str())
+        .filter(|name| find(name).is_none() && *name != ENABLED)
+        .collect();
+    if !unknown.is_empty() {
+        let unknown: Vec<&str> = unknown.into_iter().collect();
+        report.notes.push(format!("columns not used: {}", unknown.join(", ")));
+    }
     Ok(report)
 }
 
@@ -72,6 +87,11 @@ impl Fit {
     /// The service's process that this is a job of.
     pub fn job_of(&self) -> Option<u32> {
         self.job
+    }
+
+    /// The files that it reads, and those that it writes.
+    pub fn named(&self) -> Named {
+        self.input.named().writes_toml("-o", self.output.as_deref())
     }
 
     /// Does it.
@@ -84,22 +104,24 @@ impl Fit {
         let told = |step: &str| steps.tell(step);
         let report = fit(&self.input, &loaded, usize::from(self.starts), self.free_friction, &told)?;
         drop(steps);
+        // The result is printed whatever becomes of its file.
+        let written = self.write(&report, &loaded);
+        if self.json {
+            print_json(&report)?;
+        } else {
+            print(&render::fit::text(&report, &loaded.rig))?;
+        }
+        written.map(|()| Outcome::with_loss(loaded.lossy))
+    }
+
+    fn write(&self, report: &FitReport, loaded: &Loaded) -> Result<(), Failure> {
         if let Some(path) = &self.output {
-            let (text, mut left_out) =
-                with_fitted(&loaded.rig_text, &report.parameters, FITTED).map_err(Failure::failed)?;
-            let (text, effects_left_out) =
-                with_fitted_effects(&text, &report.effects, FITTED).map_err(Failure::failed)?;
-            left_out.extend(effects_left_out);
+            let (text, left_out) = with_fit(&loaded.rig_text, report).map_err(Failure::failed)?;
             write_text(path, &text)?;
             for why in left_out {
                 eprintln!("note: {}: {why}", path.display());
             }
         }
-        if self.json {
-            print_json(&report)?;
-        } else {
-            print(&render::fit::text(&report, &loaded.rig));
-        }
-        Ok(Outcome::with_loss(loaded.lossy))
+        Ok(())
     }
 }

@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use crate::failure::{Failure, Outcome, print, print_json, write_text};
 use crate::files;
+use crate::outputs::Named;
 
 mod branch;
 
@@ -53,6 +54,14 @@ pub struct Args {
     /// Print one JSON document (kort.fit-table/1)
     #[arg(long)]
     json: bool,
+}
+
+impl Args {
+    /// The files that it reads, and those that it writes.
+    pub fn named(&self) -> Named {
+        let named = Named::default().reads("table", &self.table).reads_map(self.columns.as_deref());
+        named.writes_toml("-o", self.output.as_deref())
+    }
 }
 
 /// One run of the table: a supply voltage.
@@ -130,12 +139,25 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         ));
     }
     let description = toml(args, &chosen, &others, lift, drag);
-    // What is written must be readable.
-    kort_thruster::rig::Rig::from_toml(&description).map_err(Failure::failed)?;
-    if let Some(path) = &args.output {
-        write_text(path, &description)?;
-        eprintln!("rig: {}", path.display());
-    }
+    // What is written must be readable; what no rig may be was asked for.
+    kort_thruster::rig::Rig::from_toml(&description).map_err(|wrong| {
+        let options = [
+            ("`propeller.radius_m`", "--radius-m"),
+            ("`propeller.duct_length_m`", "--duct-length-m"),
+            ("`propeller.pitch_rad`", "--pitch-rad"),
+            ("`motor.inertia_kg_m2`", "--inertia-kg-m2"),
+            ("`flow.density_kg_m3`", "--density-kg-m3"),
+        ];
+        let words = wrong.to_string();
+        match options.iter().find(|(key, _)| words.contains(key)) {
+            Some((key, option)) => Failure::input(words.replace(key, option)),
+            None => Failure::in_file(&args.table, words),
+        }
+    })?;
+    // The result is printed whatever becomes of its file.
+    let written = args.output.as_ref().map_or(Ok(()), |path| {
+        write_text(path, &description).inspect(|()| eprintln!("rig: {}", path.display()))
+    });
     if args.json {
         print_json(&Document {
             schema: "kort.fit-table/1",
@@ -148,11 +170,11 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
             not_identifiable: OPEN.to_vec(),
         })?;
     } else if args.output.is_some() {
-        print(&findings(&chosen, &others, "").replace("\n# ", "\n"));
+        print(&findings(&chosen, &others, "").replace("\n# ", "\n"))?;
     } else {
-        print(&description);
+        print(&description)?;
     }
-    Ok(Outcome::Done)
+    written.map(|()| Outcome::Done)
 }
 
 fn read(path: &Path, map: Option<&ColumnMap>) -> Result<Run, Failure> {

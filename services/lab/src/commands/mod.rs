@@ -15,6 +15,7 @@ pub mod soak;
 use clap::Subcommand;
 
 use crate::failure::{Failure, Outcome};
+use crate::outputs::Named;
 
 /// The laboratory's subcommands.
 #[derive(Debug, Subcommand)]
@@ -59,8 +60,26 @@ impl Command {
         matches!(self, Command::Calibrate(_))
     }
 
+    /// The files that it reads, and those that it writes.
+    fn named(&self) -> Named {
+        match self {
+            Command::Calibrate(args) => args.named(),
+            Command::Columns(args) => args.named(),
+            Command::Convert(args) => args.named(),
+            Command::Diagnose(diagnose) => diagnose.named(),
+            Command::Explain(_) => Named::default(),
+            Command::Fit(fit) => fit.named(),
+            Command::FitTable(args) => args.named(),
+            Command::Reproduce(args) => args.named(),
+            Command::Simulate(args) => args.named(),
+            Command::Soak(args) => args.named(),
+            Command::Prove(prove) => prove.named(),
+        }
+    }
+
     /// Does it.
     pub fn run(self) -> Result<Outcome, Failure> {
+        self.named().check()?;
         match self {
             Command::Calibrate(args) => calibrate::run(&args),
             Command::Columns(args) => columns::run(&args),

@@ -7,6 +7,7 @@ use maud::html;
 use serde::Serialize;
 
 use crate::failure::{Failure, Outcome, print, print_json, write_text};
+use crate::outputs::Named;
 use crate::render::{Chart, Mark, Page, Series, number, table};
 use kort_reproduce::{Figure, Part, Row, Shown, Verdict};
 
@@ -29,6 +30,13 @@ pub struct Args {
     seed: u64,
 }
 
+impl Args {
+    /// The files that it reads, and those that it writes.
+    pub fn named(&self) -> Named {
+        Named::default().writes("--html", self.html.as_deref())
+    }
+}
+
 #[derive(Serialize)]
 struct Document<'a> {
     schema: &'static str,
@@ -43,10 +51,10 @@ struct Document<'a> {
 /// The page cannot be written.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let parts = kort_reproduce::all(args.seed).map_err(Failure::failed)?;
-    if let Some(path) = &args.html {
-        write_text(path, &page(&parts, args.seed))?;
-        eprintln!("page: {}", path.display());
-    }
+    // The result is printed whatever becomes of its page.
+    let written = args.html.as_ref().map_or(Ok(()), |path| {
+        write_text(path, &page(&parts, args.seed)).inspect(|()| eprintln!("page: {}", path.display()))
+    });
     if args.json {
         let rows = parts.iter().flat_map(|p| &p.rows).collect();
         print_json(&Document {
@@ -56,9 +64,9 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
             rows,
         })?;
     } else {
-        print(&text(&parts));
+        print(&text(&parts))?;
     }
-    Ok(Outcome::Done)
+    written.map(|()| Outcome::Done)
 }
 
 fn shown(value: &Shown) -> String {

@@ -9,7 +9,9 @@ use kort_recording::{Column, Format, Recording, TOPIC, Writer};
 use kort_scenario::{Replayed, Replays, Run, Scenario};
 use serde::Serialize;
 
+use crate::check::Kind;
 use crate::failure::{Failure, Outcome, print, print_json};
+use crate::outputs::Named;
 use crate::{files, progress};
 
 /// Arguments of `kort simulate`.
@@ -42,6 +44,14 @@ pub struct Args {
     json: bool,
 }
 
+impl Args {
+    /// The files that it reads, and those that it writes.
+    pub fn named(&self) -> Named {
+        let named = Named::default().reads_rig(Some(&self.rig)).reads("scenario", &self.scenario);
+        named.writes("-o", Some(&self.output))
+    }
+}
+
 #[derive(Serialize)]
 struct Report<'a> {
     schema: &'static str,
@@ -62,11 +72,19 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let rig = files::read_rig(&args.rig)?;
     let mut scenario = read_scenario(&args.scenario)?;
     scenario.seed = args.seed.unwrap_or(scenario.seed);
+    if let Some(noise) = args.noise.filter(|noise| !(noise.is_finite() && *noise >= 0.0)) {
+        return Err(Failure::input(format!(
+            "--noise {noise}: allowed is 0 (off) or a factor above 0\nhint: 1 is the usual noise of the rig's sensors"
+        )));
+    }
     scenario.noise = args.noise.unwrap_or(scenario.noise);
     let mut files = Files::beside(&args.scenario);
     let mut run =
         Run::new(&scenario, &rig, &mut files).map_err(|wrong| Failure::in_file_all(&args.scenario, wrong))?;
     let columns = run.columns().to_vec();
+    let replayed =
+        files.read.iter().fold(Named::default(), |named, file| named.reads("replayed recording", file));
+    replayed.writes("-o", Some(&args.output)).check()?;
     let duration_s = write(&mut run, format, &args.output)?;
     let report = Report {
         schema: "kort.simulate/1",
@@ -87,7 +105,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         print(&format!(
             "{recording}: {rows} rows, {duration_s} s of {model}: {}\n",
             report.columns.join(", ")
-        ));
+        ))?;
     }
     Ok(Outcome::with_loss(files.lost))
 }
@@ -151,20 +169,28 @@ fn write(run: &mut Run, format: Format, path: &Path) -> Result<f64, Failure> {
 
 /// A scenario in TOML or JSON, or the next experiment of a diagnosis report.
 fn read_scenario(wanted: &Path) -> Result<Scenario, Failure> {
-    Scenario::from_text_with_all(&files::scenario_text(wanted)?)
-        .map_err(|wrong| Failure::in_file_all(wanted, wrong))
+    let text = files::scenario_text(wanted)?;
+    if text.parse().is_ok_and(|table| Kind::of(&table) == Kind::Soak) {
+        let file = wanted.display();
+        return Err(Failure::input(format!(
+            "{file}: this is a scenario of kort soak, which runs controllers; kort simulate takes a test signal, [[segments]]\nhint: kort soak {file}"
+        )));
+    }
+    Scenario::from_text_with_all(&text).map_err(|wrong| Failure::in_file_all(wanted, wrong))
 }
 
 /// Replays from files and built-in recordings.
 pub(crate) struct Files {
     beside: Option<PathBuf>,
     lost: bool,
+    /// Recordings that were read.
+    read: Vec<PathBuf>,
 }
 
 impl Files {
     /// Those that a scenario's file names.
     pub(crate) fn beside(scenario: &Path) -> Self {
-        Self { beside: scenario.parent().map(Path::to_path_buf), lost: false }
+        Self { beside: scenario.parent().map(Path::to_path_buf), lost: false, read: Vec::new() }
     }
 }
 
@@ -174,6 +200,7 @@ impl Replays for Files {
         let recording = files::replayed_recording(name, self.beside.as_deref(), map.as_ref())
             .map_err(|e| e.to_string())?;
         self.lost |= !recording.losses.is_empty();
+        self.read.push(PathBuf::from(&recording.name));
         let Some(values) = recording.column(column) else {
             let names: Vec<&str> = recording.columns.iter().map(|c| c.name.as_str()).collect();
             return Err(format!("{name} has no column `{column}`\nhint: it has {}", names.join(", ")));

@@ -6,8 +6,9 @@ use std::path::PathBuf;
 use clap::Args as ClapArgs;
 use kort_control::known::uses;
 
-use crate::failure::{Failure, Outcome, check_writable, print, print_json, write_text};
+use crate::failure::{Failure, Outcome, print, print_json, write_text};
 use crate::files;
+use crate::outputs::Named;
 use crate::soak::{self, Instead, Loaded, Metrics, SoakError, Watch};
 
 /// A scenario that takes this long, s, is run when it is asked for by name.
@@ -65,22 +66,35 @@ pub struct Args {
     metrics_addr: Option<SocketAddr>,
 }
 
+impl Args {
+    /// The files that it reads, and those that it writes.
+    pub fn named(&self) -> Named {
+        let scenarios = self.scenarios.iter();
+        let named = scenarios.fold(Named::default(), |named, path| named.reads("scenario", path));
+        let named = self.rig.iter().fold(named, |named, rig| named.reads_rig(Some(rig)));
+        named.writes("--html", self.html.as_deref()).writes("--markdown", self.markdown.as_deref())
+    }
+}
+
 /// Runs the soak.
 ///
 /// # Errors
 /// [`Failure`] names the file, the key and what is allowed.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let table = ["velocity_servo", soak::DEFAULT, kort_soak::limits::NAME].map(str::to_owned);
-    let controllers = match (&args.controllers, &args.markdown) {
+    if let Some(url) = &args.live {
+        an_address(url)?;
+    }
+    // After a comma people put a space.
+    let trimmed = |names: &Vec<String>| names.iter().map(|name| name.trim().to_owned()).collect();
+    let asked: Option<Vec<String>> = args.controllers.as_ref().map(trimmed);
+    let controllers = match (&asked, &args.markdown) {
         (Some(controllers), _) => Some(controllers.as_slice()),
         (None, Some(_)) if !args.adopt => Some(table.as_slice()),
         (None, _) => None,
     };
     let wanted = Wanted { scenarios: &args.scenarios, rigs: &args.rig, controllers, seeds: args.seeds };
     let loaded = load(&wanted).map_err(Failure::input)?;
-    for file in args.html.iter().chain(&args.markdown) {
-        check_writable(file)?;
-    }
     for words in left_out(&loaded) {
         eprintln!("{words}");
     }
@@ -94,18 +108,47 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         None if args.adopt => soak::adopt(&loaded, args.seed, args.jobs, &watch).map_err(Failure::failed)?,
         None => soak::soak(&loaded, args.seed, args.jobs, &watch).map_err(Failure::failed)?,
     };
-    if let Some(file) = &args.html {
-        write_text(file, &soak::page(&report))?;
-    }
-    if let Some(file) = &args.markdown {
-        soak::put_into(file, &report, args.seed)?;
-    }
+    // The result is printed whatever becomes of its pages.
+    let page = args.html.as_ref().map_or(Ok(()), |file| write_text(file, &soak::page(&report)));
+    let table = args.markdown.as_ref().map_or(Ok(()), |file| soak::put_into(file, &report, args.seed));
     if args.json {
         print_json(&report.json())?;
     } else {
-        print(&report.text());
+        print(&report.text())?;
     }
-    Ok(Outcome::Done)
+    page.and(table).map(|()| Outcome::Done)
+}
+
+/// Refuses what no service can be reached at.
+fn an_address(url: &str) -> Result<(), Failure> {
+    let uri = url.parse::<ureq::http::Uri>().ok();
+    let served = |uri: &ureq::http::Uri| {
+        matches!(uri.scheme_str(), Some("http" | "https")) && uri.host().is_some_and(|host| !host.is_empty())
+    };
+    if uri.as_ref().is_some_and(served) {
+        return Ok(());
+    }
+    Err(Failure::input(format!(
+        "--live {url}: is no address of a service; allowed are http://HOST:PORT and https://HOST:PORT\nhint: --live http://127.0.0.1:8080, which `kort up` prints"
+    )))
+}
+
+/// What is named twice in a list.
+fn twice<T: PartialEq>(list: &[T]) -> Option<&T> {
+    list.iter().enumerate().find(|(at, one)| list[..*at].contains(one)).map(|(_, one)| one)
+}
+
+/// Refuses what would only be run again, and compared with itself.
+fn each_once(wanted: &Wanted) -> Result<(), Failure> {
+    let said = |what: &str, name: &dyn std::fmt::Display| {
+        Failure::input(format!(
+            "{what} {name} is given twice\nhint: name each once; --seeds N runs it with more seeds"
+        ))
+    };
+    let scenario = twice(wanted.scenarios).map(|path| said("scenario", &path.display()));
+    let rig = twice(wanted.rigs).map(|path| said("--rig", &path.display()));
+    let controller = wanted.controllers.and_then(twice).map(|name| said("--controllers", name));
+    scenario.or(rig).or(controller).map_or(Ok(()), Err)
 }
 
 /// What of the rigs' effects no law reckons with, in words: once a rig, however many scenarios and laws run on it.
@@ -143,6 +186,7 @@ pub struct Wanted<'a> {
 /// # Errors
 /// [`SoakError`] names the file, the key and what is allowed.
 pub fn load(wanted: &Wanted) -> Result<Vec<Loaded>, SoakError> {
+    each_once(wanted)?;
     let is_all = |list: &[PathBuf]| list.len() == 1 && list[0].as_os_str() == "all";
     let every_scenario = is_all(wanted.scenarios);
     let scenarios: Vec<PathBuf> = if every_scenario {

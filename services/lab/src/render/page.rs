@@ -4,8 +4,8 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::number;
 
-/// The whole look. Dark text on white, or light on dark for who asks for it, as the console shows it; tables scroll inside
-/// their own box on a phone.
+/// The whole look. Dark text on white, or light on dark for who asks for it, as the console shows it; tables and charts
+/// scroll inside their own boxes on a phone: a chart made as narrow as that could not be read.
 const STYLE: &str = "
 :root { --ink: #1b2733; --soft: #5b6b7a; --line: #d8e0e7; --band: #f4f7fa; --accent: #0b6fb8; --paper: #fff; color-scheme: light dark; }
 * { box-sizing: border-box; }
@@ -25,9 +25,9 @@ thead th { border-bottom: 2px solid var(--line); white-space: nowrap; }
 td.n, th.n { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
 tbody tr:nth-child(even) { background: var(--band); }
 figure { margin: 1rem 0; }
-figure svg { max-width: 100%; height: auto; display: block; }
+figure svg { max-width: 100%; min-width: 45rem; height: auto; display: block; }
 code, pre { font: .88em/1.45 ui-monospace, 'Cascadia Mono', Menlo, Consolas, monospace; }
-pre { background: var(--band); padding: .7rem .9rem; overflow-x: auto; border-radius: 4px; }
+pre { background: var(--band); padding: .7rem .9rem; white-space: pre-wrap; overflow-wrap: anywhere; border-radius: 4px; }
 .note { border-left: 4px solid var(--accent); background: var(--band); padding: .6rem .9rem; margin: .8rem 0; }
 .note.good { border-color: #2a8a4a; } .note.warn { border-color: #c77700; } .note.bad { border-color: #b3261e; }
 .bar { background: var(--accent); height: .8rem; min-width: 1px; border-radius: 2px; }

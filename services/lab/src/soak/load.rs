@@ -7,6 +7,7 @@ use kort_soak::{Hooked, Prepared, Replayed, Scenario, Segment};
 use kort_thruster::rig::{Rig, RigError};
 use thiserror::Error;
 
+use crate::check::Kind;
 use crate::failure::{Failure, all_of};
 use crate::files;
 
@@ -170,6 +171,13 @@ pub struct Instead<'a> {
 /// [`SoakError`] names the file, the key and what is allowed; all that is wrong.
 pub fn load(path: &Path, instead: &Instead) -> Result<Loaded, SoakError> {
     let text = files::soak_scenario_text(path)?;
+    if text.parse().is_ok_and(|table| Kind::of(&table) == Kind::Scenario) {
+        let words = format!(
+            "this is a scenario of kort simulate, a test signal; kort soak takes what controllers are asked for, [[reference]]\nhint: kort simulate --rig RIG --scenario {} -o REC.csv",
+            path.display()
+        );
+        return Err(ScenarioError::of(path, words));
+    }
     of_text(&text, path, instead).map_err(SoakError::all)
 }
 
@@ -182,10 +190,17 @@ pub fn of_text(text: &str, path: &Path, instead: &Instead) -> Result<Loaded, Vec
     let of_scenario = |wrong: Vec<String>| -> Vec<SoakError> {
         wrong.into_iter().map(|words| ScenarioError::of(path, words)).collect()
     };
-    let scenario = Scenario::from_toml(text).map_err(of_scenario)?;
+    let (scenario, said) = Scenario::read(text);
+    let mut wrong = of_scenario(said);
+    let Some(scenario) = scenario else { return Err(wrong) };
     let folder = path.parent().unwrap_or(Path::new("."));
-    let mut wrong = Vec::new();
-    let found = rig(&scenario, path, instead.rig).map_err(|errors| wrong.extend(errors)).ok();
+    // A rig that it lacks is told as missing.
+    let named = instead.rig.is_some() || scenario.rig != Path::new("");
+    let found = if named {
+        rig(&scenario, path, instead.rig).map_err(|errors| wrong.extend(errors)).ok()
+    } else {
+        None
+    };
     let period_s = 1.0 / scenario.control_rate_hz;
     let model = found.as_ref().and_then(|(rig, _)| {
         let model = ControlModel::from_rig(rig, period_s);
@@ -265,7 +280,7 @@ fn rig(scenario: &Scenario, path: &Path, instead: Option<&Path>) -> Result<(Rig,
     }
 }
 
-/// A controller by name: a path, a file beside the scenario or under `config/`, or a bare law.
+/// A controller by name: a path, a file beside the scenario or under `config/`, one built in, or a bare law.
 fn controller(name: &str, folder: &Path) -> Result<ControllerConfig, SoakError> {
     let file = format!("{name}.toml");
     let places = if name.ends_with(".toml") {
@@ -273,8 +288,10 @@ fn controller(name: &str, folder: &Path) -> Result<ControllerConfig, SoakError> 
     } else {
         vec![folder.join("../controllers").join(&file), Path::new("config/controllers").join(&file)]
     };
-    if let Some((place, text)) = places.iter().find_map(|p| std::fs::read_to_string(p).ok().map(|t| (p, t))) {
-        let file = place.display().to_string();
+    let on_disk =
+        places.iter().find_map(|p| Some((p.display().to_string(), std::fs::read_to_string(p).ok()?)));
+    let built_in = || Some((file, files::controller_text(name)?));
+    if let Some((file, text)) = on_disk.or_else(built_in) {
         return ControllerConfig::from_toml_with_all(&text)
             .map_err(|wrong| SoakError::Controller { message: all_of(&file, wrong), file });
     }

@@ -118,7 +118,8 @@ fn scores_of(s: &ScenarioResult, columns: &[(&str, &str)]) -> Markup {
 
 /// Mean and half the width of its interval, the latter to two digits.
 fn cell(score: Score) -> String {
-    let half = 0.5 * (score.ci95[1] - score.ci95[0]);
+    let [low, high] = score.ends();
+    let half = 0.5 * (high - low);
     if score.mean.is_nan() {
         "not known".into()
     } else if half == 0.0 {

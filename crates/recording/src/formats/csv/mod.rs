@@ -84,6 +84,8 @@ pub(super) fn decode(name: &str, input: impl Read, map: Option<&ColumnMap>) -> R
     ends.narrow(header.len());
     let width = header.len() as u64;
     let mut rows = Assembler::new(name, header.clone(), map)?;
+    // What stands behind the last sign of each row: nothing, if the sign only ends it.
+    let mut behind = false;
     let mut first = true;
     loop {
         match next {
@@ -126,6 +128,7 @@ pub(super) fn decode(name: &str, input: impl Read, map: Option<&ColumnMap>) -> R
         }
         texts.take(&mut record, line)?;
         first = false;
+        behind |= record.iter().next_back().is_some_and(|cell| !text(cell).trim().is_empty());
         rows.push(Place::Line(line), |i| match record.get(i).map_or("", text) {
             "" => Cell::Empty,
             text => Cell::Text(text),
@@ -133,6 +136,10 @@ pub(super) fn decode(name: &str, input: impl Read, map: Option<&ColumnMap>) -> R
         next = read(&mut reader, &mut record);
     }
     let mut recording = rows.finish(losses)?;
+    if !behind {
+        let unnamed = format!("(column {})", header.len());
+        recording.unused.retain(|name| *name != unnamed);
+    }
     notes.extend(texts.note());
     notes.extend(empty_rows(empty));
     notes.extend(repeats.note());

@@ -56,9 +56,17 @@ pub(super) fn open<R: Read>(
         notes.push(format!("line 1 says that the cells are parted by {shown:?}, and is no row"));
         begins = behind;
     }
-    let only = said.map(|(delimiter, _)| [delimiter]);
-    let offered = only.as_ref().map_or(offered, |one| one);
     let whole = (start.len() as u64) < WINDOW;
+    // What others saved again has the map's names and another sign between them.
+    let known = |delimiter: u8| Rows::of(&start[begins..], delimiter, whole).with(wanted).is_some();
+    let saved_again = stated.filter(|map| said.is_none() && !wanted.is_empty() && !known(*map));
+    let other = saved_again.and_then(|map| Some((map, *DELIMITERS.iter().find(|other| known(**other))?)));
+    if let Some((map, other)) = other {
+        let [map, other] = [map, other].map(char::from);
+        notes.push(format!("the cells are parted by {other:?}, not by {map:?} as the column map has it"));
+    }
+    let only = said.map(|(delimiter, _)| [delimiter]).or(other.map(|(_, other)| [other]));
+    let offered = only.as_ref().map_or(offered, |one| one);
     let (delimiter, found) = header(&start[begins..], whole, offered, wanted);
     let names = begins + found;
     let before = count(&start[..begins]);

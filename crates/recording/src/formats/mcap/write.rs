@@ -80,7 +80,8 @@ impl<W: Write + Seek> Rows<W> {
         self.writer.write_metadata(&about).map_err(cause)
     }
 
-    /// A column not sampled in this row is left out of the message.
+    /// A column not sampled in this row is left out of the message; of a recording that is saved whole the first message
+    /// has all of them, so that a column without a value is still one when it is read.
     ///
     /// # Errors
     /// The output cannot be written.
@@ -88,10 +89,12 @@ impl<W: Write + Seek> Rows<W> {
         self.message.clear();
         write!(self.message, "{{\"time_s\":")?;
         serde_json::to_writer(&mut self.message, &time_s)?;
-        for (name, value) in self.columns.iter().zip(values).filter(|(_, v)| !v.is_nan()) {
+        let all = self.sequence == 0 && self.beside.is_none();
+        for (name, value) in self.columns.iter().zip(values).filter(|(_, v)| all || !v.is_nan()) {
             self.message.push(b',');
             serde_json::to_writer(&mut self.message, name)?;
             self.message.push(b':');
+            // What is no number is written as null.
             serde_json::to_writer(&mut self.message, value)?;
         }
         self.message.push(b'}');

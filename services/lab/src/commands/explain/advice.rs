@@ -23,7 +23,7 @@ pub fn run(wanted: &Path, json: bool) -> Result<Outcome, Failure> {
     if json {
         print_json(&document(&rig.name, period_s, &advice, &known))?;
     } else {
-        print(&text(&rig.name, period_s, &advice, &known));
+        print(&text(&rig.name, period_s, &advice, &known))?;
     }
     Ok(Outcome::Done)
 }

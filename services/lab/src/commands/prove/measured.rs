@@ -50,16 +50,18 @@ pub fn run(folder: &Path, prove: &Prove) -> Result<Outcome, Failure> {
     drop(bar);
     let (compared, hidden): (Vec<Compared>, Vec<Vec<Concealed>>) = results.into_iter().unzip();
     let measured = Measured::new(stamp::stamp(), compared, hidden.into_iter().flatten().collect());
-    if let Some(path) = &prove.markdown {
+    // The result is printed whatever becomes of its page.
+    let written = prove.markdown.as_ref().map_or(Ok(()), |path| {
         write_text(path, &placed(path, &measured.markdown())?)?;
         eprintln!("wrote {}", path.display());
-    }
+        Ok(())
+    });
     if prove.json {
         print_json(&measured.json())?;
     } else {
-        print(&page::measured_text(&measured));
+        print(&page::measured_text(&measured))?;
     }
-    Ok(Outcome::Done)
+    written.map(|()| Outcome::Done)
 }
 
 /// Every folder with a key, in the order of their names.

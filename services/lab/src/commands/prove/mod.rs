@@ -19,6 +19,7 @@ use kort_truth::{CaseKind, MachineKind, Selection, families};
 use rayon::prelude::*;
 
 use crate::failure::{Failure, Outcome, print, print_json, write_text};
+use crate::outputs::Named;
 use crate::progress;
 
 const EXAMPLE: &str = "\
@@ -141,6 +142,13 @@ fn noise(name: &str) -> Result<String, String> {
 }
 
 impl Prove {
+    /// The files that it reads, and those that it writes.
+    pub fn named(&self) -> Named {
+        let named = Named::default().writes("--html", self.html.as_deref());
+        let named = named.writes("--markdown", self.markdown.as_deref());
+        named.writes("--calibrate", self.calibrate.as_deref())
+    }
+
     /// Does it.
     ///
     /// # Errors
@@ -148,9 +156,6 @@ impl Prove {
     pub fn run(self) -> Result<Outcome, Failure> {
         let threads = self.jobs.map_or(0, usize::from);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(Failure::failed)?;
-        for path in [&self.html, &self.markdown, &self.calibrate].into_iter().flatten() {
-            crate::failure::check_writable(path)?;
-        }
         if let Some(folder) = &self.measured {
             return pool.install(|| measured::run(folder, &self));
         }
@@ -199,20 +204,18 @@ impl Prove {
     }
 
     fn show(&self, proof: &Proof) -> Result<Outcome, Failure> {
-        if let Some(path) = &self.html {
-            write_text(path, &page::html(proof))?;
-            eprintln!("wrote {}", path.display());
-        }
-        if let Some(path) = &self.markdown {
-            write_text(path, &page::markdown(proof))?;
-            eprintln!("wrote {}", path.display());
-        }
+        // The result is printed whatever becomes of its pages.
+        let write = |path: &Option<PathBuf>, page: fn(&Proof) -> String| match path {
+            Some(path) => write_text(path, &page(proof)).inspect(|()| eprintln!("wrote {}", path.display())),
+            None => Ok(()),
+        };
+        let (html, markdown) = (write(&self.html, page::html), write(&self.markdown, page::markdown));
         if self.json {
             print_json(&proof.json())?
         } else {
-            print(&page::text(proof))
+            print(&page::text(proof))?
         }
-        Ok(Outcome::Done)
+        html.and(markdown).map(|()| Outcome::Done)
     }
 
     fn selection(&self) -> Selection {
