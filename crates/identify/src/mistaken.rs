@@ -17,7 +17,7 @@ const ALIKE: f64 = 0.95;
 const AGAINST: f64 = 0.8;
 /// How far a factor may lie from a unit's, since the rig is only stated: no two of a quantity's units are so near.
 const NEAR: f64 = 0.15;
-/// Least of the model's own full scale that must be simulated for a reading that never changes to be a dead one.
+/// How many times a reading that never changes its model must show for it to be a dead one.
 const MOVES: f64 = 10.0;
 
 /// What a unit in the place of SI makes of a value, by what it is and what stands in the log.
@@ -73,18 +73,19 @@ pub fn mistaken(problem: &Problem, stated: &Hypothesis) -> Option<Thin> {
     let mut free = all.filter(|(_, (r, _))| !r.second && r.observer_rad_s == 0.0);
     free.find_map(|(r, (recording, residual))| {
         recording.channels.iter().zip(residual).find_map(|(channel, left)| {
-            let used = (0..left.len()).filter(|k| !problem.masked[r][channel.rows[*k]]);
+            // What never changes is taken for frozen and left out.
+            let dead = channel.values.iter().all(|value| *value == channel.values[0]);
+            let used = (0..left.len()).filter(|k| dead || !problem.masked[r][channel.rows[*k]]);
             let likeness = Likeness::of(used.map(|k| (channel.values[k], channel.values[k] - left[k])));
-            let why = fault(channel, &likeness)?;
+            let why = fault(channel, &likeness, dead)?;
             Some(Thin { why: format!("{}: {why}", recording.name), still: true, of_the_log: true })
         })
     })
 }
 
-fn fault(channel: &Channel, likeness: &Likeness) -> Option<String> {
+fn fault(channel: &Channel, likeness: &Likeness, dead: bool) -> Option<String> {
     let name = channel.response.name();
-    let constant = channel.values.iter().all(|value| *value == channel.values[0]);
-    if constant && likeness.model > MOVES * channel.full_scale.max(1e-9) {
+    if dead && likeness.model > (MOVES * channel.values[0].abs()).max(1e-6) {
         return Some(format!(
             "{name} reads {:.3} in every row while the stated rig would show {:.3} r.m.s.: its sensor, its column or the drive is dead",
             channel.values[0], likeness.model
