@@ -20,6 +20,9 @@ const NEAR: f64 = 0.15;
 /// How many times a reading that never changes its model must show for it to be a dead one.
 const MOVES: f64 = 10.0;
 
+/// Share of the largest speed by which noise takes one below zero that tells no direction.
+const UNDIRECTED: f64 = 0.05;
+
 /// What a unit in the place of SI makes of a value, by what it is and what stands in the log.
 fn units(response: Response) -> &'static [(f64, &'static str)] {
     const RPM: (f64, &str) = (30.0 / PI, "rpm");
@@ -91,7 +94,11 @@ fn fault(channel: &Channel, likeness: &Likeness, dead: bool) -> Option<String> {
             channel.values[0], likeness.model
         ));
     }
-    if likeness.correlation < -AGAINST {
+    // A speed without a direction is a sensor of its own kind.
+    let most = channel.values.iter().fold(0.0_f64, |most, value| most.max(*value));
+    let undirected = channel.response == Response::ShaftSpeed
+        && channel.values.iter().all(|value| *value >= -UNDIRECTED * most);
+    if likeness.correlation < -AGAINST && !undirected {
         return Some(format!(
             "{name} runs against what drives (correlation {:.2} with the stated rig): its sign is the other way round, or the command's is. Put it right in the column map (sign = -1) or at the sensor",
             likeness.correlation
@@ -117,9 +124,9 @@ mod tests {
     use crate::noise::Criterion;
     use crate::setup::Setup;
 
-    /// Why a log of a motor under a voltage whose speed is so many times what it should be tells nothing, if it does not; the rig
+    /// Why a log of a motor under a voltage whose speed is read so tells nothing, if it does not; the rig
     /// states this friction, of 0.1 N m s.
-    fn why(times: f64, stated_nm_s: f64) -> Option<String> {
+    fn why_of(read: impl Fn(f64) -> f64, stated_nm_s: f64) -> Option<String> {
         let rig = format!(
             "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = {{ value = 0.01, tol = 0.3 }}\n\
              torque_constant_nm_a = {{ value = 0.5, tol = 0.1 }}\nwinding_resistance_ohm = 1.0\n\
@@ -130,7 +137,7 @@ mod tests {
         for row in 0..2000 {
             let command = ((row / 60 * 7919) % 13) as f64 / 2.0 - 3.0;
             commands.push(command);
-            speeds.push(times * speed);
+            speeds.push(read(speed));
             (0..10).for_each(|_| speed += (0.5 * (command - 0.5 * speed) - 0.1 * speed) / 0.01 * 0.001);
         }
         let columns = vec![("voltage_cmd_v".into(), commands), ("shaft_speed_rad_s".into(), speeds)];
@@ -142,11 +149,16 @@ mod tests {
         setup.thin.filter(|thin| thin.of_the_log).map(|thin| thin.why)
     }
 
+    fn why(times: f64, stated_nm_s: f64) -> Option<String> {
+        why_of(|speed| times * speed, stated_nm_s)
+    }
+
     #[test]
     fn signs_and_units_are_told_and_rough_rigs_are_none() {
         const RPM: f64 = 30.0 / PI;
         assert_eq!((why(1.0, 0.1), why(1.0, 0.4)), (None, None));
         assert!(why(-1.0, 0.1).unwrap().contains("sign"));
+        assert_eq!(why_of(f64::abs, 0.1), None, "of an unsigned speed");
         assert!(why(RPM, 0.1).unwrap().contains("rpm"));
         assert_eq!(why(RPM, 0.4), None, "nearly twice as much as a unit makes of it");
         assert!(why(0.0, 0.1).unwrap().contains("dead"));
