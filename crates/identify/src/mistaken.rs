@@ -1,10 +1,12 @@
 //! Is a column what its name says? A sign the wrong way round and a unit that is another one are the commonest faults of a log,
 //! and physics by any name would be fitted to them.
 //!
-//! Under the stated rig a response stands to its model as one number to another: were the rig off by a factor of two, no unit
-//! would be.
+//! Under the stated rig a response stands to its model as one number to another. A rig may be off by two, and by four in what
+//! two of its numbers make; a pound of force (4.4 N) is no more than that, and is not told.
 
 use std::f64::consts::PI;
+
+use kort_thruster::models::ModelName;
 
 use crate::data::{Channel, Response};
 use crate::hypothesis::Hypothesis;
@@ -70,6 +72,10 @@ impl Likeness {
 
 /// What is to be put right in the log before anything else, if a response is nothing that the stated rig could show.
 pub fn mistaken(problem: &Problem, stated: &Hypothesis) -> Option<Thin> {
+    // Coefficients of the older models stand in no rig: what they make is a guess.
+    if matches!(problem.model, ModelName::Model0 | ModelName::Model1) {
+        return None;
+    }
     let residual = problem.residual(stated, &stated.start);
     let all = problem.recordings.iter().zip(&residual).enumerate();
     // A shaft that is kept with its recording goes wherever that does.
