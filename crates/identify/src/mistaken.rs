@@ -33,13 +33,7 @@ fn units(response: Response) -> &'static [(f64, &'static str)] {
     const KRPM: (f64, &str) = (0.03 / PI, "thousands of rpm");
     match response {
         Response::ShaftSpeed => &[RPM, TURNS, DEGREES, KRPM],
-        Response::Thrust => &[
-            (1.0 / 9.806_65, "kgf"),
-            (1e3 / 9.806_65, "gf"),
-            (1.0 / 4.448_22, "lbf"),
-            (1e-3, "kN"),
-            (1e3, "mN"),
-        ],
+        Response::Thrust => &[(1.0 / 9.806_65, "kgf"), (1e3 / 9.806_65, "gf"), (1e-3, "kN"), (1e3, "mN")],
         Response::Torque => {
             &[(1e3, "N mm"), (1.0 / 0.112_985, "lbf in"), (100.0 / 9.806_65, "kgf cm"), (1e2, "N cm")]
         }
