@@ -117,8 +117,11 @@ fn a_revision_is_taken_under_way_and_gone_back_from() {
             "the file names it"
         );
 
-        // The same again changes nothing; the way back is one step, and no more.
-        let (status, same) = ask(&stack, "POST", "/rig", &[TEXT, ("Lease-Id", "made-up")], &text);
+        // The same again changes nothing, and is a command all the same; the way back is one step, and no more.
+        let (status, foreign) = ask(&stack, "POST", "/rig", &[TEXT, ("Lease-Id", "made-up")], &text);
+        assert_eq!(status, 409, "{foreign}");
+        let lease = stack.leases["t1"].clone();
+        let (status, same) = ask(&stack, "POST", "/rig", &[TEXT, ("Lease-Id", &lease)], &text);
         assert_eq!((status, &parsed(&same)["applied"]), (200, &json!(false)), "{same}");
         let back = stack.expect("POST", "/rig/rollback", None);
         assert_eq!((&back["in_force"]["number"], &back["difference"][0]["after"]), (&json!(1), &Value::Null));

@@ -296,7 +296,7 @@ fn all_that_is_wrong_with_a_scenario_or_a_controller_is_said_at_once() {
         ("a.toml", format!("noise = \"no\"\nsede = 1\n{hold}duration = 1\n"), ["`noise`", "`sede`", "`segments[0].duration`"], "simulate"),
         ("b.toml", format!("noise = -1\nduration_s = -5\n{hold}duration_s = 0\n"), ["`noise`", "`duration_s`", "`segments[0].duration_s`"], "simulate"),
         ("c.toml", format!("duration_s = 60\nseed_s = 1\naim_of_plain = true\n{steps}hold = 1\n"), ["`seed_s`", "`aim_of_plain`", "`reference[0].hold`"], "soak"),
-        ("d.toml", format!("duration_s = 0\nseeds = 0\n{steps}hold_s = 0\n"), ["`duration_s`", "`seeds`", "`hold_s`"], "soak"),
+        ("d.toml", format!("duration_s = 0\nseeds = 0\n{steps}hold_s = 0\n"), ["`duration_s`", "`seeds`", "`reference[0].hold_s`"], "soak"),
         ("e.toml", "law = \"best\"\nobservr = \"ekf\"\n[laws.servo]\nphase_margin_deg = \"x\"\n".into(), ["`law`", "`observr`", "`laws.servo.phase_margin_deg`"], ""),
         ("f.toml", "law = \"look_ahead\"\n[laws.servo]\nphase_margin_deg = 5\n[limits]\noverspeed = 9\nfade_s = -1\n".into(), ["`phase_margin_deg`", "`overspeed`", "`fade_s`"], ""),
     ] {

@@ -19,7 +19,7 @@ use crate::token::Identity;
 
 /// Largest rig description, bytes: the shipped ones have up to four thousand.
 const RIG_BYTES_MAX: usize = 256 * 1024;
-/// Longest note, bytes.
+/// Longest note.
 const NOTE_CHARS_MAX: usize = 500;
 
 pub fn routes() -> OpenApiRouter<Arc<App>> {
