@@ -15,7 +15,7 @@ use crate::thin::Thin;
 
 /// Correlation from which a response is its model's but for one factor.
 const ALIKE: f64 = 0.95;
-/// Correlation the wrong way from which its sign is.
+/// Correlation the wrong way from which its sign is the other one.
 const AGAINST: f64 = 0.8;
 /// How far a factor may lie from a unit's, since the rig is only stated: no two of a quantity's units are so near.
 const NEAR: f64 = 0.15;
@@ -66,8 +66,7 @@ impl Likeness {
 
 /// What is to be put right in the log before anything else, if a response is nothing that the stated rig could show.
 pub fn mistaken(problem: &Problem, stated: &Hypothesis) -> Option<Thin> {
-    // Coefficients of the older models stand in no rig: what they make is a guess.
-    if matches!(problem.model, ModelName::Model0 | ModelName::Model1) {
+    if is_a_guess(problem.model) {
         return None;
     }
     let residual = problem.residual(stated, &stated.start);
@@ -86,6 +85,39 @@ pub fn mistaken(problem: &Problem, stated: &Hypothesis) -> Option<Thin> {
     })
 }
 
+/// Turns what runs against the stated rig and is no more than a reading: transducers of force and torque, and the current's, show
+/// either direction as positive. What was turned, in words.
+pub fn turned(problem: &mut Problem, stated: &Hypothesis) -> Vec<String> {
+    if is_a_guess(problem.model) {
+        return Vec::new();
+    }
+    let residual = problem.residual(stated, &stated.start);
+    let mut words = Vec::new();
+    for ((recording, residual), masked) in problem.recordings.iter_mut().zip(residual).zip(&problem.masked) {
+        let free = !recording.second && recording.observer_rad_s == 0.0;
+        for (channel, left) in recording.channels.iter_mut().zip(residual).filter(|_| free) {
+            let shaft = matches!(channel.response, Response::ShaftSpeed | Response::ShaftAngle);
+            let used = (0..left.len()).filter(|k| !masked[channel.rows[*k]]);
+            let likeness = Likeness::of(used.map(|k| (channel.values[k], channel.values[k] - left[k])));
+            if !shaft && likeness.correlation < -AGAINST {
+                channel.values.iter_mut().for_each(|value| *value = -*value);
+                words.push(format!(
+                    "{}: {} runs against what drives (correlation {:.2} with the stated rig): its other sign is taken; put it right in the column map (sign = -1)",
+                    recording.name,
+                    channel.response.name(),
+                    likeness.correlation
+                ));
+            }
+        }
+    }
+    words
+}
+
+/// Whether a model's coefficients stand in no rig: what they make is a guess.
+fn is_a_guess(model: ModelName) -> bool {
+    matches!(model, ModelName::Model0 | ModelName::Model1)
+}
+
 fn fault(channel: &Channel, likeness: &Likeness, dead: bool) -> Option<String> {
     let name = channel.response.name();
     if dead && likeness.model > (MOVES * channel.values[0].abs()).max(1e-6) {
@@ -96,9 +128,8 @@ fn fault(channel: &Channel, likeness: &Likeness, dead: bool) -> Option<String> {
     }
     // A speed without a direction is a sensor of its own kind.
     let most = channel.values.iter().fold(0.0_f64, |most, value| most.max(*value));
-    let undirected = channel.response == Response::ShaftSpeed
-        && channel.values.iter().all(|value| *value >= -UNDIRECTED * most);
-    if likeness.correlation < -AGAINST && !undirected {
+    let undirected = channel.values.iter().all(|value| *value >= -UNDIRECTED * most);
+    if channel.response == Response::ShaftSpeed && likeness.correlation < -AGAINST && !undirected {
         return Some(format!(
             "{name} runs against what drives (correlation {:.2} with the stated rig): its sign is the other way round, or the command's is. Put it right in the column map (sign = -1) or at the sensor",
             likeness.correlation
@@ -127,26 +158,35 @@ mod tests {
     /// Why a log of a motor under a voltage whose speed is read so tells nothing, if it does not; the rig
     /// states this friction, of 0.1 N m s.
     fn why_of(read: impl Fn(f64) -> f64, stated_nm_s: f64) -> Option<String> {
+        said(read, 1.0, stated_nm_s).0
+    }
+
+    /// The same, and how many notes speak of a sign, where the current is read so many times.
+    fn said(read: impl Fn(f64) -> f64, times: f64, stated_nm_s: f64) -> (Option<String>, usize) {
         let rig = format!(
             "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = {{ value = 0.01, tol = 0.3 }}\n\
              torque_constant_nm_a = {{ value = 0.5, tol = 0.1 }}\nwinding_resistance_ohm = 1.0\n\
              viscous_friction_nm_s = {{ value = {stated_nm_s}, tol = 0.3 }}\n[amplifier]\nkind = \"voltage\"\n"
         );
         let rig = Rig::from_toml(&rig).unwrap();
-        let (mut speed, mut commands, mut speeds) = (0.0_f64, Vec::new(), Vec::new());
+        let (mut speed, mut commands, mut speeds, mut currents) =
+            (0.0_f64, Vec::new(), Vec::new(), Vec::new());
         for row in 0..2000 {
             let command = ((row / 60 * 7919) % 13) as f64 / 2.0 - 3.0;
             commands.push(command);
             speeds.push(read(speed));
+            currents.push(times * (command - 0.5 * speed));
             (0..10).for_each(|_| speed += (0.5 * (command - 0.5 * speed) - 0.1 * speed) / 0.01 * 0.001);
         }
-        let columns = vec![("voltage_cmd_v".into(), commands), ("shaft_speed_rad_s".into(), speeds)];
+        let names = ["voltage_cmd_v", "shaft_speed_rad_s", "current_a"].map(String::from);
+        let columns = names.into_iter().zip([commands, speeds, currents]).collect();
         let time_s = (0..2000).map(|k| 0.01 * f64::from(k)).collect();
         let series = Series { name: "log".into(), time_s, columns };
         let criterion =
             Criterion { form_error: 0.01, own_form_error: 0.2, facts_a_band: 10.0, timing_s: 0.001 };
         let setup = Setup::new(&[series], &rig, ModelName::Model2, criterion).unwrap();
-        setup.thin.filter(|thin| thin.of_the_log).map(|thin| thin.why)
+        let turned = setup.notes.iter().filter(|note| note.contains("other sign is taken")).count();
+        (setup.thin.filter(|thin| thin.of_the_log).map(|thin| thin.why), turned)
     }
 
     fn why(times: f64, stated_nm_s: f64) -> Option<String> {
@@ -162,5 +202,7 @@ mod tests {
         assert!(why(RPM, 0.1).unwrap().contains("rpm"));
         assert_eq!(why(RPM, 0.4), None, "nearly twice as much as a unit makes of it");
         assert!(why(0.0, 0.1).unwrap().contains("dead"));
+        assert_eq!(said(|speed| speed, 1.0, 0.1), (None, 0));
+        assert_eq!(said(|speed| speed, -1.0, 0.1), (None, 1));
     }
 }

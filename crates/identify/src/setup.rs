@@ -12,7 +12,7 @@ use crate::data::experiments::{self, Experiment, experiments};
 use crate::data::{DataError, Driving, Prepared, Series, counted_angle, fresh, possible_drivers, spread};
 use crate::excerpt;
 use crate::hypothesis::{Free, Hypothesis, Inputs, Target, UNSTATED_TOL, nothing_stated};
-use crate::mistaken::mistaken;
+use crate::mistaken::{mistaken, turned};
 use crate::noise::Criterion;
 use crate::readings;
 use crate::refuse;
@@ -167,6 +167,7 @@ impl<'a> Setup<'a> {
             notes.extend(hidden.words(&problem.recordings));
             problem = problem.without(&hidden.rows);
         }
+        notes.splice(0..0, turned(&mut problem, &baseline));
         thin = mistaken(&problem, &baseline).or(thin);
         notes.extend(problem.recorded().filter_map(Prepared::hidden_between_rows));
         if let Some(name) = telling_column(&series, &problem, &baseline) {
