@@ -16,10 +16,12 @@ use crate::search::{Search, Set};
 
 /// A test signal: shipped scenario, what it does in an engineer's words.
 pub type Signal = (&'static str, &'static str);
+/// What shows how something goes with speed and direction.
 pub const STAIRCASE: Signal = (
     include_str!("../../../config/scenarios/staircase.toml"),
     "a staircase of steady levels, up and down, both ways",
 );
+/// What moves everything.
 pub const RANDOM_LEVELS: Signal = (
     include_str!("../../../config/scenarios/identification-random-levels.toml"),
     "random steps both ways, logged with the fastest rate there is",

@@ -21,7 +21,6 @@ const AGAINST: f64 = 0.8;
 const NEAR: f64 = 0.15;
 /// How many times a reading that never changes its model must show for it to be a dead one.
 const MOVES: f64 = 10.0;
-
 /// Share of the largest speed by which noise takes one below zero that tells no direction.
 const UNDIRECTED: f64 = 0.05;
 
@@ -64,63 +63,67 @@ impl Likeness {
     }
 }
 
-/// What is to be put right in the log before anything else, if a response is nothing that the stated rig could show.
-pub fn mistaken(problem: &Problem, stated: &Hypothesis) -> Option<Thin> {
-    if is_a_guess(problem.model) {
-        return None;
+/// Every channel against the stated rig, by recording and place. A shaft that is kept with its recording goes wherever that does,
+/// and coefficients of the older models stand in no rig: nothing is known of those.
+fn likenesses(problem: &Problem, stated: &Hypothesis) -> Vec<(usize, usize, Likeness)> {
+    if matches!(problem.model, ModelName::Model0 | ModelName::Model1) {
+        return Vec::new();
     }
     let residual = problem.residual(stated, &stated.start);
-    let all = problem.recordings.iter().zip(&residual).enumerate();
-    // A shaft that is kept with its recording goes wherever that does.
-    let mut free = all.filter(|(_, (r, _))| !r.second && r.observer_rad_s == 0.0);
-    free.find_map(|(r, (recording, residual))| {
-        recording.channels.iter().zip(residual).find_map(|(channel, left)| {
-            // What never changes is taken for frozen and left out.
-            let dead = channel.values.iter().all(|value| *value == channel.values[0]);
-            let used = (0..left.len()).filter(|k| dead || !problem.masked[r][channel.rows[*k]]);
-            let likeness = Likeness::of(used.map(|k| (channel.values[k], channel.values[k] - left[k])));
-            let why = fault(channel, &likeness, dead)?;
-            Some(Thin { why: format!("{}: {why}", recording.name), still: true, of_the_log: true })
-        })
+    let mut all = Vec::new();
+    for (r, recording) in problem.recordings.iter().enumerate() {
+        if recording.second || recording.observer_rad_s != 0.0 {
+            continue;
+        }
+        for (c, (channel, left)) in recording.channels.iter().zip(&residual[r]).enumerate() {
+            // What never changes is taken for frozen and left out elsewhere.
+            let used =
+                (0..left.len()).filter(|k| never_changes(channel) || !problem.masked[r][channel.rows[*k]]);
+            let pairs = used.map(|k| (channel.values[k], channel.values[k] - left[k]));
+            all.push((r, c, Likeness::of(pairs)));
+        }
+    }
+    all
+}
+
+fn never_changes(channel: &Channel) -> bool {
+    channel.values.iter().all(|value| *value == channel.values[0])
+}
+
+/// What is to be put right in the log before anything else, if a response is nothing that the stated rig could show.
+pub fn mistaken(problem: &Problem, stated: &Hypothesis) -> Option<Thin> {
+    likenesses(problem, stated).into_iter().find_map(|(r, c, likeness)| {
+        let recording = &problem.recordings[r];
+        let why = fault(&recording.channels[c], &likeness)?;
+        Some(Thin { why: format!("{}: {why}", recording.name), still: true, of_the_log: true })
     })
 }
 
 /// Turns what runs against the stated rig and is no more than a reading: transducers of force and torque, and the current's, show
 /// either direction as positive. What was turned, in words.
 pub fn turned(problem: &mut Problem, stated: &Hypothesis) -> Vec<String> {
-    if is_a_guess(problem.model) {
-        return Vec::new();
-    }
-    let residual = problem.residual(stated, &stated.start);
     let mut words = Vec::new();
-    for ((recording, residual), masked) in problem.recordings.iter_mut().zip(residual).zip(&problem.masked) {
-        let free = !recording.second && recording.observer_rad_s == 0.0;
-        for (channel, left) in recording.channels.iter_mut().zip(residual).filter(|_| free) {
-            let shaft = matches!(channel.response, Response::ShaftSpeed | Response::ShaftAngle);
-            let used = (0..left.len()).filter(|k| !masked[channel.rows[*k]]);
-            let likeness = Likeness::of(used.map(|k| (channel.values[k], channel.values[k] - left[k])));
-            if !shaft && likeness.correlation < -AGAINST {
-                channel.values.iter_mut().for_each(|value| *value = -*value);
-                words.push(format!(
-                    "{}: {} runs against what drives (correlation {:.2} with the stated rig): its other sign is taken; put it right in the column map (sign = -1)",
-                    recording.name,
-                    channel.response.name(),
-                    likeness.correlation
-                ));
-            }
+    for (r, c, likeness) in likenesses(problem, stated) {
+        let recording = &mut problem.recordings[r];
+        let channel = &mut recording.channels[c];
+        let reading = !matches!(channel.response, Response::ShaftSpeed | Response::ShaftAngle);
+        if reading && !never_changes(channel) && likeness.correlation < -AGAINST {
+            channel.values.iter_mut().for_each(|value| *value = -*value);
+            words.push(format!(
+                "{}: {} runs against what drives (correlation {:.2} with the stated rig): its other sign is taken; put it right in the column map (sign = -1)",
+                recording.name,
+                channel.response.name(),
+                likeness.correlation
+            ));
         }
     }
     words
 }
 
-/// Whether a model's coefficients stand in no rig: what they make is a guess.
-fn is_a_guess(model: ModelName) -> bool {
-    matches!(model, ModelName::Model0 | ModelName::Model1)
-}
-
-fn fault(channel: &Channel, likeness: &Likeness, dead: bool) -> Option<String> {
+/// What a response must be put right in, if it must.
+fn fault(channel: &Channel, likeness: &Likeness) -> Option<String> {
     let name = channel.response.name();
-    if dead && likeness.model > (MOVES * channel.values[0].abs()).max(1e-6) {
+    if never_changes(channel) && likeness.model > (MOVES * channel.values[0].abs()).max(1e-6) {
         return Some(format!(
             "{name} reads {:.3} in every row while the stated rig would show {:.3} r.m.s.: its sensor, its column or the drive is dead",
             channel.values[0], likeness.model

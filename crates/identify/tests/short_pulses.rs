@@ -60,6 +60,6 @@ fn what_stands_for_one_row_is_placed_as_any_step() {
     let fit = problem.settle_from_stated(&baseline, 24);
     let left = &problem.residual(&fit.hypothesis, &fit.values)[0][0];
     let rms = (left.iter().map(|e| e * e).sum::<f64>() / left.len() as f64).sqrt();
-    // Ticks of 2 ms are a quarter of what a step at its row would be off by at most.
+    // A step is placed to a tick of 2 ms, or to a part of one.
     assert!(rms < 10.0 * NOISE_RAD_S, "{rms} rad/s of noise {NOISE_RAD_S}");
 }

@@ -247,6 +247,7 @@ pub fn scale(rig: &Rig, p: &Parameters, peak: f64, tick_s: f64, duration_s: f64)
             (current.min(limit), speed)
         }
         AmplifierKind::Speed if cq > 0.0 => (cq * peak * peak / kt, peak),
+        // What turns it so fast within a tenth of a second: of what a loop asks for out of the water nothing else is known.
         AmplifierKind::Speed => {
             let within_s = 0.1;
             ((p.get(Parameter::InertiaKgM2) * peak / within_s / kt).min(limit), peak)
