@@ -125,7 +125,9 @@ fn what_a_recording_cannot_fix_is_said() {
 
 /// Runs both commands; the message holds the words, a hint and no panic; nothing is left behind.
 fn refused(label: &str, recording: &str, rig: &str, more: &[&str], words: &[&str]) {
-    let (page, fitted) = (path("bad.html"), path("bad.toml"));
+    // Each case has its own: tests run side by side, and whether a file can be written is tried by making it.
+    let own: String = label.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
+    let (page, fitted) = (path(&format!("bad_{own}.html")), path(&format!("bad_{own}.toml")));
     for (command, flag, out) in [("diagnose", "--html", &page), ("fit", "-o", &fitted)] {
         let mut args = vec![command, recording, "--rig", rig, "--json", flag, out];
         args.extend(more);

@@ -164,7 +164,7 @@ class Diagnosis:
     findings: list[Finding]
     """Named effects."""
     explanations: list[Explanation]
-    """Sets of effects, likeliest first, until 0.95 is reached."""
+    """Effects that are right together, likeliest first, until 0.95 is reached; none: not one of the catalogue."""
     remainder: Remainder | None
     """What is left, where that is real."""
     alternatives: list[Alternative]

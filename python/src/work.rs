@@ -105,7 +105,7 @@ pub fn diagnose(
 ) -> PyResult<(String, String, String)> {
     work(py, recordings, asked, progress, |input, loaded, told| {
         let diagnosis = diagnosing::diagnosis(input, loaded, told)?;
-        let (rig, _) = diagnosing::adopted(&loaded.rig_text, &diagnosis.report)?;
+        let (rig, ..) = diagnosing::adopted(loaded, &diagnosis.report)?;
         Ok((json(&diagnosis.report)?, rig, render::diagnosis::page(&diagnosis, &loaded.rig)))
     })
 }

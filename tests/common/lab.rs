@@ -310,7 +310,7 @@ pub fn check_diagnosis(report: &Value) {
     }
 
     let explanations = list("explanations", &report["explanations"]);
-    let mut last = 1.0;
+    let (mut last, mut listed) = (1.0, 0.0);
     for one in explanations {
         keys("explanation", one, &["effects", "probability"]);
         list("explanation.effects", &one["effects"]).iter().for_each(|w| {
@@ -320,7 +320,9 @@ pub fn check_diagnosis(report: &Value) {
         let probability = number("explanation.probability", &one["probability"]);
         assert!(probability <= last, "likeliest first: {explanations:?}");
         last = probability;
+        listed += probability;
     }
+    assert!(listed >= 0.95, "until 0.95 is reached: {explanations:?}");
     let left = &report["remainder"];
     if !left.is_null() {
         keys("remainder", left, &["share_of_excess_error", "path", "channel", "regime", "nrmse"]);

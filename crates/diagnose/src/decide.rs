@@ -3,7 +3,7 @@
 use kort_identify::thin::Thin;
 
 use crate::flexible::is_term;
-use crate::posterior::{NEAR, Posterior};
+use crate::posterior::{Beside, NEAR, Posterior};
 use crate::report::Verdict;
 use crate::search::Set;
 
@@ -67,6 +67,13 @@ pub struct Circumstances {
     pub more_than_noise: bool,
 }
 
+impl Circumstances {
+    /// What names are stated less likely for.
+    pub const fn beside(&self) -> Beside {
+        if self.more_than_noise { Beside::Everything } else { Beside::Terms }
+    }
+}
+
 /// Decides from the posterior over sets.
 pub fn decide(posterior: &Posterior, circumstances: &Circumstances) -> Decision {
     let empty: Set = Vec::new();
@@ -75,14 +82,11 @@ pub fn decide(posterior: &Posterior, circumstances: &Circumstances) -> Decision 
     let stands = |id: &&'static str| !is_term(id) && !circumstances.negligible.contains(id);
     let members: Vec<&'static str> = best.iter().copied().filter(stands).collect();
     let undone = |effect: &str| circumstances.cancelling.iter().any(|(a, b)| *a == effect || *b == effect);
-    // How likely a name is, and how likely where the catalogue does not hold all that acts.
+    let in_place = posterior.in_place(circumstances.beside());
+    let in_catalogue = posterior.in_place(Beside::Nothing);
     let stated = |effect: &str| {
         let most = if undone(effect) { EVEN } else { 1.0 };
-        if circumstances.more_than_noise {
-            most.min(posterior.beside_unknown() * posterior.probability(effect))
-        } else {
-            most.min(posterior.stated(effect))
-        }
+        in_place.probability(effect).min(most)
     };
     let mut named: Vec<Named> = Vec::new();
     for member in &members {
@@ -94,7 +98,8 @@ pub fn decide(posterior: &Posterior, circumstances: &Circumstances) -> Decision 
         let place: Vec<&'static str> = std::iter::once(*member).chain(rivals).collect();
         for effect in &place {
             let rivals: Vec<&'static str> = place.iter().copied().filter(|id| id != effect).collect();
-            let believed = posterior.probability(effect) >= BELIEVED && rivals.is_empty() && !undone(effect);
+            let believed =
+                in_catalogue.probability(effect) >= BELIEVED && rivals.is_empty() && !undone(effect);
             named.push(Named { effect, probability: stated(effect), rivals, believed });
         }
     }
@@ -145,12 +150,17 @@ fn rivals(
 ) -> Vec<&'static str> {
     let rest: Vec<&str> = best.iter().copied().filter(|id| *id != member).collect();
     let likely = posterior.told().map_or(0.0, |e| e.probability);
+    // What stands beside a name as often as in its place is no rival for that.
+    let instead = |new: &str, of: &str| -> f64 {
+        let sets = posterior.sets.iter().filter(|e| e.set().contains(&new) && !e.set().contains(&of));
+        sets.map(|e| e.probability).sum()
+    };
     let mut out = Vec::new();
     for other in &posterior.sets {
         let new: Vec<&'static str> = other.set().iter().copied().filter(|id| !best.contains(id)).collect();
         let near = match new[..] {
             [new] => {
-                posterior.presence(new) >= NEAR * posterior.presence(member)
+                instead(new, member) >= NEAR * posterior.presence(member)
                     || unparted.iter().any(|(of, rival)| *of == member && *rival == new)
             }
             [_, _] => other.probability >= NEAR * likely,
@@ -252,12 +262,12 @@ mod tests {
         let usual = Circumstances::default();
         let much = Circumstances { more_than_noise: true, ..usual.clone() };
         let (alone, beside) = (decided(costs, &usual), decided(costs, &much));
-        assert!((beside.named[0].probability - 0.75 * alone.named[0].probability).abs() < 1e-12);
+        assert!((beside.named[0].probability - 0.75 * alone.named[0].probability).abs() < 1e-4);
         // The factor is not counted again where a nameless term stands in the set already.
         let with_term: &[(&[&'static str], f64)] =
             &[(&["unknown_shaft_step", "windage_drag"], 0.0), (&[], 80.0)];
         let (once, twice) = (decided(with_term, &usual), decided(with_term, &much));
-        assert!((once.named[0].probability - twice.named[0].probability).abs() < 1e-12);
+        assert!((once.named[0].probability - twice.named[0].probability).abs() < 1e-4);
         assert_eq!(beside.verdict, Verdict::PartlyExplained);
     }
 
@@ -303,6 +313,19 @@ mod tests {
         assert_eq!(near.named[0].rivals, ["coulomb_friction", "torque_channel_bias"]);
         assert_eq!(far.verdict, Verdict::Explained);
         assert_eq!(far.named.len(), 1);
+    }
+
+    #[test]
+    fn what_stands_beside_a_name_is_no_rival_of_it() {
+        let costs: &[(&[&'static str], f64)] = &[
+            (&["windage_drag"], 0.0),
+            (&["duct_loss", "windage_drag"], 1.0),
+            (&["duct_loss"], 30.0),
+            (&[], 90.0),
+        ];
+        let decision = decided(costs, &Circumstances::default());
+        assert_eq!(decision.named.len(), 1, "{:?}", decision.named);
+        assert!(decision.named[0].believed);
     }
 
     #[test]

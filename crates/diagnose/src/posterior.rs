@@ -1,5 +1,7 @@
 //! From costs of sets to probabilities, of sets and of effects.
 
+use std::collections::BTreeMap;
+
 use crate::constants::PosteriorConstants;
 use crate::flexible::is_term;
 use crate::search::Set;
@@ -56,6 +58,31 @@ pub struct Posterior {
     constants: PosteriorConstants,
 }
 
+/// Sets less likely than this move no probability that is printed.
+const LEAST_WEIGHT: f64 = 1e-9;
+
+/// Sets of names that are right together, each with its probability, likeliest first.
+#[derive(Clone, Debug, PartialEq)]
+pub struct InPlace(pub Vec<(Set, f64)>);
+
+impl InPlace {
+    /// Probability of an effect: the sum over the sets that hold it.
+    pub fn probability(&self, effect: &str) -> f64 {
+        self.0.iter().filter(|(set, _)| set.contains(&effect)).map(|(_, p)| p).sum()
+    }
+}
+
+/// Whether names are stated less likely for what stands beside them and has no name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Beside {
+    /// In a world that the catalogue holds.
+    Nothing,
+    /// In the world as it is: in sets that need a nameless term names count by a factor less.
+    Terms,
+    /// In all sets: the told one leaves more than noise can be.
+    Everything,
+}
+
 /// What does as well stands within these odds: five to one part two names.
 pub(crate) const NEAR: f64 = 0.2;
 
@@ -108,42 +135,41 @@ impl Posterior {
         self.holding(effect).map(|e| e.probability).sum()
     }
 
-    /// Probability of an effect in a world that the catalogue holds: its sets against all others that were fitted and
-    /// against what was not, in its place ([`doubt`]).
-    pub fn probability(&self, effect: &str) -> f64 {
-        let presence = self.presence(effect);
-        presence / (1.0 + presence * self.doubt_of(effect))
-    }
-
-    /// The same in the world as it is: sets that need a nameless term count by a factor less.
-    pub fn stated(&self, effect: &str) -> f64 {
-        let presence = self.presence(effect);
-        if presence == 0.0 {
-            return 0.0;
+    /// Which names are right together, likeliest first; the probabilities sum to one. Any member of a set that was fitted
+    /// may stand where something belongs that was not ([`doubt`]): one alternative, whichever member stands there. A set
+    /// without names is none of them, or what nobody wrote down.
+    pub fn in_place(&self, beside: Beside) -> InPlace {
+        let mut weights: BTreeMap<(Set, u32), f64> = BTreeMap::new();
+        for explanation in self.sets.iter().filter(|e| e.probability >= LEAST_WEIGHT) {
+            let (terms, names): (Set, Set) = explanation.set().iter().partition(|id| is_term(id));
+            let lowered = match beside {
+                Beside::Nothing => false,
+                Beside::Terms => !terms.is_empty(),
+                Beside::Everything => true,
+            };
+            let factor = if lowered { self.constants.beside_unknown } else { 1.0 };
+            // The odds against a name in place: its probability there is the factor's share of what it would be.
+            let against = |id: &&str| (1.0 + self.doubt_in(explanation, id)) / factor - 1.0;
+            let against: Vec<f64> = names.iter().map(against).collect();
+            for out in 0..1_u32 << names.len() {
+                let is_out = |at: &usize| out >> at & 1 == 1;
+                let stays = (0..names.len()).filter(|at| !is_out(at)).map(|at| names[at]);
+                let stays: Set = stays.chain(terms.iter().copied()).collect();
+                let odds: f64 = (0..names.len()).filter(is_out).map(|at| against[at]).product();
+                let weight = weights.entry((stays, out.count_ones())).or_default();
+                *weight = weight.max(explanation.probability * odds);
+            }
         }
-        let term = |e: &&Explanation| e.set().iter().any(|id| is_term(id));
-        let beside: f64 = self.holding(effect).filter(term).map(|e| e.probability).sum();
-        self.probability(effect) * (1.0 - (1.0 - self.constants.beside_unknown) * beside / presence)
-    }
-
-    /// Probability of a set with all its members in place, [`doubt`] of each counted.
-    pub fn of_set(&self, explanation: &Explanation) -> f64 {
-        let in_place = |id| 1.0 / (1.0 + self.doubt_in(explanation, id));
-        explanation.probability * explanation.set().iter().copied().map(in_place).product::<f64>()
-    }
-
-    /// Factor on names beside more error than noise.
-    pub const fn beside_unknown(&self) -> f64 {
-        self.constants.beside_unknown
+        let total: f64 = weights.values().sum();
+        let mut sets: BTreeMap<Set, f64> = BTreeMap::new();
+        weights.into_iter().for_each(|((set, _), weight)| *sets.entry(set).or_default() += weight / total);
+        let mut sets: Vec<(Set, f64)> = sets.into_iter().collect();
+        sets.sort_by(|a, b| b.1.total_cmp(&a.1));
+        InPlace(sets)
     }
 
     fn holding(&self, effect: &str) -> impl Iterator<Item = &Explanation> {
         self.sets.iter().filter(move |e| e.set().contains(&effect))
-    }
-
-    /// Doubt of an effect in the likeliest set that holds it.
-    fn doubt_of(&self, effect: &str) -> f64 {
-        self.holding(effect).next().map_or(1.0, |e| self.doubt_in(e, effect))
     }
 
     /// Doubt of a set's member by what the recordings cost more without it: the least of what was fitted of the others.
@@ -193,7 +219,11 @@ mod tests {
         let all = of(&[(&["a"], 10.0), (&["b"], 10.0), (&[], 1e4)], 3.0);
         assert!((all.presence("a") - 0.5).abs() < 1e-9 && (all.presence("b") - 0.5).abs() < 1e-9);
         assert!(all.sets[2].probability < 1e-12);
-        assert_eq!((all.probability("c"), all.stated("c")), (0.0, 0.0), "what was not fitted");
+        assert_eq!(
+            (all.in_place(Beside::Nothing).probability("c"), all.in_place(Beside::Terms).probability("c")),
+            (0.0, 0.0),
+            "what was not fitted"
+        );
     }
 
     #[test]
@@ -208,7 +238,7 @@ mod tests {
     fn what_has_no_name_stands_in_no_name_s_place() {
         let at = |worse: f64| of(&[(&["unknown_x"], 0.0), (&["a"], worse), (&[], 900.0)], 3.0);
         assert_eq!(*at(6.0).told().unwrap().set(), ["a"], "odds of e to one");
-        assert!(at(6.0).probability("a") > 0.9, "and is not doubted for it");
+        assert!(at(6.0).in_place(Beside::Nothing).probability("a") > 0.9, "and is not doubted for it");
         assert_eq!(*at(12.0).told().unwrap().set(), ["unknown_x"], "of seven to one");
     }
 
@@ -217,31 +247,43 @@ mod tests {
         let surprise = constants().surprise;
         let without = |gain: f64| of(&[(&["a", "b"], 0.0), (&["a"], gain), (&["b"], 1e5), (&[], 1e6)], 1.0);
         let even = without(2.0 * surprise);
-        assert!((even.probability("b") - 0.5).abs() < 1e-6, "one to one at twice the surprise of one");
-        assert!(even.probability("a") > 0.999, "each by its own");
-        assert!(without(4.0 * surprise).probability("b") > 0.7);
-        assert!(without(surprise).probability("b") < 0.3);
-        let set = &even.sets[0];
-        assert!((even.of_set(set) - even.probability("a") * even.probability("b")).abs() < 1e-6);
+        assert!(
+            (even.in_place(Beside::Nothing).probability("b") - 0.5).abs() < 1e-6,
+            "one to one at twice the surprise of one"
+        );
+        assert!(even.in_place(Beside::Nothing).probability("a") > 0.999, "each by its own");
+        assert!(without(4.0 * surprise).in_place(Beside::Nothing).probability("b") > 0.7);
+        assert!(without(surprise).in_place(Beside::Nothing).probability("b") < 0.3);
+        let sets = even.in_place(Beside::Nothing).0;
+        assert_eq!(sets[0].0.len() + sets[1].0.len(), 3, "both, or the sure one alone: {sets:?}");
+        assert!((sets[0].1 - 0.5).abs() < 1e-3 && (sets.iter().map(|s| s.1).sum::<f64>() - 1.0).abs() < 1e-9);
     }
 
     #[test]
     fn a_rival_and_the_doubt_are_not_counted_as_one_factor_each() {
         let surprise = constants().surprise;
         let two = of(&[(&["a"], 0.0), (&["b"], 0.0), (&[], surprise)], 1.0);
-        assert!((two.probability("a") - 1.0 / 3.0).abs() < 1e-3, "a, b and what was not fitted");
+        assert!(
+            (two.in_place(Beside::Nothing).probability("a") - 1.0 / 3.0).abs() < 1e-3,
+            "a, b and what was not fitted"
+        );
     }
 
     #[test]
     fn beside_a_nameless_term_a_name_is_stated_lower() {
         let factor = constants().beside_unknown;
         let all = of(&[(&["a", "unknown_x"], 0.0), (&["unknown_x"], 1e4), (&["a"], 1e4), (&[], 1e5)], 1.0);
-        assert!((all.stated("a") - factor * all.probability("a")).abs() < 1e-9);
+        assert!(
+            (all.in_place(Beside::Terms).probability("a")
+                - factor * all.in_place(Beside::Nothing).probability("a"))
+            .abs()
+                < 1e-9
+        );
     }
 
     #[test]
     fn where_nothing_smaller_stands_the_odds_are_even() {
         let all = of(&[(&["a"], 0.0), (&["b"], 90.0)], 1.0);
-        assert!((all.probability("a") - 0.5).abs() < 1e-9);
+        assert!((all.in_place(Beside::Nothing).probability("a") - 0.5).abs() < 1e-9);
     }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-pub use kort_identify::scores::{BeforeAfter, ChannelReport, HeldOut, ParameterReport};
+pub use kort_identify::scores::{BeforeAfter, ChannelReport, FittedEffect, HeldOut, ParameterReport};
 use serde::Serialize;
 
 /// Outcome of a diagnosis.
@@ -28,8 +28,11 @@ pub enum Verdict {
 pub struct Baseline {
     /// Model's name.
     pub model: String,
-    /// Its parameters.
+    /// Its parameters, and those of the effects that are taken to be there.
     pub parameters: Vec<ParameterReport>,
+    /// The effects that are taken to be there, because the rig states them or the command line does.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub effects: Vec<FittedEffect>,
     /// Its errors.
     pub channels: BTreeMap<String, ChannelReport>,
 }
@@ -77,7 +80,7 @@ pub struct Finding {
 /// A set of effects that explains the recording.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SetReport {
-    /// Its effects; none is the baseline alone.
+    /// Effects that are right together; none: not one of the catalogue.
     pub effects: Vec<String>,
     /// Its probability.
     pub probability: f64,

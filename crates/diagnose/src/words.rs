@@ -61,13 +61,17 @@ pub fn evidence(
     out
 }
 
-/// Why an effect was set aside: how much worse the best set with it is, and what the best set gains in all.
-pub fn why_not(worse: f64, gained: f64, nothing_found: bool) -> String {
+/// Why an effect was set aside: how much worse the best set with it is, what the best set gains in all, and the odds that
+/// are made of it.
+pub fn why_not(worse: f64, gained: f64, temper: f64, nothing_found: bool) -> String {
+    let odds = (worse / (2.0 * temper)).exp();
+    let odds = if odds < 1e6 { format!("odds of {odds:.1} to 1") } else { "more than a million to 1".into() };
+    let against = format!("in twice the log-evidence, which counts as {odds} against it");
     if nothing_found {
-        return format!("adding it costs {worse:.0} more than it gains, in twice the log-evidence");
+        return format!("adding it costs {worse:.0} more than it gains, {against}");
     }
     let of = if gained > 0.0 { format!(" (of {gained:.0} gained in all)") } else { String::new() };
-    format!("the best set with it is worse by {worse:.0}{of}, in twice the log-evidence")
+    format!("the best set with it is worse by {worse:.0}{of}, {against}")
 }
 
 /// A nameless term with its numbers.
@@ -175,6 +179,8 @@ pub struct Told<'a> {
 
 /// Standard deviations from which a mismatch that names might explain is real.
 const REAL_SIGMA: f64 = 3.0;
+/// From this probability on a name is likelier there than not.
+const LIKELY: f64 = 0.5;
 /// From this probability on a name that is not stated cannot be excluded either.
 const POSSIBLE: f64 = 0.2;
 
@@ -203,7 +209,13 @@ pub fn summary(told: &Told) -> String {
         }
         Verdict::Explained => format!("{model} leaves out {}.{}", named(told.findings), shows(told)),
         Verdict::PartlyExplained => {
-            let mut text = format!("{model} leaves out {}.{}", named(told.findings), shows(told));
+            let (likely, perhaps): (Vec<Finding>, Vec<Finding>) =
+                told.findings.iter().cloned().partition(|f| f.probability >= LIKELY);
+            let mut text = match (likely.is_empty(), perhaps.is_empty()) {
+                (true, _) | (_, true) => format!("{model} leaves out {}.", named(told.findings)),
+                _ => format!("{model} leaves out {}, perhaps also {}.", named(&likely), named(&perhaps)),
+            };
+            text.push_str(&shows(told));
             if let Some(left) = told.remainder {
                 let (who, what) = match told.in_doubt {
                     Some(effect) => ("Those that are likely", format!("it may be {}", plain(effect))),

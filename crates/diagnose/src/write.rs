@@ -19,7 +19,7 @@ use crate::left_aside;
 use crate::load_steps;
 use crate::locate::{self, locate};
 use crate::place;
-use crate::posterior::{Explanation, Posterior};
+use crate::posterior::{Explanation, InPlace, Posterior};
 use crate::report::{Alternative, Baseline, Finding, Mismatch, Remainder, Report, SetReport, Verdict};
 use crate::search::{Search, Set};
 use crate::traces::{Traces, traces};
@@ -121,7 +121,8 @@ impl<'a, 'p> Writer<'a, 'p> {
         let idle = !self.names_only().is_empty() && !scores::predicts(problem, &last_full);
         let thin = thin.filter(|thin| thin.still || !idle).or(idle.then(Thin::unpredicted));
         let actions = problem.actions(&self.last);
-        let negligible = left::negligible(problem, &self.last, &actions);
+        let mut negligible = left::negligible(problem, &self.last, &actions);
+        negligible.retain(|(id, _)| !self.baseline.hypothesis.has(id));
         let circumstances = Circumstances {
             negligible: negligible.iter().map(|n| n.0).collect(),
             thin: thin.clone(),
@@ -240,7 +241,8 @@ impl<'a, 'p> Writer<'a, 'p> {
         let std_baseline = problem.standard_errors(self.baseline);
         let baseline = Baseline {
             model: options.model.name().into(),
-            parameters: scores::stated_parameters(self.baseline, &std_baseline),
+            parameters: scores::all_parameters(self.baseline, &std_baseline),
+            effects: scores::fitted_effects(self.baseline, &std_baseline),
             channels: scores::channels(problem, &self.held, &baseline_trained, &baseline_full, &self.floor),
         };
         let misread = thin.as_ref().is_some_and(|thin| thin.of_the_log);
@@ -248,7 +250,8 @@ impl<'a, 'p> Writer<'a, 'p> {
         let open = Open::of(&decision, remainder.as_ref(), &mismatch, thin);
         let next = || experiment::next(self.search, &decision, &self.best, self.rig, open);
         let next_experiment = if misread { None } else { next() };
-        let alternatives = self.alternatives(&decision, &circumstances.negligible, empty_cost);
+        let in_place = self.posterior.in_place(circumstances.beside());
+        let alternatives = self.alternatives(&decision, &circumstances.negligible, &in_place, empty_cost);
         let summary = words::summary(&words::Told {
             verdict: decision.verdict,
             findings: &findings,
@@ -274,7 +277,7 @@ impl<'a, 'p> Writer<'a, 'p> {
             baseline,
             mismatch,
             findings,
-            explanations: self.listed(),
+            explanations: listed(in_place),
             remainder,
             alternatives,
             empirical_term,
@@ -334,26 +337,14 @@ impl<'a, 'p> Writer<'a, 'p> {
         }
     }
 
-    fn listed(&self) -> Vec<SetReport> {
-        let mut reached = 0.0;
-        let mut out = Vec::new();
-        for e in &self.posterior.sets {
-            out.push(SetReport {
-                effects: e.set().iter().map(|id| (*id).to_string()).collect(),
-                probability: self.posterior.of_set(e),
-            });
-            reached += e.probability;
-            if reached >= LISTED || e.probability < 1e-3 {
-                break;
-            }
-        }
-        // What was not fitted may stand in the places of many effects rather than of few.
-        out.sort_by(|a, b| b.probability.total_cmp(&a.probability));
-        out
-    }
-
     /// Names that were fitted and are less likely, likeliest first.
-    fn alternatives(&self, decision: &Decision, negligible: &[&str], empty_cost: f64) -> Vec<Alternative> {
+    fn alternatives(
+        &self,
+        decision: &Decision,
+        negligible: &[&str],
+        in_place: &InPlace,
+        empty_cost: f64,
+    ) -> Vec<Alternative> {
         let best_cost = self.search.cost(&self.best);
         let mut others: Vec<(f64, f64, &'static str)> = self
             .search
@@ -363,7 +354,7 @@ impl<'a, 'p> Writer<'a, 'p> {
             .filter_map(|e| {
                 let holding = self.search.fits.keys().filter(|set| set.contains(&e.id));
                 let cost = holding.map(|set| self.search.cost(set)).min_by(f64::total_cmp)?;
-                Some((self.posterior.stated(e.id), cost, e.id))
+                Some((in_place.probability(e.id), cost, e.id))
             })
             .collect();
         others.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.total_cmp(&b.1)));
@@ -376,11 +367,25 @@ impl<'a, 'p> Writer<'a, 'p> {
                 why_not: words::why_not(
                     (cost - best_cost).max(0.0),
                     empty_cost - best_cost,
+                    self.search.temper(),
                     self.best.is_empty(),
                 ),
             })
             .collect()
     }
+}
+
+/// Sets of names that are right together, until enough is listed.
+fn listed(in_place: InPlace) -> Vec<SetReport> {
+    let mut reached = 0.0;
+    let missing = |(_, probability): &(Set, f64)| {
+        let more = reached < LISTED;
+        reached += probability;
+        more
+    };
+    let effects = |set: Set| set.into_iter().map(String::from).collect();
+    let report = |(set, probability)| SetReport { effects: effects(set), probability };
+    in_place.0.into_iter().take_while(missing).map(report).collect()
 }
 
 fn mismatch_of(path: &str, located: &locate::Place, gain: f64, share: f64) -> Mismatch {

@@ -21,7 +21,7 @@ use crate::heldout::held_out_rows;
 use crate::hypothesis::{Free, Hypothesis, Target};
 use crate::identifiable::{NotIdentifiable, not_identifiable};
 use crate::noise::Criterion;
-use crate::scores::{self, ChannelReport, ParameterReport, parameters};
+use crate::scores::{self, ChannelReport, FittedEffect, ParameterReport, fitted_effects, parameters};
 use crate::setup::Setup;
 use crate::simulate::Problem;
 
@@ -49,19 +49,6 @@ pub struct Correlation {
     pub parameters: [String; 2],
     /// Correlation of their errors, priors included.
     pub correlation: f64,
-}
-
-/// An effect that was fitted with the model.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct FittedEffect {
-    /// Catalogue identifier.
-    pub effect: String,
-    /// Where it enters.
-    pub path: String,
-    /// Equation.
-    pub equation: String,
-    /// Fitted values.
-    pub parameters: Vec<ParameterReport>,
 }
 
 /// What the further starts said.
@@ -176,18 +163,7 @@ pub fn identify(
     let held = held_out_rows(problem, &[&best.hypothesis]);
     let trained = problem.without(&held).again(&best, 6);
     let train_residual = problem.residual(&trained.hypothesis, &trained.values);
-    let effects = best
-        .hypothesis
-        .effects
-        .iter()
-        .enumerate()
-        .map(|(i, m)| FittedEffect {
-            effect: m.effect.id.into(),
-            path: m.effect.path.name().into(),
-            equation: m.effect.equation.into(),
-            parameters: parameters(&best, &std, Some(i)),
-        })
-        .collect();
+    let effects = fitted_effects(&best, &std);
     Ok(FitReport {
         schema: "kort.fit/1".into(),
         kort_version: env!("CARGO_PKG_VERSION").into(),

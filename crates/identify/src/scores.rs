@@ -85,13 +85,34 @@ pub fn parameters(fit: &Fit, std_errors: &[f64], effect: Option<usize>) -> Vec<P
         .collect()
 }
 
-/// What the rig states and a fit changed: the baseline's parameters, and those of effects that the rig is known to have.
-pub fn stated_parameters(fit: &Fit, std_errors: &[f64]) -> Vec<ParameterReport> {
-    let known = (0..fit.hypothesis.effects.len()).filter(|k| !fit.hypothesis.effects[*k].stated.is_empty());
-    std::iter::once(None)
-        .chain(known.map(Some))
-        .flat_map(|effect| parameters(fit, std_errors, effect))
-        .collect()
+/// What a fit has of the model's own parameters and of every effect that is taken to be there.
+pub fn all_parameters(fit: &Fit, std_errors: &[f64]) -> Vec<ParameterReport> {
+    let effects = (0..fit.hypothesis.effects.len()).map(Some);
+    std::iter::once(None).chain(effects).flat_map(|effect| parameters(fit, std_errors, effect)).collect()
+}
+
+/// An effect that was fitted with the model.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FittedEffect {
+    /// Catalogue identifier.
+    pub effect: String,
+    /// Where it enters.
+    pub path: String,
+    /// Equation.
+    pub equation: String,
+    /// Fitted values.
+    pub parameters: Vec<ParameterReport>,
+}
+
+/// The effects of a fit with their values.
+pub fn fitted_effects(fit: &Fit, std_errors: &[f64]) -> Vec<FittedEffect> {
+    let fitted = |(i, member): (usize, &Member)| FittedEffect {
+        effect: member.effect.id.into(),
+        path: member.effect.path.name().into(),
+        equation: member.effect.equation.into(),
+        parameters: parameters(fit, std_errors, Some(i)),
+    };
+    fit.hypothesis.effects.iter().enumerate().map(fitted).collect()
 }
 
 /// Values of an effect that are not fitted and without which those that are mean nothing: the order of a ripple, the

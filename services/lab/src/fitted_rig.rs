@@ -2,7 +2,8 @@
 //! they are. The comment behind a stated value told where that came from, and makes room for where the new one does.
 
 use kort_diagnose::report::ParameterReport;
-use kort_identify::identify::{FitReport, FittedEffect};
+use kort_identify::identify::FitReport;
+use kort_identify::scores::FittedEffect;
 use kort_thruster::effects::{self, Scale};
 use kort_thruster::parameters::Parameter;
 use kort_thruster::rig::{FoundEffect, Quantity, Rig};

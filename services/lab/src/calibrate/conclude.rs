@@ -5,7 +5,7 @@ use std::path::Path;
 use kort_calibrate::{Estimate, Facts, Log, estimate, recorded, stands_out};
 use kort_diagnose::constants::Constants;
 use kort_diagnose::diagnose::{Diagnosis, Options, diagnose};
-use kort_identify::identify::FittedEffect;
+use kort_identify::scores::FittedEffect;
 use kort_recording::{Column, Recording};
 use kort_thruster::models::ModelName;
 use kort_thruster::rig::Rig;

@@ -9,6 +9,7 @@ use kort_thruster::rig::Rig;
 
 use crate::believed::{DIAGNOSED, believed};
 use crate::failure::{Failure, Outcome, print, print_json, write_text};
+use crate::fitted_rig::with_fitted_effects;
 use crate::input::{Input, Loaded};
 use crate::outputs::Named;
 use crate::progress::Steps;
@@ -29,7 +30,7 @@ pub struct Diagnose {
     #[command(flatten)]
     input: Input,
     /// Write the rig description with what was found as its [[effects]], which fit, diagnose, simulate and
-    /// soak then use: names of probability 0.7 and more that have no rival
+    /// soak then use: names of probability 0.7 and more that have no rival, and those of --with
     #[arg(short, long, value_name = "RIG2")]
     output: Option<PathBuf>,
     /// Print one JSON document (kort.diagnosis/2)
@@ -55,14 +56,19 @@ pub fn diagnosis(input: &Input, loaded: &Loaded, told: &(dyn Fn(&str) + Sync)) -
     Ok(diagnosis)
 }
 
-/// The rig description with what is believed of a diagnosis as its `[[effects]]`, and their names.
+/// The rig description with what is believed of a diagnosis, and what it was told is there, as its `[[effects]]`; their
+/// names, and why something is not among them.
 ///
 /// # Errors
 /// The text is no rig description (it was one when it was read).
-pub fn adopted(rig_text: &str, report: &Report) -> Result<(String, Vec<String>), Failure> {
+pub fn adopted(loaded: &Loaded, report: &Report) -> Result<(String, Vec<String>, Vec<String>), Failure> {
     let found = believed(report);
-    let text = Rig::with_effects_toml(rig_text, &found, DIAGNOSED).map_err(Failure::failed)?;
-    Ok((text, found.iter().map(|f| f.effect.to_string()).collect()))
+    let mut told = report.baseline.effects.clone();
+    told.retain(|told| loaded.rig.effects.iter().all(|stated| stated.effect != told.effect));
+    let text = Rig::with_effects_toml(&loaded.rig_text, &found, DIAGNOSED).map_err(Failure::failed)?;
+    let (text, left_out) = with_fitted_effects(&text, &told, DIAGNOSED).map_err(Failure::failed)?;
+    let names = found.iter().map(|f| f.effect).chain(told.iter().map(|t| t.effect.as_str()));
+    Ok((text, names.map(String::from).collect(), left_out))
 }
 
 impl Diagnose {
@@ -102,8 +108,9 @@ impl Diagnose {
             eprintln!("wrote {}", path.display());
         }
         if let Some(path) = &self.output {
-            let (text, names) = adopted(&loaded.rig_text, &diagnosis.report)?;
+            let (text, names, left_out) = adopted(loaded, &diagnosis.report)?;
             write_text(path, &text)?;
+            left_out.iter().for_each(|why| eprintln!("{}: {why}", path.display()));
             let names = if names.is_empty() { "nothing".to_string() } else { names.join(", ") };
             eprintln!("wrote {} with {names}", path.display());
         }

@@ -33,7 +33,7 @@ pub fn page(diagnosis: &Diagnosis, rig: &Rig) -> String {
         page.section("What is known of it, without a name", empirical(term));
     }
     if report.explanations.len() > 1 {
-        page.section("Sets of effects that explain it", explanations(report));
+        page.section("Names that are right together", explanations(report));
     }
     page.section("Measured, modelled, explained", curves::all(diagnosis));
     page.section("The re-fitted baseline", baseline(report, rig));
@@ -178,7 +178,7 @@ fn baseline(report: &Report, rig: &Rig) -> Markup {
     }
 }
 
-/// Sets of effects with their probabilities, and what the likeliest leaves.
+/// Names that are right together with their probabilities, and what the likeliest leaves.
 fn explanations(report: &Report) -> Markup {
     let rows: Vec<Vec<String>> = report
         .explanations

@@ -124,7 +124,7 @@ pub fn text(report: &Report, rig: &Rig) -> String {
         ));
     }
     if report.explanations.len() > 1 {
-        sheet.heading("Sets of effects that explain it");
+        sheet.heading("Names that are right together");
         for e in report.explanations.iter().take(SHOWN) {
             sheet.item(&format!("{}: {}", short(e.probability), set(&e.effects)));
         }
@@ -174,7 +174,7 @@ pub fn text(report: &Report, rig: &Rig) -> String {
 /// A set of effects in words.
 pub fn set(effects: &[String]) -> String {
     if effects.is_empty() {
-        return "the baseline alone".into();
+        return "none of the catalogue".into();
     }
     effects.iter().map(|e| plain(e)).collect::<Vec<_>>().join(" and ")
 }
