@@ -262,12 +262,12 @@ mod tests {
         let usual = Circumstances::default();
         let much = Circumstances { more_than_noise: true, ..usual.clone() };
         let (alone, beside) = (decided(costs, &usual), decided(costs, &much));
-        assert!((beside.named[0].probability - 0.75 * alone.named[0].probability).abs() < 1e-4);
+        assert!((beside.named[0].probability - 0.75 * alone.named[0].probability).abs() < 1e-12);
         // The factor is not counted again where a nameless term stands in the set already.
         let with_term: &[(&[&'static str], f64)] =
             &[(&["unknown_shaft_step", "windage_drag"], 0.0), (&[], 80.0)];
         let (once, twice) = (decided(with_term, &usual), decided(with_term, &much));
-        assert!((once.named[0].probability - twice.named[0].probability).abs() < 1e-4);
+        assert!((once.named[0].probability - twice.named[0].probability).abs() < 1e-12);
         assert_eq!(beside.verdict, Verdict::PartlyExplained);
     }
 

@@ -70,6 +70,31 @@ pub fn more_than_noise(problem: &Problem, fit: &Fit, residual: &Stack, floor: &N
     Some(Rest { alone: others.peek().is_some() && others.all(|rest| rest.ratio <= 1.0), ..most })
 }
 
+/// Share of a mean square from which on its mean is most of it.
+const MOSTLY: f64 = 0.5;
+
+/// What is more than noise, in words: when, how large, and whether it is one number all the time, as a sensor whose zero is
+/// off leaves, which is one fact and too few for a name.
+pub fn told(problem: &Problem, rest: Rest, residual: &Stack, regime: &str) -> String {
+    let (mut sum, mut squares, mut n) = (0.0, 0.0, 0.0);
+    for (r, recording) in problem.recordings.iter().enumerate() {
+        for (channel, errors) in recording.channels.iter().zip(&residual[r]) {
+            let in_use = |row: &usize| channel.response.name() == rest.channel && !problem.masked[r][*row];
+            for (_, error) in channel.rows.iter().zip(errors).filter(|(row, _)| in_use(row)) {
+                let error = error / channel.full_scale;
+                (sum, squares, n) = (sum + error, squares + error * error, n + 1.0);
+            }
+        }
+    }
+    let constant = if sum * sum > MOSTLY * squares * n {
+        let mean = 100.0 * sum / f64::max(n, 1.0);
+        format!(", most of it one number: measured less simulated is {mean:+.1} % in the mean")
+    } else {
+        String::new()
+    };
+    format!("{regime} ({:.1} % of full scale that is no noise{constant})", 100.0 * rest.size)
+}
+
 /// Whether a fit leaves more than noise.
 pub fn leaves_more(problem: &Problem, fit: &Fit) -> bool {
     let more = |fit: &Fit| {
@@ -210,7 +235,7 @@ fn is_uneven(time_s: &[f64]) -> bool {
 mod tests {
     use kort_identify::scores::noise_floor;
 
-    use super::{is_uneven, more_than_noise};
+    use super::{is_uneven, more_than_noise, told};
     use crate::stand;
 
     /// Whether an error of the shaft's speed, in hundredths of its full scale of 30 rad/s, is more than noise.
@@ -243,6 +268,20 @@ mod tests {
         assert!(more(|_, time, noise| 6.0 * (0.7 * time).sin() + 0.2 * noise));
         assert!(!more(|_, time, noise| 1.0 * (0.7 * time).sin() + 0.2 * noise));
     }
+    #[test]
+    fn what_is_one_number_all_the_time_is_said() {
+        let words = |error: fn(f64, f64, f64) -> f64| {
+            stand::left(error, |problem, fit, residual| {
+                let rest = more_than_noise(problem, fit, residual, &noise_floor(problem, residual));
+                told(problem, rest.unwrap(), residual, "throughout")
+            })
+        };
+        let offset = words(|_, _, noise| 1.5 + 0.1 * noise);
+        assert!(offset.contains("one number") && offset.contains("+5.0 %"), "{offset}");
+        let wave = words(|_, time, _| 1.8 * (0.7 * time).sin());
+        assert!(wave.starts_with("throughout (") && !wave.contains("one number"), "{wave}");
+    }
+
     #[test]
     fn rows_are_uneven_where_most_intervals_differ() {
         let even: Vec<f64> =

@@ -135,11 +135,12 @@ impl Posterior {
         self.holding(effect).map(|e| e.probability).sum()
     }
 
-    /// Which names are right together, likeliest first; the probabilities sum to one. Any member of a set that was fitted
-    /// may stand where something belongs that was not ([`doubt`]): one alternative, whichever member stands there. A set
-    /// without names is none of them, or what nobody wrote down.
+    /// Which names are right together, likeliest first; the probabilities sum to one. In each set that was fitted something
+    /// that was not may be right in the place of any member ([`doubt`]): the set then goes on without it. A set without
+    /// names is none of them, or what nobody wrote down.
     pub fn in_place(&self, beside: Beside) -> InPlace {
-        let mut weights: BTreeMap<(Set, u32), f64> = BTreeMap::new();
+        let mut sets: BTreeMap<Set, f64> = BTreeMap::new();
+        let mut trusted: BTreeMap<&'static str, f64> = BTreeMap::new();
         for explanation in self.sets.iter().filter(|e| e.probability >= LEAST_WEIGHT) {
             let (terms, names): (Set, Set) = explanation.set().iter().partition(|id| is_term(id));
             let lowered = match beside {
@@ -148,24 +149,28 @@ impl Posterior {
                 Beside::Everything => true,
             };
             let factor = if lowered { self.constants.beside_unknown } else { 1.0 };
-            // The odds against a name in place: its probability there is the factor's share of what it would be.
-            let against = |id: &&str| (1.0 + self.doubt_in(explanation, id)) / factor - 1.0;
-            let against: Vec<f64> = names.iter().map(against).collect();
+            let in_place: Vec<f64> = names
+                .iter()
+                .map(|id| factor * *trusted.entry(*id).or_insert_with(|| self.trust(id)))
+                .collect();
             for out in 0..1_u32 << names.len() {
-                let is_out = |at: &usize| out >> at & 1 == 1;
-                let stays = (0..names.len()).filter(|at| !is_out(at)).map(|at| names[at]);
-                let stays: Set = stays.chain(terms.iter().copied()).collect();
-                let odds: f64 = (0..names.len()).filter(is_out).map(|at| against[at]).product();
-                let weight = weights.entry((stays, out.count_ones())).or_default();
-                *weight = weight.max(explanation.probability * odds);
+                let stays = |at: &usize| out >> at & 1 == 0;
+                let odds = |at| if stays(&at) { in_place[at] } else { 1.0 - in_place[at] };
+                let kept = (0..names.len()).filter(stays).map(|at| names[at]).chain(terms.iter().copied());
+                let share = explanation.probability * (0..names.len()).map(odds).product::<f64>();
+                *sets.entry(kept.collect()).or_default() += share;
             }
         }
-        let total: f64 = weights.values().sum();
-        let mut sets: BTreeMap<Set, f64> = BTreeMap::new();
-        weights.into_iter().for_each(|((set, _), weight)| *sets.entry(set).or_default() += weight / total);
         let mut sets: Vec<(Set, f64)> = sets.into_iter().collect();
         sets.sort_by(|a, b| b.1.total_cmp(&a.1));
         InPlace(sets)
+    }
+
+    /// Probability that an effect which a set holds is what stands there: what was not fitted is one more rival, beside all
+    /// sets that hold the effect.
+    fn trust(&self, effect: &str) -> f64 {
+        let doubt = self.holding(effect).next().map_or(1.0, |e| self.doubt_in(e, effect));
+        1.0 / (1.0 + self.presence(effect) * doubt)
     }
 
     fn holding(&self, effect: &str) -> impl Iterator<Item = &Explanation> {

@@ -298,7 +298,7 @@ impl<'a, 'p> Writer<'a, 'p> {
         Mismatch {
             path: path.map_or("sensor", Path::name).into(),
             channel: rest.channel.into(),
-            regime: format!("{} ({:.1} % of full scale that is no noise)", located.regime, 100.0 * rest.size),
+            regime: left::told(self.problem, rest, residual, &located.regime),
             time_s: located.spans,
             significance_sigma: rest.ratio,
             share_of_excess_error: 1.0,
