@@ -66,9 +66,9 @@ const LEAST_WEIGHT: f64 = 1e-9;
 pub struct InPlace(pub Vec<(Set, f64)>);
 
 impl InPlace {
-    /// Probability of an effect: the sum over the sets that hold it.
+    /// Probability of an effect: the sum over the sets that hold it. (A sum of no floats is -0.)
     pub fn probability(&self, effect: &str) -> f64 {
-        self.0.iter().filter(|(set, _)| set.contains(&effect)).map(|(_, p)| p).sum()
+        self.0.iter().filter(|(set, _)| set.contains(&effect)).fold(0.0, |sum, (_, p)| sum + p)
     }
 }
 
