@@ -30,13 +30,15 @@ fn allowed(option: &str, said: &str) -> String {
     let range = said.split_once(" is not in ").and_then(|(_, range)| range.lines().next());
     match range.and_then(|range| range.split_once("..=")) {
         Some((low, high)) => format!("{option} takes a whole number from {low} to {high}"),
+        None if said.contains("invalid float") || said.contains("parse float") => {
+            format!("{option} takes a number: 0.5")
+        }
         None if said.contains("invalid digit")
             || said.contains("number too")
             || said.contains("empty string") =>
         {
             format!("{option} takes a whole number, 0 or above")
         }
-        None if said.contains("invalid float") => format!("{option} takes a number: 0.5"),
         None => format!("--help says what {option} takes"),
     }
 }
@@ -50,7 +52,15 @@ mod tests {
         for (said, words) in [
             ("error: invalid value '0' for '--jobs <N>': 0 is not in 1..=1024\n\nFor more", "from 1 to 1024"),
             ("error: invalid value '-1' for '--jobs <N>': invalid digit found in string\n", "0 or above"),
-            ("error: invalid value 'x' for '--jobs <N>': invalid float literal\n", "a number"),
+            ("error: invalid value 'x' for '--jobs <N>': invalid float literal\n", "a number: 0.5"),
+            (
+                "error: invalid value '' for '--jobs <N>': cannot parse float from empty string\n",
+                "a number: 0.5",
+            ),
+            (
+                "error: invalid value '' for '--jobs <N>': cannot parse integer from empty string\n",
+                "0 or above",
+            ),
         ] {
             assert!(
                 allowed("--jobs <N>", said).ends_with(words) || allowed("--jobs <N>", said).contains(words)

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use serde_json::{Value, json};
 use tokio_tungstenite::tungstenite::{self, Message, client::IntoClientRequest};
 
-use crate::common::{self, Site, kill, wait};
+use crate::common::{self, Site, Stack, kill, wait};
 use crate::{T1, ask, token};
 
 /// A service that asks for tokens, and one of them.
@@ -42,6 +42,38 @@ fn a_gateway_on_loopback_says_why_it_asks_for_tokens() {
         kill(supervisor.id(), "TERM");
         supervisor.wait().unwrap();
     }
+}
+
+/// A token may be of too low a role for a stop where nobody needs one: it stops all the same, either way, by its own name.
+#[test]
+fn where_nobody_needs_a_token_a_viewer_stops_by_its_own_name() {
+    common::in_real_time(|| {
+        let stack = Stack::start();
+        let port = stack.site.port;
+        let bearer = format!("Bearer {}", token(&stack.site, "eye", "viewer"));
+        let stopped = || {
+            let (_, events) = ask(port, "GET", "/v1/events", &[], "");
+            let events = events.as_array().unwrap();
+            let of = |event: &&Value| event["kind"] == "stopped" && event["who"] == "eye";
+            events.iter().filter(of).count()
+        };
+        assert_eq!(ask(port, "POST", "/v1/stop", &[("Authorization", &bearer)], "").0, 200);
+        wait("the first stop", || (stopped() == 1).then_some(()));
+        let mut request = format!("ws://127.0.0.1:{port}{T1}/stream?hz=50").into_client_request().unwrap();
+        request.headers_mut().insert("authorization", bearer.parse().unwrap());
+        let (mut socket, _) = tungstenite::connect(request).unwrap();
+        let mut answer = |sent: Value| {
+            socket.send(Message::text(sent.to_string())).unwrap();
+            wait("an answer", || {
+                let Message::Text(text) = socket.read().unwrap() else { return None };
+                serde_json::from_str::<Value>(&text).ok().filter(|told| told["measured"].is_null())
+            })
+        };
+        assert_eq!(answer(json!({"stop": true}))["stopped"], json!(["t1"]));
+        wait("the second stop", || (stopped() == 2).then_some(()));
+        let refused = answer(json!({"setpoint": {"thrust_n": 1.0}, "lease_id": "x"}));
+        assert_eq!(refused["type"], "urn:kort:problem:role-too-low", "it commands nothing: {refused}");
+    });
 }
 
 /// They would stand in the event log for the service itself, or for whoever needs no token.

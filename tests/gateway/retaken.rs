@@ -51,6 +51,46 @@ fn what_the_next_lease_commands_within_the_ramp_is_not_lost() {
     });
 }
 
+/// Armed at zero there is no ramp to be found: the controller disarms in the tick in which it hears that nobody commands.
+#[test]
+fn at_zero_the_end_of_a_lease_is_told_as_such_however_soon_the_next_is_taken() {
+    common::in_real_time(|| {
+        let mut stack = Stack::start();
+        for (round, after_ms) in [0, 2, 4, 6, 8, 10, 20].into_iter().enumerate() {
+            take_again(&mut stack);
+            stack.expect("POST", "/clear-faults", None);
+            stack.expect("POST", "/arm", None);
+            if round % 2 == 1 {
+                stack.expect("PUT", "/setpoint", Some(json!({"thrust_n": 0.0})));
+            }
+            let since = newest(&stack);
+            stack.expect("DELETE", "/lease", None);
+            stack.leases.clear();
+            std::thread::sleep(Duration::from_millis(after_ms));
+            take_again(&mut stack);
+            std::thread::sleep(Duration::from_millis(200));
+            let told = told(&stack, since);
+            assert!(!told.iter().any(|(_, words)| words.contains("by none of")), "{after_ms} ms: {told:?}");
+            stack.expect("DELETE", "/lease", None);
+            stack.leases.clear();
+            wait("it to be disarmed", || (stack.state()?["armed"] == false).then_some(()));
+        }
+    });
+}
+
+/// However short its life: who takes a lease during the ramp of the one before is given it.
+#[test]
+fn a_lease_of_a_millisecond_is_granted_during_a_ramp_too() {
+    common::in_real_time(|| {
+        let mut stack = Stack::start();
+        stack.thrust(80.0, 60_000);
+        stack.expect("DELETE", "/lease", None);
+        stack.leases.clear();
+        let grant = stack.expect("POST", "/lease", Some(json!({"holder": "next", "ttl_ms": 1})));
+        assert_eq!(grant["lease_id"].as_str().map(str::len), Some(32), "{grant}");
+    });
+}
+
 /// A lease alone moves nothing: the ramp ends at zero, and the old setpoint does not come back.
 #[test]
 fn the_next_lease_finds_the_drive_armed_at_zero_where_it_asks_for_nothing() {

@@ -276,12 +276,13 @@ impl Tick {
         }
         let mut share = 1.0;
         if let Some(ending) = self.ending {
+            // Also where it is over at once: whoever sees the stop is told why.
+            self.limits |= Limit::LeaseRamp.bit();
             let nothing = self.setpoint.is_none_or(|s| s.value == 0.0);
             if !ending.hold && (nothing || ending.is_over(now_ns)) {
                 let stop = self.end_over(ending.cause, now_ns);
                 return (Reference::Off, stop);
             }
-            self.limits |= Limit::LeaseRamp.bit();
             share = ending.share(now_ns);
         }
         let Some(setpoint) = self.setpoint else {

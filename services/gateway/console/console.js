@@ -140,7 +140,7 @@ function showState(s, fresh) {
   TILES.forEach(([, , value, digits], i) => { $("tiles").children[i].querySelector("i").textContent = text(value(s), digits); });
   $("time").textContent = `servo time ${s.time_s.toFixed(2)} s${clock.zero_ms === null || run ? "" : `, ${clockAt(s.time_s)}`}`;
   chip("armed", !fresh ? `${s.armed ? "armed" : "disarmed"} when last heard` : s.armed ? "armed" : "disarmed", s.armed && fresh ? "warn" : "");
-  $("arm").disabled = s.armed || !fresh; $("disarm").disabled = false;
+  $("arm").disabled = s.armed || !fresh || !lease; $("disarm").disabled = false;
 
   const mine = lease && s.lease;
   // A state that was on its way when the lease was granted does not know of it.

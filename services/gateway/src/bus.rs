@@ -121,11 +121,13 @@ struct Bridge {
     /// And before it was ramped down: a lost gateway's stop begins there.
     before_ramp: Option<Before>,
     ramping: bool,
-    /// When it was last heard ramped down.
+    /// When it was last heard ramped down, or its controller was told that nobody commands it.
     ramped: Option<Instant>,
     /// As the servo said last, and whether somebody asked since the arming for its end.
     armed: bool,
     disarm_asked: bool,
+    /// The calibration that armed it, if one did.
+    calibrates: Option<String>,
     /// Until when answers are looked for between two ticks.
     errands_until: Option<Instant>,
 }
@@ -151,6 +153,7 @@ impl Bridge {
             ramped: None,
             armed: false,
             disarm_asked: false,
+            calibrates: None,
             errands_until: None,
         }
     }
@@ -351,7 +354,7 @@ impl Bridge {
     }
 
     /// What the desk asks for now. A disarmed thruster is asked for nothing, so that arming starts at rest.
-    fn setpoint(&self, now: Instant) -> SetpointMessage {
+    fn setpoint(&mut self, now: Instant) -> SetpointMessage {
         let heard = self.link.thruster.heard();
         let mut desk = self.link.thruster.desk();
         desk.expire(now);
@@ -368,6 +371,10 @@ impl Bridge {
             Some(Setpoint::SpeedRadS(value)) => (SetpointKind::Speed, value),
             None => (SetpointKind::Zero, 0.0),
         };
+        // At zero its controller disarms it within one tick, of which this thread may hear nothing.
+        if heard.armed(now) && desk.lease.current(now).is_none() {
+            self.ramped = Some(now);
+        }
         let lease_until_ns =
             desk.lease.current(now).map_or(0, |lease| monotonic_ns() + lease.expires_in_ms(now) * 1_000_000);
         let ago_ns = |at: Instant| u64::try_from(now.duration_since(at).as_nanos()).unwrap_or(u64::MAX);

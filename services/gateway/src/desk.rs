@@ -104,12 +104,13 @@ impl Desk {
         let (lease, before) = self.lease.take(&self.thruster, wanted, now)?;
         self.version += 1;
         let who = lease.who();
+        // Whichever way the lease before ended, nothing of it is left for this one.
+        self.rest(now, &format!("{who} took command"));
         match before {
             None => {
                 self.note(EventKind::LeaseTaken, &who, format!("{who} took command for {} ms", wanted.ttl_ms))
             }
             Some(from) => {
-                self.rest(now, &format!("{who} took command"));
                 self.note(EventKind::LeaseTakenOver, &who, format!("{who} took command from {from}"));
             }
         }

@@ -71,9 +71,9 @@ impl Gate {
         Gate { hosts: Hosts::new(bind, hosts), tokens, required, stops: Queue::new(), others: Queue::new() }
     }
 
-    /// Does this bring a thruster to zero, without a token?
-    fn stops_for_all(&self, path: &str) -> bool {
-        !self.required && stops(path)
+    /// May anybody bring a thruster to zero, with whatever token or none?
+    pub fn all_may_stop(&self) -> bool {
+        !self.required
     }
 
     /// Is what somebody was let in by still in force?
@@ -190,10 +190,12 @@ pub async fn check(
     if let Some(role) = needed(request.method(), path) {
         let peer = request.extensions().get::<Peer>().map(|Peer(address)| *address);
         let identified = gate.identify(&app, request.headers(), peer, stops(path)).await;
+        let for_all = gate.all_may_stop() && stops(path);
         let identity = match identified {
-            // Where anybody may stop, a header that is not understood, or a token that may not, stops nobody from it.
-            Err(_) if gate.stops_for_all(path) => Identity::local(),
-            Ok(known) if gate.stops_for_all(path) && known.role < role => Identity::local(),
+            // Where anybody may stop, a header that is not understood, or a token that may not, stops nobody from it; who
+            // it is, is told all the same.
+            Err(_) if for_all => Identity::local(),
+            Ok(known) if for_all && known.role < role => Identity { role, ..known },
             other => other?,
         };
         if identity.role < role {

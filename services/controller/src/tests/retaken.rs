@@ -84,3 +84,22 @@ fn a_lease_that_ends_again_during_the_ramp_stops_in_the_end() {
     bench.setpoint.lease_until_ns = 0;
     assert!((0..100).any(|_| bench.step().stop != 0));
 }
+
+/// At zero there is no ramp, and the stop has its reason all the same: the gateway tells of it by that.
+#[test]
+fn at_zero_the_end_of_a_lease_stops_at_once_and_says_why() {
+    for asked_zero in [true, false] {
+        let mut bench = Bench::new();
+        bench.arm();
+        if asked_zero {
+            bench.give(THRUST, 0.0);
+        }
+        for _ in 0..50 {
+            assert_eq!(bench.step().stop, 0);
+        }
+        assert_eq!(shown(&bench), (0.0, false));
+        bench.setpoint.lease_until_ns = 0;
+        assert_ne!(bench.step().stop, 0);
+        assert_eq!(shown(&bench), (0.0, true));
+    }
+}

@@ -92,14 +92,17 @@ impl Bridge {
         let was = std::mem::replace(&mut self.armed, armed);
         if armed && !was {
             self.disarm_asked = false;
+            // A calibration arms by a way of its own, and only while it drives; when it disarms it may be at its estimation.
+            let calibration = self.link.thruster.calibration(Instant::now()).filter(|step| step.drives);
+            self.calibrates = calibration.map(|step| step.id);
         }
         let faultless = telemetry.faults == 0 && self.latched.iter().all(|faults| faults.unwrap_or(0) == 0);
         if was && !armed && !self.disarm_asked && faultless {
             let id = &self.link.thruster.id;
             let now = Instant::now();
             let led = self.link.thruster.desk().lease.current(now).is_some();
-            let words = match self.link.thruster.calibration(now) {
-                Some(calibration) => format!("disarmed: calibration {} has driven it as far as it wants", calibration.id),
+            let words = match self.calibrates.take() {
+                Some(calibration) => format!("disarmed: calibration {calibration} drives it no more"),
                 // Its controller may not have heard of the lease in force.
                 None if led && self.ramped.is_some_and(|at| now.duration_since(at) < RAMP_OVER) => {
                     "disarmed at the end of a ramp to zero: the lease before was over, or the service stops".into()

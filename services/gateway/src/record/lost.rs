@@ -10,8 +10,16 @@ use super::{ENDING, RecordingInfo, RecordingState, is_word};
 /// What is known of the recording of a `NAME.json`; none for any other file.
 pub fn known_of(path: &Path) -> Option<RecordingInfo> {
     let name = path.file_name()?.to_str()?.strip_suffix(".json").filter(|name| is_word(name))?;
-    let text = fs::read(path).unwrap_or_default();
-    Some(serde_json::from_slice(&text).unwrap_or_else(|error| of_the_file(path, name, &error.to_string())))
+    // One that was deleted meanwhile, or that cannot be read, is not damaged.
+    let text = fs::read(path).ok()?;
+    match serde_json::from_slice(&text) {
+        Ok(info) => Some(info),
+        // Without a recording beside it, it is a file of somebody else's.
+        Err(error) => {
+            let recorded = path.with_file_name(format!("{name}.{ENDING}")).is_file();
+            recorded.then(|| of_the_file(path, name, &error.to_string()))
+        }
+    }
 }
 
 /// What its own file tells, and what is lost: so it is shown, fetched and deleted as any other.
@@ -54,6 +62,12 @@ mod tests {
             fs::write(file(&format!("{name}.mcap")), "rows").unwrap();
         }
         fs::write(file("no recording.json"), "").unwrap();
+        // Somebody else's report, and folders that are called as files of a recording.
+        fs::write(file("x-report.json"), "{\"verdict\": 1}").unwrap();
+        fs::create_dir(file("folder.json")).unwrap();
+        fs::write(file("folder.mcap"), "rows").unwrap();
+        fs::write(file("other.json"), "").unwrap();
+        fs::create_dir(file("other.mcap")).unwrap();
         let recorder = Recorder::open(folder.path(), RecordingLimits::default()).unwrap();
         let list = recorder.list();
         assert_eq!(list.len(), 2, "{list:?}");

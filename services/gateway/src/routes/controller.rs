@@ -11,6 +11,7 @@ use utoipa::openapi::RefOr;
 use utoipa::openapi::schema::{AdditionalProperties, ObjectBuilder, Schema, SchemaType, Type};
 use utoipa_axum::{router::OpenApiRouter, routes};
 
+use super::whole;
 use crate::App;
 use crate::extract::{Json, LeaseId, Path};
 use crate::problem::Problem;
@@ -145,7 +146,10 @@ async fn put(
     LeaseId(lease_id): LeaseId,
     Json(request): Json<ControllerRequest>,
 ) -> Result<axum::Json<ControllerView>, Problem> {
-    let thruster = app.thruster(&id)?;
-    thruster.set_controller(&who.name, lease_id.as_deref(), &request).await?;
-    Ok(axum::Json(thruster.controller()?))
+    let thruster = Arc::clone(app.thruster(&id)?);
+    whole(async move {
+        thruster.set_controller(&who.name, lease_id.as_deref(), &request).await?;
+        thruster.controller()
+    })
+    .await
 }

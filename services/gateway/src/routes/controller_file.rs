@@ -12,7 +12,7 @@ use serde::Deserialize;
 use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
-use super::{ControllerRequest, ControllerView};
+use super::{ControllerRequest, ControllerView, whole};
 use crate::App;
 use crate::extract::{Json, LeaseId, Path};
 use crate::problem::{Kind, Problem};
@@ -77,7 +77,7 @@ async fn load(
     LeaseId(lease): LeaseId,
     Json(ControllerFile { toml }): Json<ControllerFile>,
 ) -> Result<axum::Json<ControllerView>, Problem> {
-    let thruster = app.thruster(&id)?;
+    let thruster = Arc::clone(app.thruster(&id)?);
     let invalid = |words: String| Problem::new(Kind::InvalidField, words);
     let wanted = ControllerConfig::from_toml_with_all(&toml).map_err(|wrong| {
         Problem::of_many(Kind::InvalidField, &wrong, "config/controllers has examples").within("toml")
@@ -106,10 +106,13 @@ async fn load(
         estimator: None,
         parameters: part.iter().cloned().collect::<BTreeMap<_, _>>(),
     }));
-    for request in &requests {
-        thruster.set_controller(&who.name, lease.as_deref(), request).await?;
-    }
-    Ok(axum::Json(thruster.controller()?))
+    whole(async move {
+        for request in &requests {
+            thruster.set_controller(&who.name, lease.as_deref(), request).await?;
+        }
+        thruster.controller()
+    })
+    .await
 }
 
 /// The whole configuration that runs: what the deployment states, with what the controller tells of itself.

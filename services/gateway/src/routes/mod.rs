@@ -91,6 +91,14 @@ pub fn router(app: Arc<App>) -> Router {
         .with_state(app)
 }
 
+/// Done to its end, whether or not the client waits for it.
+async fn whole<T: Send + 'static>(
+    change: impl Future<Output = Result<T, Problem>> + Send + 'static,
+) -> Result<axum::Json<T>, Problem> {
+    let done = tokio::spawn(change).await;
+    done.map_err(|error| Problem::new(Kind::Internal, error.to_string()))?.map(axum::Json)
+}
+
 async fn unknown_route(request: Request) -> Problem {
     Problem::new(Kind::UnknownRoute, format!("there is no route {}", request.uri().path()))
         .hint("GET /openapi.json lists every route; /docs shows them")

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
 use utoipa_axum::{router::OpenApiRouter, routes};
 
+use super::whole;
 use crate::App;
 use crate::analysis::{Analysis, DiagnosisInfo, FitInfo};
 use crate::extract::{Json, LeaseId, Path, Query};
@@ -247,14 +248,6 @@ async fn roll_back(
 ) -> Result<axum::Json<Revised>, Problem> {
     let (desk, asker) = (Arc::clone(app.rig(&id)?), Asker { who: who.name, lease });
     whole(async move { desk.roll_back(&asker).await }).await
-}
-
-/// Done to its end, whether or not the client waits for it.
-async fn whole(
-    change: impl Future<Output = Result<Revised, Problem>> + Send + 'static,
-) -> Result<axum::Json<Revised>, Problem> {
-    let done = tokio::spawn(change).await;
-    done.map_err(|error| Problem::new(Kind::Internal, error.to_string()))?.map(axum::Json)
 }
 
 /// The text that a request names, and where it comes from.

@@ -39,7 +39,7 @@ impl Thruster {
 
     /// Refuses whoever does not hold the lease in force.
     pub fn holds(&self, lease: Option<&str>) -> Result<(), Problem> {
-        self.desk().lease.check(&self.id, lease, Instant::now())
+        self.desk().check(lease, Instant::now())
     }
 
     /// May this lease's holder calibrate now? At rest, disarmed, without a fault. Returns the lease.
@@ -57,5 +57,42 @@ impl Thruster {
         }
         self.desk().done(lease, now);
         Ok(lease.unwrap_or_default().to_owned())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+    use std::time::Duration;
+
+    use kort_proto::events::EventKind;
+
+    use super::*;
+    use crate::events::Events;
+    use crate::heard::Heard;
+    use crate::lease::Wanted;
+    use crate::record::Recorder;
+    use crate::settings::RecordingLimits;
+    use crate::view::{Setpoint, SetpointRange};
+
+    /// A calibration looks every 20 ms: it may be the first to find that the lease is over.
+    #[test]
+    fn a_calibration_that_finds_its_lease_over_ends_what_the_lease_began() {
+        let folder = tempfile::tempdir().unwrap();
+        let recorder = Recorder::open(&folder.path().join("recordings"), RecordingLimits::default()).unwrap();
+        let events = Events::start(&folder.path().join("events"), Arc::new(recorder)).unwrap();
+        let range = SetpointRange { thrust_n: 200.0, speed_rad_s: 120.0 };
+        let (thruster, _asks) = Thruster::new("t1", range, Heard::default(), Arc::default(), events);
+        let wanted = Wanted { holder: "bench", token: "local", ttl_ms: 20, takeover: false };
+        let lease = thruster.desk().take(&wanted, Instant::now()).unwrap();
+        let id = Some(lease.id.as_str());
+        thruster.desk().command("local", id, Setpoint::ThrustN(25.0), Instant::now()).unwrap();
+        let before = thruster.desk().version();
+        std::thread::sleep(Duration::from_millis(40));
+        assert!(thruster.holds(id).unwrap_err().is(Kind::LeaseLost));
+        let mut desk = thruster.desk();
+        assert_eq!(desk.setpoint(), None);
+        assert_ne!(desk.version(), before);
+        assert!(desk.notes().iter().any(|note| note.kind == EventKind::LeaseExpired));
     }
 }

@@ -29,8 +29,9 @@ impl Thruster {
         let heard_within = TURNS_TO_HEAR * self.heard().turn;
         while !led && self.heard().armed(Instant::now()) && now.elapsed() < heard_within {
             tokio::time::sleep(Duration::from_millis(2)).await;
-            // The wait is none of its life.
-            lease = self.desk().renew(Some(&lease.id), Instant::now())?;
+            // The wait is none of its life. One that is over all the same, or taken over, was granted: its next word is told.
+            let Ok(renewed) = self.desk().renew(Some(&lease.id), Instant::now()) else { break };
+            lease = renewed;
         }
         Ok((lease, Instant::now()))
     }

@@ -87,8 +87,8 @@ impl Thruster {
             let Some(state) = self.heard().controller(Instant::now()).copied() else { continue };
             if let Some(before) = kept.replaced(&state) {
                 match self.set_again(&kept.set, &state).await {
-                    // One that is not there yet is asked again.
-                    Err(problem) if problem.is(Kind::NotReady) => continue,
+                    // One that is not there yet is asked again, and so is one that was not asked.
+                    Err(problem) if problem.is(Kind::NotReady) || problem.is(Kind::Overloaded) => continue,
                     Err(problem) => {
                         let words = format!("the controller began anew without {}", words(&kept.set));
                         tracing::error!(thruster = self.id, ?problem, "{words}");
@@ -102,8 +102,10 @@ impl Thruster {
                     self.desk().note(EventKind::ControllerChanged, "gateway", words);
                 }
             }
-            let Some(state) = self.heard().controller(Instant::now()).copied() else { continue };
-            kept.ran = Some((state.header.session, runs(&state)));
+            // What was found holds of this controller; one that began anew meanwhile is looked at in its turn.
+            let now = self.heard().controller(Instant::now()).copied();
+            let same = now.filter(|now| now.header.session == state.header.session);
+            kept.ran = same.map(|now| (now.header.session, runs(&now))).or(kept.ran.take());
         }
     }
 

@@ -51,6 +51,8 @@ impl Thruster {
         lease: Option<&str>,
         wanted: &ControllerRequest,
     ) -> Result<(), Problem> {
+        // First of all: another switch may hold it longer than the lease lives.
+        let mut kept = self.law.lock().await;
         self.desk().may(lease, Instant::now())?;
         let now = self.controller()?;
         if let Some(name) = &wanted.controller
@@ -60,7 +62,6 @@ impl Thruster {
                 .hint(format!("choose one of {}", now.available.join(", ")))
                 .allowed(now.available));
         }
-        let mut kept = self.law.lock().await;
         self.ask_law(wanted).await?;
         kept.set(wanted);
         match words(wanted) {
