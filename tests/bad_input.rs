@@ -170,8 +170,11 @@ fn outputs_are_looked_at_first() {
     let recording = file(folder.path(), "run.csv", b"time_s,current_cmd_a,shaft_speed_rad_s\n0,1,0\n1,1,1\n");
     let rig = folder.path().join("rig.toml");
     std::fs::copy(concat!(env!("CARGO_MANIFEST_DIR"), "/config/thrusters/t200.toml"), &rig).unwrap();
+    let bench = b"[thrusters.t1]\nrig = \"rig.toml\"\namplifier = \"simulated\"\n";
+    let bench = file(folder.path(), "kort.toml", bench);
     let kept = [&recording, &rig].map(|path| std::fs::read(path).unwrap());
     let (run, rig_file) = (recording.to_str().unwrap(), rig.to_str().unwrap());
+    let (bench, new) = (bench.to_str().unwrap(), folder.path().join("new.toml"));
     for (args, words) in [
         (vec!["diagnose", run, "--rig", rig_file, "--html", run], "recording that is read"),
         (vec!["diagnose", run, "--rig", rig_file, "-o", rig_file], "rig description that is read"),
@@ -183,6 +186,21 @@ fn outputs_are_looked_at_first() {
         (
             vec!["simulate", "--rig", rig_file, "--scenario", "chirp", "-o", "/no/such/a.csv"],
             "cannot be written",
+        ),
+        // A rig that only the deployment names is read too; and no session is lost for its recording's name.
+        (vec!["calibrate", "--config", bench, "--yes", "-o", rig_file], "rig description that is read"),
+        (
+            vec![
+                "calibrate",
+                "--config",
+                bench,
+                "--yes",
+                "-o",
+                new.to_str().unwrap(),
+                "--recording",
+                "a.txt",
+            ],
+            "\".txt\"",
         ),
         (vec!["reproduce", "--html", "/proc"], "it is a folder"),
         (vec!["soak", "soak-towed", "--html", "/no/such/page.html"], "cannot be written"),

@@ -178,7 +178,8 @@ class Diagnosis:
     document: dict[str, Any]
     """The JSON document that this mirrors."""
     rig_toml: str
-    """The rig description with what is believed as its ``[[effects]]``: probability 0.7 and more, without a rival."""
+    """The rig description with what is believed as its ``[[effects]]``, probability 0.7 and more without a rival, and with
+    what ``with_effects`` took as known, unless it may as well be zero."""
     html: str
     """The report as one self-contained page."""
 

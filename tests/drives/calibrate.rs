@@ -60,10 +60,13 @@ fn ctrl_c_ends_it_at_zero_and_nobody_who_is_not_there_agrees() {
     let rest = (0..ATTEMPTS).find_map(|_| interrupted(&site)).expect("a session that was not held up");
     assert!(rest.contains("drive off"), "the servo ends in order: {rest}");
     assert!(rest.contains("aborted"), "{rest}");
-    // Without --yes and without a terminal nothing is driven.
+    // Without --yes and without a terminal nothing is driven, and a file that somebody left empty stays.
+    let left = site.folder.path().join("new.toml");
+    std::fs::write(&left, "").unwrap();
     let (code, talk, _) = undisturbed(&site, &[]);
     assert_eq!(code, Some(1), "{talk}");
     assert!(talk.contains("nobody agreed to zeros") && talk.contains("--yes"), "{talk}");
+    assert!(left.exists());
 }
 
 /// A session that is interrupted in its first movement, and what it said after that; none where it was held up.

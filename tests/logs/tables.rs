@@ -41,6 +41,31 @@ fn a_table_with_decimal_commas_and_units_below_the_names_comes_in_as_proposed() 
     assert!(recording.losses.is_empty(), "{:?}", recording.losses);
 }
 
+/// What is asked of a shaft is in the turns of what it does.
+#[test]
+fn a_speed_in_hertz_is_turns_once_a_person_says_so() {
+    let mut text = String::from("Time (s),Motor speed setpoint (Hz),Motor speed (Hz)\n");
+    for row in 0..100 {
+        let _ = writeln!(text, "{},{},{}", f64::from(row) * 0.01, row / 10, f64::from(row) / 10.0);
+    }
+    let log = write("hertz.csv", text);
+    let map = lab::path("hertz.toml");
+    let said = kort(&["columns", &log, "-o", &map]);
+    assert_eq!(said.status.code(), Some(0), "{}", stderr(&said));
+    let proposed = std::fs::read_to_string(&map).unwrap();
+    assert_eq!(proposed.matches("\n# unit = \"rev/s\"").count(), 2, "{proposed}");
+    std::fs::write(
+        &map,
+        proposed.replace("\n# unit", "\nunit").replace("   the log says", " # the log says"),
+    )
+    .unwrap();
+    let recording = read(&log, &map);
+    for (column, turns_s) in [("speed_cmd_rad_s", 5.0), ("shaft_speed_rad_s", 5.5)] {
+        let there = recording.column(column).unwrap()[55];
+        assert!((there / std::f64::consts::TAU - turns_s).abs() < 1e-9, "{column} {there}");
+    }
+}
+
 #[test]
 fn what_was_written_is_said_as_one_document() {
     let log = write("written.csv", "Time (s),RPM,Thrust (N),note\n0,1,N/A,a\n1,2,5,b\n2,4,6,c\n");

@@ -1,6 +1,6 @@
 //! Checks of a scenario's values: each message names the key, the value and what is allowed.
 
-use crate::scenario::{Channel, LONGEST_S, Lie, Scenario, Segment};
+use crate::scenario::{CONTROL_RATES_HZ, Channel, LONGEST_S, Lie, Scenario, Segment};
 
 impl Scenario {
     /// All values that cannot be meant.
@@ -10,7 +10,8 @@ impl Scenario {
         // What must lie within the run is told once there is one.
         let run_s = if wrong.said.is_empty() { self.duration_s } else { f64::INFINITY };
         wrong.within("settle_s", self.settle_s, 0.0, 0.9 * run_s, "shorter than the run");
-        wrong.within("control_rate_hz", self.control_rate_hz, 50.0, 10_000.0, "1000 is usual");
+        let (slowest, fastest) = CONTROL_RATES_HZ.into_inner();
+        wrong.within("control_rate_hz", self.control_rate_hz, slowest, fastest, "1000 is usual");
         wrong.within("seeds", f64::from(self.seeds), 1.0, 1000.0, "4 gives a first interval");
         wrong.within(
             "aim_of_plain",

@@ -36,8 +36,8 @@ pub use log::Log;
 pub use reference::{Player, Replayed};
 pub use run::{Knows, Prepared, Progress, run, run_logged, stream};
 pub use scenario::{
-    Ambient, Change, Channel, Depth, EffectSpec, Fitted, Lie, NEVER_WORSE, Noise, ProcessFault,
-    ProcessFaultKind, Sag, Scenario, Segment, SensorFault, Truth,
+    Ambient, CONTROL_RATES_HZ, Change, Channel, Depth, EffectSpec, Fitted, Lie, NEVER_WORSE, Noise,
+    ProcessFault, ProcessFaultKind, Sag, Scenario, Segment, SensorFault, Truth,
 };
 pub use score::{Outcome, Point, SCORES, Sample, Tally, Window};
 pub use summary::{Score, summarise, summarise_ratios};

@@ -5,6 +5,7 @@
 //! largest steady thrust of the rig, so that one scenario serves any thruster.
 
 use std::collections::{BTreeMap, HashMap};
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
 use kort_thruster::models::ModelName;
@@ -18,6 +19,9 @@ pub const NEVER_WORSE: f64 = 1.02;
 
 /// Longest run, s.
 pub(crate) const LONGEST_S: f64 = 31.0 * 86_400.0;
+
+/// Rates of controller and servo that a run may have, Hz.
+pub const CONTROL_RATES_HZ: RangeInclusive<f64> = 50.0..=10_000.0;
 
 /// A scenario as written.
 #[derive(Clone, Debug, Deserialize)]

@@ -250,6 +250,29 @@ mod tests {
     }
 
     #[test]
+    fn what_is_missing_is_said_once() {
+        for with in [
+            "[[effect]]\nvalues = { coulomb_torque_n_m = 0.01 }",
+            "[[reference]]\nkind = \"replay\"\npeak = 0.7",
+            "[[reference]]\nkind = \"steps\"\nlevels = [0.5]\nhold_s = 3\n[truth]\nspread = 0.6",
+        ] {
+            let said = said_of_soak(with);
+            assert!(said.len() == 1 && said[0].contains("hint: "), "{with}: {said:?}");
+        }
+        let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../config/scenarios/soak-towed.toml"));
+        let towed = std::fs::read_to_string(path).unwrap();
+        for rate in [0.0, -1000.0, 20_000.0] {
+            let said = Kind::Soak.check(&format!("control_rate_hz = {rate:?}\n{towed}"), path).unwrap_err();
+            assert!(said.len() == 1 && said[0].contains("50 to 10000"), "{rate}: {said:?}");
+        }
+        let map = "[time]\nsource = \"t\"\nunit = \"s\"\n";
+        for (columns, words) in [("", "missing field `columns`"), ("[columns]\n", "`columns` is empty")] {
+            let said = Kind::Columns.check(&format!("{map}{columns}"), Path::new("a.toml")).unwrap_err();
+            assert!(said.len() == 1 && said[0].contains(words), "{columns}: {said:?}");
+        }
+    }
+
+    #[test]
     fn a_scenario_without_a_rig_is_checked_for_what_no_rig_allows() {
         let said = |effects: &str, more: &str| {
             let text = format!(

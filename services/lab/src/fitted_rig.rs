@@ -16,6 +16,9 @@ const TOL: (f64, f64) = (1e-4, 2.0);
 /// Begins the lines at the head of a fitted rig that say what is not in it.
 const NOT_WRITTEN: &str = "# not written by kort fit: ";
 
+/// Why what was recorded does not fix a value.
+const NOT_FIXED: &str = "nothing recorded fixes it";
+
 /// A rig description with what a fit of it found, and at its head what was not written of that, which is also returned.
 ///
 /// # Errors
@@ -24,7 +27,7 @@ pub fn with_fit(text: &str, report: &FitReport) -> Result<(String, Vec<String>),
     let (kept, fixed) = parted(report);
     let (text, mut left_out) = with_fitted(text, &fixed, FITTED)?;
     left_out.extend(kept.iter().map(|p| format!("{} stays as stated: the recordings do not fix it", p.name)));
-    let (text, effects_left_out) = with_fitted_effects(&text, &report.effects, FITTED)?;
+    let (text, effects_left_out) = with_fitted_effects(&text, &report.effects, &open(report), FITTED)?;
     left_out.extend(effects_left_out);
     let head: String =
         left_out.iter().map(|why| format!("{NOT_WRITTEN}{}\n", why.replace('\n', " "))).collect();
@@ -33,13 +36,18 @@ pub fn with_fit(text: &str, report: &FitReport) -> Result<(String, Vec<String>),
     Ok((head + &rest.collect::<String>(), left_out))
 }
 
+/// Names of what the recordings alone do not fix, of the rig and of effects.
+pub fn open(report: &FitReport) -> Vec<&str> {
+    report.not_identifiable.iter().flat_map(|group| &group.parameters).map(String::as_str).collect()
+}
+
 /// Parameters that the recordings leave to what the rig states, and those that they fix: a fitted value of the first is the
 /// statement's, pulled about by the rest, and is not written as if it had been measured.
 pub fn parted(report: &FitReport) -> (Vec<ParameterReport>, Vec<ParameterReport>) {
-    let open =
-        |name: &str| report.not_identifiable.iter().any(|group| group.parameters.iter().any(|p| p == name));
+    let open = open(report);
     let of_rig = |name: &str| Parameter::ALL.iter().any(|of_rig| of_rig.name() == name);
-    let (mut kept, fixed): (Vec<_>, Vec<_>) = report.parameters.iter().cloned().partition(|p| open(&p.name));
+    let (mut kept, fixed): (Vec<_>, Vec<_>) =
+        report.parameters.iter().cloned().partition(|p| open.contains(&p.name.as_str()));
     kept.retain(|p| of_rig(&p.name));
     (kept, fixed)
 }
@@ -86,27 +94,27 @@ pub fn with_fitted(
     Ok((document.to_string(), left_out))
 }
 
-/// Puts fitted effects among a rig description's `[[effects]]`; what the fit held of one that stands there stays as it is.
-/// Also returned: which could not be written, and why.
+/// Puts fitted effects among a rig description's `[[effects]]`; what the fit held of one that stands there stays as it is, and
+/// what nothing recorded fixes (`open`). Also returned: which could not be written, and why.
 ///
 /// # Errors
 /// The text is no rig description (it was one when the fit read it).
 pub fn with_fitted_effects(
     text: &str,
     effects: &[FittedEffect],
+    open: &[&str],
     by: &str,
 ) -> Result<(String, Vec<String>), String> {
     let (mut text, mut left_out) = (text.to_owned(), Vec::new());
     for fitted in effects {
         let id = &fitted.effect;
-        let (parameters, unsure) = of_a_size(fitted);
-        if !unsure.is_empty() && parameters.is_empty() {
-            let mut document: DocumentMut = text.parse().map_err(|e: toml_edit::TomlError| e.to_string())?;
-            let stays = if standing(&mut document, id).is_some() { "stays as stated" } else { "is left out" };
-            left_out.push(format!("{id} {stays}: {}", unsure.join("; ")));
+        let mut document: DocumentMut = text.parse().map_err(|e: toml_edit::TomlError| e.to_string())?;
+        let stands = standing(&mut document, id).is_some();
+        let (parameters, not_written) = if stands { as_it_is_now(fitted, open) } else { new(fitted, open) };
+        left_out.extend(not_written);
+        if parameters.is_empty() {
             continue;
         }
-        left_out.extend(unsure.into_iter().map(|why| format!("{id}: {why}")));
         match with_one(&text, id, &parameters, by) {
             Ok(written) => text = written,
             Err(why) => left_out.push(format!("{id}: {}", why.replace('\n', "; "))),
@@ -134,26 +142,39 @@ fn with_one(text: &str, id: &str, parameters: &[&ParameterReport], by: &str) -> 
     Rig::from_toml(&written).map(|_| written).map_err(|e| e.to_string())
 }
 
-/// What of an effect is written, and why its other strengths are not: one that may as well be zero is no knowledge, and what
-/// a rig states as zero has no tolerance and would count as exact. None where no strength is left: the effect is not known to
-/// be there at all.
-fn of_a_size(fitted: &FittedEffect) -> (Vec<&ParameterReport>, Vec<String>) {
+/// What is written of an effect that stands in the rig, and why the rest is not: all that is fixed, also what may as well be
+/// zero by now, since the fit ran with it and the value that stands there is refuted.
+fn as_it_is_now<'a>(fitted: &'a FittedEffect, open: &[&str]) -> (Vec<&'a ParameterReport>, Vec<String>) {
+    let (kept, known): (Vec<_>, Vec<_>) =
+        fitted.parameters.iter().partition(|p| open.contains(&p.name.as_str()));
+    let why = |p: &&ParameterReport| format!("{}: {} stays as stated: {NOT_FIXED}", fitted.effect, p.name);
+    (known, kept.iter().map(why).collect())
+}
+
+/// What is written of an effect that the rig does not have yet, and why the rest is not. Nothing where none of its strengths
+/// is known: it is not known to be there at all. Once one is, so are the others as far as the fit has them, since a strength that a
+/// rig does not state is exactly zero; only what was fitted as that is left out, having no tolerance.
+fn new<'a>(fitted: &'a FittedEffect, open: &[&str]) -> (Vec<&'a ParameterReport>, Vec<String>) {
     let specs = effects::find(&fitted.effect).map_or_else(Vec::new, |e| (e.parameters)(&Scale::ANY));
     let is_shape = |p: &ParameterReport| specs.iter().any(|spec| spec.name == p.name && spec.shape);
-    let nothing = |p: &ParameterReport| p.value == 0.0 || tolerance(p) > TOL.1;
-    let (unsure, mut known): (Vec<_>, Vec<_>) =
-        fitted.parameters.iter().partition(|p| !is_shape(p) && nothing(p));
-    let why: Vec<String> = unsure
-        .iter()
-        .map(|p| {
-            let (value, error) = (short(p.value), short(p.std_error));
-            format!("{} = {value} {}, standard error {error}, may as well be zero", p.name, p.unit)
-        })
-        .collect();
-    if known.iter().all(|p| is_shape(p)) && !why.is_empty() {
-        known.clear();
+    let unsure = |p: &ParameterReport| {
+        let why = match () {
+            () if p.value == 0.0 || tolerance(p) > TOL.1 => "may as well be zero",
+            () if open.contains(&p.name.as_str()) => NOT_FIXED,
+            () => return None,
+        };
+        let (value, error) = (short(p.value), short(p.std_error));
+        Some(format!("{} = {value} {}, standard error {error}, {why}", p.name, p.unit))
+    };
+    let strengths: Vec<_> = fitted.parameters.iter().filter(|p| !is_shape(p)).collect();
+    let why: Vec<String> = strengths.iter().filter_map(|p| unsure(p)).collect();
+    if !why.is_empty() && why.len() == strengths.len() {
+        return (Vec::new(), vec![format!("{} is left out: {}", fitted.effect, why.join("; "))]);
     }
-    (known, why)
+    let (known, nothing): (Vec<_>, Vec<_>) =
+        fitted.parameters.iter().partition(|p| is_shape(p) || p.value != 0.0);
+    let why = nothing.into_iter().filter_map(unsure).map(|why| format!("{}: {why}", fitted.effect));
+    (known, why.collect())
 }
 
 /// Why no tolerance says how well a value is known, if none does.
@@ -196,12 +217,15 @@ fn standing<'a>(document: &'a mut DocumentMut, effect: &str) -> Option<(&'a mut 
 
 /// A fitted value as it stands in a rig description, with what is told behind it.
 fn item(fitted: &ParameterReport, told: &str) -> Item {
-    let mut both = InlineTable::new();
-    both.insert("value", short(fitted.value).into());
-    if let Some(tol) = quantity(fitted).tol {
-        both.insert("tol", short(tol.clamp(TOL.0, TOL.1)).into());
-    }
-    let mut value = Value::InlineTable(both);
+    let mut value = match quantity(fitted).tol {
+        None => Value::from(short(fitted.value)),
+        Some(tol) => {
+            let mut both = InlineTable::new();
+            both.insert("value", short(fitted.value).into());
+            both.insert("tol", short(tol.clamp(TOL.0, TOL.1)).into());
+            Value::InlineTable(both)
+        }
+    };
     *value.decor_mut() = Decor::new(" ", told);
     Item::Value(value)
 }
@@ -276,7 +300,7 @@ mod tests {
         let friction = effect("coulomb_friction", vec![fitted("coulomb_torque_n_m", 0.25, 0.01)]);
         let unknown = effect("gremlins", vec![fitted("number", 3.0, 1.0)]);
         let (text, left_out) =
-            with_fitted_effects(&format!("{RIG}{known}"), &[friction, unknown], FITTED).unwrap();
+            with_fitted_effects(&format!("{RIG}{known}"), &[friction, unknown], &[], FITTED).unwrap();
         assert!(
             text.contains("coulomb_torque_n_m = { value = 0.25, tol = 0.08 } # 1, fitted by kort fit"),
             "{text}"
@@ -303,18 +327,47 @@ mod tests {
                 fitted("stribeck_speed_rad_s", 2.0, 0.1),
             ],
         );
-        let (text, left_out) = with_fitted_effects(RIG, &[none.clone(), unsure], FITTED).unwrap();
+        let (text, left_out) = with_fitted_effects(RIG, &[none.clone(), unsure], &[], FITTED).unwrap();
         assert!(
             left_out.len() == 2 && left_out.iter().all(|why| why.contains("may as well be zero")),
             "{left_out:?}"
         );
         assert!(!text.contains("transport_delay") && !text.contains("coulomb_torque_n_m"), "{text}");
-        // What stands there already stays.
+        // What stands there is refuted: the fit ran without it. Where nothing fixed it, it stays.
         let known = format!(
             "{RIG}[[effects]]\neffect = \"transport_delay\"\ndelay_s = {{ value = 0.03, tol = 2 }}\n"
         );
-        let (text, left_out) = with_fitted_effects(&known, &[none], FITTED).unwrap();
-        assert!(text == known && left_out[0].contains("stays as stated"), "{text} {left_out:?}");
+        let (text, left_out) = with_fitted_effects(&known, std::slice::from_ref(&none), &[], FITTED).unwrap();
+        assert_eq!(Rig::from_toml(&text).unwrap().effects[0].value("delay_s"), 0.0, "{text}");
+        assert!(left_out.is_empty() && text.contains("delay_s = 0.0 # 1, fitted by kort fit"), "{text}");
+        let (text, left_out) = with_fitted_effects(&known, &[none], &["delay_s"], FITTED).unwrap();
+        assert!(text == known && left_out[0].contains("delay_s stays as stated"), "{text} {left_out:?}");
+    }
+
+    #[test]
+    fn beside_a_strength_that_is_known_no_other_is_exactly_zero() {
+        let cogging = |cos: (f64, f64), sin: (f64, f64)| FittedEffect {
+            effect: "torque_ripple_cogging".into(),
+            path: "drive".into(),
+            equation: String::new(),
+            parameters: vec![
+                fitted("cogging_cos_1_n_m", cos.0, cos.1),
+                fitted("cogging_sin_1_n_m", sin.0, sin.1),
+                fitted("order_1", 14.0, 0.0),
+            ],
+        };
+        let written = |effect, open: &[&str]| with_fitted_effects(RIG, &[effect], open, FITTED).unwrap();
+        let (text, left_out) = written(cogging((0.2, 0.01), (0.005, 0.01)), &[]);
+        let rig = Rig::from_toml(&text).unwrap();
+        let sin = rig.effects[0].parameters.iter().find(|(name, _)| *name == "cogging_sin_1_n_m").unwrap();
+        assert_eq!((sin.1.value, sin.1.tol), (0.005, Some(2.0)), "{text}");
+        assert!(left_out.is_empty(), "{left_out:?}");
+        let (text, left_out) = written(cogging((0.2, 0.01), (0.0, 0.01)), &[]);
+        assert!(!text.contains("cogging_sin_1_n_m") && left_out.len() == 1, "{text} {left_out:?}");
+        // Of one that nothing recorded fixes nothing is known.
+        let (text, left_out) = written(cogging((0.2, 0.01), (0.005, 0.01)), &["cogging_cos_1_n_m"]);
+        assert_eq!(text, RIG);
+        assert!(left_out[0].contains("torque_ripple_cogging is left out: "), "{left_out:?}");
     }
 
     #[test]

@@ -89,8 +89,26 @@ fn same(a: &Path, b: &Path) -> bool {
     match (a.metadata(), b.metadata()) {
         // To devices and pipes two may write.
         (Ok(a), Ok(b)) => a.is_file() && (a.dev(), a.ino()) == (b.dev(), b.ino()),
-        (Err(_), Err(_)) => a == b,
+        (Err(_), Err(_)) => place(a) == place(b),
         _ => false,
+    }
+}
+
+/// Links that lead one to the next before this is taken for a circle.
+const LINKS: usize = 40;
+
+/// Where a file that is not there yet will be, whatever the spelling; a link to it leads there too.
+fn place(path: &Path) -> PathBuf {
+    let mut path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    for _ in 0..LINKS {
+        match (path.parent(), path.read_link()) {
+            (Some(folder), Ok(target)) => path = folder.join(target),
+            _ => break,
+        }
+    }
+    match (path.parent().map(Path::canonicalize), path.file_name()) {
+        (Some(Ok(folder)), Some(name)) => folder.join(name),
+        _ => path,
     }
 }
 
@@ -119,7 +137,12 @@ fn writable(option: &str, path: &Path) -> Result<(), Failure> {
     }
     let opened = std::fs::OpenOptions::new().append(true).create(true).open(path);
     opened.map_err(|error| cannot(&error))?;
-    if there.is_err() { std::fs::remove_file(path).map_err(|error| cannot(&error)) } else { Ok(()) }
+    if there.is_ok() {
+        return Ok(());
+    }
+    // Behind a link it is the target that was made; the link was there before.
+    let made = path.canonicalize();
+    made.and_then(std::fs::remove_file).map_err(|error| cannot(&error))
 }
 
 #[cfg(test)]
@@ -145,6 +168,16 @@ mod tests {
         let twice =
             Named::default().writes("-o", Some(&at("new.toml"))).writes("--html", Some(&at("new.toml")));
         assert!(twice.check().unwrap_err().to_string().contains("-o writes to the same file"));
+        // Neither is there yet: one name may be spelt in many ways.
+        std::fs::create_dir(at("sub")).unwrap();
+        std::os::unix::fs::symlink("p.md", at("latest.md")).unwrap();
+        for other in ["./p.md", "sub/../p.md", "latest.md"] {
+            let named =
+                Named::default().writes("--html", Some(&at("p.md"))).writes("--markdown", Some(&at(other)));
+            let said = named.check().unwrap_err().to_string();
+            assert!(said.contains("--html writes to the same file"), "{other}: {said}");
+        }
+        assert!(!at("p.md").exists());
     }
 
     #[test]
@@ -162,5 +195,13 @@ mod tests {
         assert_eq!(Named::default().writes("-o", Some(&new)).check(), Ok(()));
         assert_eq!(Named::default().writes_toml("-o", Some(Path::new("/dev/null"))).check(), Ok(()));
         assert!(!new.exists());
+        // A link to what is not there yet stays, and so does a file that somebody left empty.
+        let (link, empty) = (folder.path().join("latest.toml"), folder.path().join("empty.toml"));
+        std::os::unix::fs::symlink(&new, &link).unwrap();
+        std::fs::write(&empty, "").unwrap();
+        for path in [&link, &empty] {
+            assert_eq!(Named::default().writes_toml("-o", Some(path)).check(), Ok(()));
+        }
+        assert!(link.is_symlink() && !new.exists() && empty.exists());
     }
 }

@@ -235,9 +235,10 @@ fn qualified(rule: &Rule, field: &Field) -> usize {
     }
 }
 
-/// Whether a shaft's speed is given in hertz, which may be its turns per second.
+/// Whether a shaft's speed, or what was asked of it, is given in hertz, which may be its turns per second.
 pub(super) fn is_turns(column: &str, field: &Field) -> bool {
-    column == "shaft_speed_rad_s" && unit_of(field).is_some_and(|unit| unit.symbol == "Hz")
+    matches!(column, "shaft_speed_rad_s" | "speed_cmd_rad_s")
+        && unit_of(field).is_some_and(|unit| unit.symbol == "Hz")
 }
 
 /// How well a field suits a rule, if it does.

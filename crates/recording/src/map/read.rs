@@ -64,9 +64,10 @@ impl RawMap {
         let given = Given::new(name, &self.ask, asked, wrong);
         let time = self.time.check(name, &given, wrong);
         if self.columns.is_empty() {
+            // Begins as a value's place does: of a map without the table it is told that it is missing.
             wrong.say(fail(
                 name,
-                "[columns] is empty",
+                "`columns` is empty",
                 "name at least one of our columns, for example [columns.thrust_n]",
             ));
         }

@@ -128,7 +128,8 @@ impl Reader<'_> {
         Sensors {
             log_rate_hz: self.number("sensors", "log_rate_hz"),
             control_rate_hz: self.number("sensors", "control_rate_hz"),
-            encoder_counts_per_rev: self.count("sensors", "encoder_counts_per_rev"),
+            // Before a gear of uneven ratio no whole number of them makes a turn of the shaft.
+            encoder_counts_per_rev: self.number("sensors", "encoder_counts_per_rev"),
             speed_filter_time_constant_s: speed_filter.map(|filter| filter.value),
             speed_filter_tol: speed_filter.and_then(|filter| filter.tol),
             thrust_filter_hz: self.number("sensors", "thrust_filter_hz"),

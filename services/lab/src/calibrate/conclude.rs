@@ -11,7 +11,7 @@ use kort_thruster::models::ModelName;
 use kort_thruster::rig::Rig;
 
 use crate::failure::Failure;
-use crate::fitted_rig::{parted, with_fitted, with_fitted_effects};
+use crate::fitted_rig::{open, parted, with_fitted, with_fitted_effects};
 
 /// What stands behind each value in the rig description.
 const MEASURED: &str = "measured by kort calibrate";
@@ -44,7 +44,8 @@ pub fn rig_text(text: &str, estimate: &Estimate) -> Result<(String, Vec<String>)
     let rig = Rig::from_toml(&text).map_err(Failure::failed)?;
     let (effects, not_seen) = standing_out(estimate, &rig);
     left_out.extend(not_seen);
-    let (written, not_written) = with_fitted_effects(&text, &effects, MEASURED).map_err(Failure::failed)?;
+    let (written, not_written) =
+        with_fitted_effects(&text, &effects, &open(fit), MEASURED).map_err(Failure::failed)?;
     text = written;
     left_out.extend(not_written);
     Ok((text, left_out))
@@ -185,6 +186,13 @@ mod tests {
         assert!(left_out[0].contains("zero of thrust_n"), "{left_out:?}");
         let (again, _) = rig_text(&text, &none).unwrap();
         assert_eq!(Rig::from_toml(&again).unwrap().effects[0].value("bias_n"), 0.02);
+        // Also of a cell that was set back to zero since, within what a tolerance cannot say.
+        for zero in [0.004, 0.0] {
+            let set_back = estimate(Vec::new(), Vec::new(), &[], fitted("bias_n", zero, 0.01));
+            let (again, left_out) = rig_text(&text, &set_back).unwrap();
+            let known = &Rig::from_toml(&again).unwrap().effects[0];
+            assert_eq!((known.value("bias_n"), left_out.len()), (zero, 0), "{again} {left_out:?}");
+        }
     }
 
     #[test]

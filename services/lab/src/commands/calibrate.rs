@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use kort_calibrate::{Report, steps};
 use kort_proto::config::Config;
 use kort_proto::transport::{Deployment, idle};
+use kort_recording::Format;
 use kort_thruster::rig::Rig;
 use rustix::process::nice;
 
@@ -101,25 +102,33 @@ fn share(text: &str) -> Result<f64, String> {
 /// Unreadable input; a session that was stopped.
 pub fn run(args: &Calibrate) -> Result<Outcome, Failure> {
     let config = Config::load(args.config.as_deref()).map_err(Failure::input)?;
-    let (rig_text, rig) = stated(args, &config)?;
+    let (file, rig_text, rig) = stated(args, &config)?;
     match (args.rehearse, &args.output) {
         (Some(rigs), _) => rehearsal(args, &rig, rigs),
-        (None, Some(output)) => session(args, &config, &rig_text, &rig, output),
+        (None, Some(output)) => {
+            // Neither the deployment nor its rig need be named to be read.
+            let named = args.named().reads("rig description", &file);
+            let named = config.file.iter().fold(named, |named, file| named.reads("deployment", file));
+            named.check()?;
+            // An ending that is no format's is not found out behind an hour at the bench.
+            Format::of(&args.recorded(output)).map_err(Failure::input)?;
+            session(args, &config, &rig_text, &rig, output)
+        }
         (None, None) => Err(Failure::input("-o RIG is missing\nhint: the rig description to write")),
     }
 }
 
-/// The rig to begin with.
-fn stated(args: &Calibrate, config: &Config) -> Result<(String, Rig), Failure> {
+/// The rig to begin with: its file, its text.
+fn stated(args: &Calibrate, config: &Config) -> Result<(PathBuf, String, Rig), Failure> {
     if let Some(path) = &args.rig {
         let text = files::rig_text(path)?;
         let rig = Rig::from_toml(&text).map_err(|e| Failure::in_file(path, e))?;
-        return Ok((text, rig));
+        return Ok((path.clone(), text, rig));
     }
     let thruster = config.thruster(&args.thruster).map_err(Failure::input)?;
     let (file, text) = config.rig_text(&args.thruster, thruster).map_err(Failure::input)?;
     let rig = Rig::from_toml(&text).map_err(|e| Failure::input(format!("{file}: {e}")))?;
-    Ok((text, rig))
+    Ok((file.into(), text, rig))
 }
 
 fn session(
@@ -142,8 +151,7 @@ fn session(
         yes: args.yes,
         job: args.job.is_some(),
     };
-    let ended = live::run(&bench).inspect_err(|_| remove_empty(&[output, &recording]))?;
-    remove_empty(&[output, &recording]);
+    let ended = live::run(&bench)?;
     // Whatever follows, and whatever the session ended for, what was measured is kept.
     let period_s = ended.session.plan().period_s;
     let saved = conclude::save(ended.session.log(), period_s, &recording);
@@ -183,23 +191,26 @@ fn session(
     };
     let estimate = conclude::estimated(ended.session.log(), period_s, rig, facts, &told)?;
     let (text, left_out) = conclude::rig_text(rig_text, &estimate)?;
-    write_text(output, &text)?;
+    // The result is printed whatever becomes of its file, and of the diagnosis behind it.
+    let written = write_text(output, &text);
     let calibrated = Rig::from_toml(&text).map_err(|e| Failure::in_file(output, e))?;
-    let diagnosis = conclude::diagnosed(&estimate, &calibrated, args.seed, &told)?;
+    let diagnosis = conclude::diagnosed(&estimate, &calibrated, args.seed, &told);
     drop(spinner);
     report.steps = steps(facts, Some(&estimate));
     if let Some(step) = report.steps.last_mut() {
         step.skipped_because.extend(left_out);
     }
-    report.rig = Some(output.display().to_string());
-    report.diagnosis = Some(diagnosis.report.summary.clone());
+    report.rig = written.is_ok().then(|| output.display().to_string());
+    report.diagnosis = diagnosis.as_ref().ok().map(|diagnosis| diagnosis.report.summary.clone());
     if args.json {
         print_json(&report)?;
     } else {
         print(&render::calibration::text(&report))?;
-        print(&render::verdict::text(&diagnosis.report, &calibrated))?;
+        if let Ok(diagnosis) = &diagnosis {
+            print(&render::verdict::text(&diagnosis.report, &calibrated))?;
+        }
     }
-    Ok(Outcome::Done)
+    written.and(diagnosis.map(|_| Outcome::Done))
 }
 
 /// The session is over, the service goes on: from now on this process runs where nothing else wants the processor.
@@ -207,15 +218,6 @@ fn behind_everything_else() {
     let _ = nice(19);
     if let Some(words) = idle() {
         eprintln!("warning: {words}");
-    }
-}
-
-/// Takes away what was only made to see whether it can be written.
-fn remove_empty(paths: &[&Path]) {
-    for path in paths {
-        if std::fs::metadata(path).is_ok_and(|file| file.len() == 0) {
-            let _ = std::fs::remove_file(path);
-        }
     }
 }
 

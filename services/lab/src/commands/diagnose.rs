@@ -44,6 +44,9 @@ pub struct Diagnose {
     job: Option<u32>,
 }
 
+/// What stands behind each value of an effect that nobody found: the command line has it.
+const TOLD: &str = "taken as known, fitted by kort diagnose";
+
 /// Diagnoses what was read.
 ///
 /// # Errors
@@ -66,7 +69,9 @@ pub fn adopted(loaded: &Loaded, report: &Report) -> Result<(String, Vec<String>,
     let mut told = report.baseline.effects.clone();
     told.retain(|told| loaded.rig.effects.iter().all(|stated| stated.effect != told.effect));
     let text = Rig::with_effects_toml(&loaded.rig_text, &found, DIAGNOSED).map_err(Failure::failed)?;
-    let (text, left_out) = with_fitted_effects(&text, &told, DIAGNOSED).map_err(Failure::failed)?;
+    let (text, left_out) = with_fitted_effects(&text, &told, &[], TOLD).map_err(Failure::failed)?;
+    let written = Rig::from_toml(&text).map_err(Failure::failed)?;
+    told.retain(|told| written.effects.iter().any(|known| known.effect == told.effect));
     let names = found.iter().map(|f| f.effect).chain(told.iter().map(|t| t.effect.as_str()));
     Ok((text, names.map(String::from).collect(), left_out))
 }
@@ -115,5 +120,65 @@ impl Diagnose {
             eprintln!("wrote {} with {names}", path.display());
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use kort_diagnose::report::{Baseline, FittedEffect, ParameterReport, Verdict};
+
+    use super::*;
+
+    #[test]
+    fn what_was_told_is_written_as_that_and_named_where_it_is_written() {
+        let told = |effect: &str, name: &str, value: f64| FittedEffect {
+            effect: effect.into(),
+            path: String::new(),
+            equation: String::new(),
+            parameters: vec![ParameterReport {
+                name: name.into(),
+                value,
+                unit: "1".into(),
+                std_error: 1e-3,
+                stated: None,
+                at_bound: Some(value == 0.0),
+            }],
+        };
+        let effects =
+            vec![told("transport_delay", "delay_s", 0.0), told("thrust_sensor_lag", "thrust_lag_s", 0.04)];
+        let report = Report {
+            schema: String::new(),
+            kort_version: String::new(),
+            recordings: Vec::new(),
+            rig: String::new(),
+            seed: 1,
+            seconds: 1.0,
+            verdict: Verdict::NoMismatch,
+            summary: String::new(),
+            baseline: Baseline {
+                model: String::new(),
+                parameters: Vec::new(),
+                effects,
+                channels: Default::default(),
+            },
+            mismatch: Vec::new(),
+            findings: Vec::new(),
+            explanations: Vec::new(),
+            remainder: None,
+            alternatives: Vec::new(),
+            empirical_term: None,
+            next_experiment: None,
+            notes: Vec::new(),
+        };
+        let rig_text = include_str!("../../../../config/thrusters/t200.toml").to_owned();
+        let rig = Rig::from_toml(&rig_text).unwrap();
+        let loaded = Loaded { rig_text, rig, series: Vec::new(), notes: Vec::new(), lossy: false };
+        let (text, names, left_out) = adopted(&loaded, &report).unwrap();
+        assert_eq!(names, ["thrust_sensor_lag"]);
+        assert!(
+            left_out.len() == 1 && left_out[0].starts_with("transport_delay is left out"),
+            "{left_out:?}"
+        );
+        assert!(text.contains(TOLD) && !text.contains(DIAGNOSED), "{text}");
     }
 }

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use kort_diagnose::constants::Constants;
+use kort_identify::data::KNOWN;
 use kort_identify::identify::{FitReport, Options, identify};
 use kort_recording::columns::find;
 
@@ -22,7 +23,7 @@ Example: kort fit tests/recordings/example-cases/clean.csv.gz \\
 Exit code 3 means that the fit was done but rows were lost in reading or left out
 because a sensor misbehaves there; the notes say which.";
 
-/// A column that is none of the contract's and that the model reads all the same.
+/// The drive's switch, a column that the model reads though it is none of the contract's and drives nothing.
 const ENABLED: &str = "torque_enable";
 
 /// Identify a model's parameters, with standard errors and a held-out score
@@ -74,7 +75,7 @@ pub fn fit(
     let columns = loaded.series.iter().flat_map(|series| &series.columns);
     let unknown: BTreeSet<&str> = columns
         .map(|(name, _)| name.as_str())
-        .filter(|name| find(name).is_none() && *name != ENABLED)
+        .filter(|name| find(name).is_none() && !KNOWN.contains(name) && *name != ENABLED)
         .collect();
     if !unknown.is_empty() {
         let unknown: Vec<&str> = unknown.into_iter().collect();

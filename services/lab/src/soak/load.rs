@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use kort_control::{ControlModel, ControllerConfig, LawKind, ModelError, advise};
-use kort_soak::{Hooked, Prepared, Replayed, Scenario, Segment};
+use kort_soak::{CONTROL_RATES_HZ, Hooked, Prepared, Replayed, Scenario, Segment};
 use kort_thruster::rig::{Rig, RigError};
 use thiserror::Error;
 
@@ -171,7 +171,9 @@ pub struct Instead<'a> {
 /// [`SoakError`] names the file, the key and what is allowed; all that is wrong.
 pub fn load(path: &Path, instead: &Instead) -> Result<Loaded, SoakError> {
     let text = files::soak_scenario_text(path)?;
-    if text.parse().is_ok_and(|table| Kind::of(&table) == Kind::Scenario) {
+    // One without references or controllers has no other mark of `kort simulate` than what only that has.
+    let simulated = |table: &toml::Table| Kind::of(table) == Kind::Scenario && table.contains_key("segments");
+    if text.parse().is_ok_and(|table| simulated(&table)) {
         let words = format!(
             "this is a scenario of kort simulate, a test signal; kort soak takes what controllers are asked for, [[reference]]\nhint: kort simulate --rig RIG --scenario {} -o REC.csv",
             path.display()
@@ -192,7 +194,14 @@ pub fn of_text(text: &str, path: &Path, instead: &Instead) -> Result<Loaded, Vec
     };
     let (scenario, said) = Scenario::read(text);
     let mut wrong = of_scenario(said);
-    let Some(scenario) = scenario else { return Err(wrong) };
+    let Some(mut scenario) = scenario else { return Err(wrong) };
+    // What stands empty in the place of a key that is missing is told already.
+    if !wrong.is_empty() {
+        scenario.effects.retain(|effect| !effect.id.is_empty());
+        scenario
+            .references
+            .retain(|segment| !matches!(segment, Segment::Replay { file, .. } if file.is_empty()));
+    }
     let folder = path.parent().unwrap_or(Path::new("."));
     // A rig that it lacks is told as missing.
     let named = instead.rig.is_some() || scenario.rig != Path::new("");
@@ -202,7 +211,9 @@ pub fn of_text(text: &str, path: &Path, instead: &Instead) -> Result<Loaded, Vec
         None
     };
     let period_s = 1.0 / scenario.control_rate_hz;
-    let model = found.as_ref().and_then(|(rig, _)| {
+    // At a rate that is none nothing can be designed, and the rate is told already.
+    let rated = found.as_ref().filter(|_| CONTROL_RATES_HZ.contains(&scenario.control_rate_hz));
+    let model = rated.and_then(|(rig, _)| {
         let model = ControlModel::from_rig(rig, period_s);
         model.map_err(|source| wrong.push(SoakError::Model { file: file.clone(), source })).ok()
     });

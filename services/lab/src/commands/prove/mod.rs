@@ -196,15 +196,17 @@ impl Prove {
         pool.install(|| plan.par_iter().map(prove).collect_into_vec(&mut results));
         drop(bar);
         eprintln!("{} cases diagnosed in {:.0} s", plan.len(), started.elapsed().as_secs_f64());
-        if let Some(path) = &self.calibrate {
-            calibrate::write(path, &results, self.fold_by, usize::from(self.folds))?;
-        }
+        // The result is printed whatever becomes of its files.
+        let records = match &self.calibrate {
+            Some(path) => calibrate::write(path, &results, self.fold_by, usize::from(self.folds)),
+            None => Ok(()),
+        };
         let scored = results.into_iter().map(|(scored, ..)| scored).collect();
-        self.show(&Proof::new(seed, self.tuning, stamp, scored))
+        let shown = self.show(&Proof::new(seed, self.tuning, stamp, scored));
+        records.and(shown)
     }
 
     fn show(&self, proof: &Proof) -> Result<Outcome, Failure> {
-        // The result is printed whatever becomes of its pages.
         let write = |path: &Option<PathBuf>, page: fn(&Proof) -> String| match path {
             Some(path) => write_text(path, &page(proof)).inspect(|()| eprintln!("wrote {}", path.display())),
             None => Ok(()),
