@@ -110,7 +110,7 @@ pub fn with_fitted_effects(
         let id = &fitted.effect;
         let mut document: DocumentMut = text.parse().map_err(|e: toml_edit::TomlError| e.to_string())?;
         let stands = standing(&mut document, id).is_some();
-        let (parameters, not_written) = if stands { as_it_is_now(fitted, open) } else { new(fitted, open) };
+        let (parameters, not_written) = if stands { as_it_is_now(fitted, open) } else { new(fitted) };
         left_out.extend(not_written);
         if parameters.is_empty() {
             continue;
@@ -153,18 +153,16 @@ fn as_it_is_now<'a>(fitted: &'a FittedEffect, open: &[&str]) -> (Vec<&'a Paramet
 
 /// What is written of an effect that the rig does not have yet, and why the rest is not. Nothing where none of its strengths
 /// is known: it is not known to be there at all. Once one is, so are the others as far as the fit has them, since a strength that a
-/// rig does not state is exactly zero; only what was fitted as that is left out, having no tolerance.
-fn new<'a>(fitted: &'a FittedEffect, open: &[&str]) -> (Vec<&'a ParameterReport>, Vec<String>) {
+/// rig does not state is exactly zero; only what was fitted as that is left out, having no tolerance. What the recordings fix
+/// only together with what the rig states roughly has the tolerance that both give.
+fn new(fitted: &FittedEffect) -> (Vec<&ParameterReport>, Vec<String>) {
     let specs = effects::find(&fitted.effect).map_or_else(Vec::new, |e| (e.parameters)(&Scale::ANY));
     let is_shape = |p: &ParameterReport| specs.iter().any(|spec| spec.name == p.name && spec.shape);
     let unsure = |p: &ParameterReport| {
-        let why = match () {
-            () if p.value == 0.0 || tolerance(p) > TOL.1 => "may as well be zero",
-            () if open.contains(&p.name.as_str()) => NOT_FIXED,
-            () => return None,
-        };
         let (value, error) = (short(p.value), short(p.std_error));
-        Some(format!("{} = {value} {}, standard error {error}, {why}", p.name, p.unit))
+        let nothing = p.value == 0.0 || tolerance(p) > TOL.1;
+        nothing
+            .then(|| format!("{} = {value} {}, standard error {error}, may as well be zero", p.name, p.unit))
     };
     let strengths: Vec<_> = fitted.parameters.iter().filter(|p| !is_shape(p)).collect();
     let why: Vec<String> = strengths.iter().filter_map(|p| unsure(p)).collect();
@@ -364,10 +362,9 @@ mod tests {
         assert!(left_out.is_empty(), "{left_out:?}");
         let (text, left_out) = written(cogging((0.2, 0.01), (0.0, 0.01)), &[]);
         assert!(!text.contains("cogging_sin_1_n_m") && left_out.len() == 1, "{text} {left_out:?}");
-        // Of one that nothing recorded fixes nothing is known.
-        let (text, left_out) = written(cogging((0.2, 0.01), (0.005, 0.01)), &["cogging_cos_1_n_m"]);
-        assert_eq!(text, RIG);
-        assert!(left_out[0].contains("torque_ripple_cogging is left out: "), "{left_out:?}");
+        // A strength that goes with what the rig states roughly is known as well as that.
+        let (text, left_out) = written(cogging((0.2, 0.01), (0.05, 0.01)), &["cogging_cos_1_n_m"]);
+        assert!(text.contains("cogging_cos_1_n_m") && left_out.is_empty(), "{text} {left_out:?}");
     }
 
     #[test]
