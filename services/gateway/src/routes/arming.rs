@@ -7,6 +7,7 @@ use axum::response::Response;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::thrusters::json;
+use super::whole;
 use crate::App;
 use crate::extract::{LeaseId, Path};
 use crate::problem::Problem;
@@ -51,9 +52,13 @@ async fn disarm(
     Extension(who): Extension<Identity>,
     Path(id): Path<String>,
 ) -> Result<Response, Problem> {
-    let thruster = app.thruster(&id)?;
-    thruster.disarm(&who.name).await?;
-    Ok(json(thruster.state_json()))
+    let thruster = Arc::clone(app.thruster(&id)?);
+    // Who asked is told also where nobody waits for the answer.
+    whole(async move {
+        thruster.disarm(&who.name).await?;
+        Ok(json(thruster.state_json()))
+    })
+    .await
 }
 
 /// Clears latched faults whose cause is gone. The thruster stays disarmed. Needs the `Lease-Id` in force while somebody holds one.
@@ -72,7 +77,10 @@ async fn clear_faults(
     Path(id): Path<String>,
     LeaseId(lease_id): LeaseId,
 ) -> Result<Response, Problem> {
-    let thruster = app.thruster(&id)?;
-    thruster.clear_faults(&who.name, lease_id.as_deref()).await?;
-    Ok(json(thruster.state_json()))
+    let thruster = Arc::clone(app.thruster(&id)?);
+    whole(async move {
+        thruster.clear_faults(&who.name, lease_id.as_deref()).await?;
+        Ok(json(thruster.state_json()))
+    })
+    .await
 }

@@ -149,7 +149,7 @@ async fn put(
     let thruster = Arc::clone(app.thruster(&id)?);
     whole(async move {
         thruster.set_controller(&who.name, lease_id.as_deref(), &request).await?;
-        thruster.controller()
+        thruster.controller().map(axum::Json)
     })
     .await
 }

@@ -110,7 +110,7 @@ async fn load(
         for request in &requests {
             thruster.set_controller(&who.name, lease.as_deref(), request).await?;
         }
-        thruster.controller()
+        thruster.controller().map(axum::Json)
     })
     .await
 }

@@ -94,9 +94,9 @@ pub fn router(app: Arc<App>) -> Router {
 /// Done to its end, whether or not the client waits for it.
 async fn whole<T: Send + 'static>(
     change: impl Future<Output = Result<T, Problem>> + Send + 'static,
-) -> Result<axum::Json<T>, Problem> {
+) -> Result<T, Problem> {
     let done = tokio::spawn(change).await;
-    done.map_err(|error| Problem::new(Kind::Internal, error.to_string()))?.map(axum::Json)
+    done.map_err(|error| Problem::new(Kind::Internal, error.to_string()))?
 }
 
 async fn unknown_route(request: Request) -> Problem {

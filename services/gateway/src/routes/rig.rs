@@ -224,7 +224,7 @@ async fn revise(
     let (text, source) = wanted(&app, &id, &body)?;
     let making = Making { source, who: who.name.clone(), note: body.note };
     let (desk, asker) = (Arc::clone(desk), Asker { who: who.name, lease });
-    whole(async move { desk.revise(&asker, &text, making, dry_run).await }).await
+    whole(async move { desk.revise(&asker, &text, making, dry_run).await.map(axum::Json) }).await
 }
 
 /// Goes back to the revision that was in force before the present one, bumpless. Needs the role admin, and the
@@ -247,7 +247,7 @@ async fn roll_back(
     LeaseId(lease): LeaseId,
 ) -> Result<axum::Json<Revised>, Problem> {
     let (desk, asker) = (Arc::clone(app.rig(&id)?), Asker { who: who.name, lease });
-    whole(async move { desk.roll_back(&asker).await }).await
+    whole(async move { desk.roll_back(&asker).await.map(axum::Json) }).await
 }
 
 /// The text that a request names, and where it comes from.
