@@ -268,6 +268,7 @@ mod tests {
         assert!(more(|_, time, noise| 6.0 * (0.7 * time).sin() + 0.2 * noise));
         assert!(!more(|_, time, noise| 1.0 * (0.7 * time).sin() + 0.2 * noise));
     }
+
     #[test]
     fn what_is_one_number_all_the_time_is_said() {
         let words = |error: fn(f64, f64, f64) -> f64| {
