@@ -6,13 +6,11 @@ use kort_identify::identify::FitReport;
 use kort_identify::scores::FittedEffect;
 use kort_thruster::effects::{self, Scale};
 use kort_thruster::parameters::Parameter;
-use kort_thruster::rig::{FoundEffect, Quantity, Rig};
-use toml_edit::{Decor, DocumentMut, InlineTable, Item, TableLike, Value};
+use kort_thruster::rig::{FoundEffect, Quantity, Rig, TOL, short, written};
+use toml_edit::{Decor, DocumentMut, Item, TableLike, Value};
 
 /// What stands behind each value that `kort fit` writes.
 pub const FITTED: &str = "fitted by kort fit";
-/// Least and largest tolerance written: what a rig may state.
-const TOL: (f64, f64) = (1e-4, 2.0);
 /// Begins the lines at the head of a fitted rig that say what is not in it.
 const NOT_WRITTEN: &str = "# not written by kort fit: ";
 
@@ -215,15 +213,7 @@ fn standing<'a>(document: &'a mut DocumentMut, effect: &str) -> Option<(&'a mut 
 
 /// A fitted value as it stands in a rig description, with what is told behind it.
 fn item(fitted: &ParameterReport, told: &str) -> Item {
-    let mut value = match quantity(fitted).tol {
-        None => Value::from(short(fitted.value)),
-        Some(tol) => {
-            let mut both = InlineTable::new();
-            both.insert("value", short(fitted.value).into());
-            both.insert("tol", short(tol.clamp(TOL.0, TOL.1)).into());
-            Value::InlineTable(both)
-        }
-    };
+    let mut value = written(quantity(fitted));
     *value.decor_mut() = Decor::new(" ", told);
     Item::Value(value)
 }
@@ -237,11 +227,6 @@ pub fn quantity(fitted: &ParameterReport) -> Quantity {
 /// Twice its standard error, over its value.
 fn tolerance(fitted: &ParameterReport) -> f64 {
     (2.0 * fitted.std_error / fitted.value).abs()
-}
-
-/// Six significant digits.
-fn short(x: f64) -> f64 {
-    format!("{x:.5e}").parse().unwrap_or(x)
 }
 
 #[cfg(test)]

@@ -12,7 +12,7 @@ mod write;
 
 pub use known::KnownEffect;
 pub use load::Load;
-pub use write::FoundEffect;
+pub use write::{FoundEffect, TOL, short, written};
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;

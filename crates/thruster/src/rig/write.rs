@@ -6,8 +6,8 @@ use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value};
 use super::keys::value_error;
 use super::{Quantity, Rig, RigError};
 
-/// Least and largest tolerance written.
-const TOL: (f64, f64) = (1e-4, 2.0);
+/// Least and largest tolerance written: what a rig may state.
+pub const TOL: (f64, f64) = (1e-4, 2.0);
 
 /// An effect to be written, with its values by name.
 #[derive(Clone, Debug, PartialEq)]
@@ -70,21 +70,22 @@ fn fill(table: &mut Table, effect: &FoundEffect, by: &str) {
     });
     table.insert("effect", Item::Value(effect.effect.into()));
     for (name, quantity) in &effect.parameters {
-        let mut value = match quantity.tol {
-            None => Value::from(short(quantity.value)),
-            Some(tol) => {
-                let mut both = InlineTable::new();
-                both.insert("value", short(quantity.value).into());
-                both.insert("tol", short(tol.clamp(TOL.0, TOL.1)).into());
-                Value::InlineTable(both)
-            }
-        };
+        let mut value = written(*quantity);
         value.decor_mut().set_suffix(format!(" # {by}"));
         table.insert(name, Item::Value(value));
     }
 }
 
+/// A quantity as it stands in a rig description.
+pub fn written(quantity: Quantity) -> Value {
+    let Some(tol) = quantity.tol else { return short(quantity.value).into() };
+    let mut both = InlineTable::new();
+    both.insert("value", short(quantity.value).into());
+    both.insert("tol", short(tol.clamp(TOL.0, TOL.1)).into());
+    Value::InlineTable(both)
+}
+
 /// Six significant digits.
-fn short(x: f64) -> f64 {
+pub fn short(x: f64) -> f64 {
     format!("{x:.5e}").parse().unwrap_or(x)
 }
