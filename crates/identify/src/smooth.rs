@@ -48,8 +48,10 @@ impl Prepared {
             tick.course = course_of(*smooth, *decay);
         }
         self.strides = vec![1; decay.len()];
-        if plant.is_stiff() {
-            return;
+        // Implicit steps are stable however fast a disturbance dies in them; a plant that takes others is told of each tick.
+        let implicit = plant.is_stiff();
+        if implicit {
+            decay.fill(0.0);
         }
         let (mut at, tops) = (0, tops(&course));
         for to in self.looked_at() {
@@ -57,11 +59,11 @@ impl Prepared {
                 let longest = ((LONGEST_S / self.tick_s + 1e-6) as usize).clamp(1, to - at);
                 let fits = |count: &usize| passes(&course, tops, &smooth, &decay, at, *count);
                 let count = [longest, longest.div_ceil(2)].into_iter().find(fits).unwrap_or(1);
-                if count > 1 {
-                    let fastest = decay[at..at + count].iter().fold(0.0_f64, |m, d| m.max(*d));
+                let fastest = decay[at..at + count].iter().fold(0.0_f64, |m, d| m.max(*d));
+                if count > 1 && !implicit {
                     self.stimulus.ticks[at].course = course_of(true, fastest * count as f64);
-                    self.strides[at] = count;
                 }
+                self.strides[at] = count;
                 at += count;
             }
         }

@@ -1,7 +1,7 @@
 //! The drive within a tick: from the command, through the effects on it, to a motor current or an imposed
 //! shaft speed at every instant of the tick.
 
-use super::{Balance, Drive, Driven, Plant, Rub, SPEED, STATES, Tick};
+use super::{Balance, Drive, Driven, OWN, Plant, Rub, SPEED, STATES, Tick, each};
 use crate::effects::FirstOrder;
 use crate::parameters::Parameter as P;
 use crate::real::Real;
@@ -122,14 +122,24 @@ impl<T: Real> Plant<T> {
         }
         let now = self.x[SPEED];
         let mut balance = Balance::default();
-        let at = self.local_at(&self.x, T::ZERO, 0.0, tick);
-        let unpowered = self.rates::<true, true, STATES>(&self.x, &at, &mut balance)[SPEED];
+        let unpowered = if self.used_states <= OWN {
+            self.unpowered::<OWN>(tick, &mut balance)
+        } else {
+            self.unpowered::<STATES>(tick, &mut balance)
+        };
         let short = (wanted_rad_s - now) / self.tick_s - unpowered;
         let rub = Rub::of(&balance).slow(now, T::from(self.tick_s)) - now;
         let short_a =
             (short - rub / self.tick_s) * balance.inertia_kg_m2 / self.constants.torque_constant_nm_a;
         let current_a = short_a.clamp(-limit_a, limit_a);
         (current_a != short_a).then_some(AtLimit { current_a, wanted_rad_s })
+    }
+
+    /// Acceleration of the shaft where no current drives it, rad/s^2.
+    fn unpowered<const N: usize>(&self, tick: &Tick, balance: &mut Balance<T>) -> T {
+        let x: [T; N] = each(|i| self.x[i]);
+        let at = self.local_at(&x, T::ZERO, 0.0, tick);
+        self.rates::<true, true, N>(&x, &at, balance)[SPEED]
     }
 
     /// Whether the winding, under a voltage that stands, brakes the shaft within this time.

@@ -40,6 +40,7 @@ impl<T: Real> Plant<T> {
         let goes = self.last_rates[0][SPEED].re().abs() + self.last_rub.largest();
         self.foretold::<HOOKED>(tick, drive, &begin)
             && self.slow
+            && drive.speed_rad_s.is_none()
             && drive.at_limit.is_none()
             && !self.quantise_encoder
             && !self.brisk
@@ -57,7 +58,9 @@ impl<T: Real> Plant<T> {
         drive: &DriveCourse<T>,
         begin: &super::Local<T>,
     ) -> bool {
-        self.holds::<HOOKED>(begin) && tick.course != Course::Any && drive.speed_rad_s.is_none()
+        self.holds::<HOOKED>(begin)
+            && tick.course != Course::Any
+            && drive.speed_rad_s.is_some() == self.was_imposed
     }
 
     /// Whether the rates at the end of the last step are this one's at its start.
@@ -143,7 +146,7 @@ impl<T: Real> Plant<T> {
         }
         self.last_rub = rub_of(&balance);
         self.last_span_s = span_s;
-        self.moving = true;
+        (self.moving, self.was_imposed) = (true, speed.is_some());
         end.current_a = drive.shown_a(end.current_a);
         self.arrive(ticks, &x, end, &balance);
     }

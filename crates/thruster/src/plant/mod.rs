@@ -94,8 +94,9 @@ pub struct Plant<T = f64> {
     /// Whether an effect may change within a few ticks by itself, or makes another motion of the model's: what is known of
     /// a tick's course is not known of several then.
     brisk: bool,
-    /// Whether there was a last tick.
+    /// Whether there was a last tick, and whether its speed was imposed.
     moving: bool,
+    was_imposed: bool,
     /// Whether those rates can hold at all: no effect keeps a memory that changes between ticks
     /// and acts on the rates.
     rates_may_hold: bool,
@@ -103,8 +104,9 @@ pub struct Plant<T = f64> {
     slow: bool,
     /// Where shaft, flow or swirl settle so fast beside a tick that explicit steps would run away.
     stiff: Option<Stiff>,
-    /// The derivative that a calm stiff plant goes on with.
-    slopes: Option<Slopes<T, OWN>>,
+    /// The derivative that a calm stiff plant goes on with, and whether it was taken.
+    slopes: Slopes<T, STATES>,
+    slopes_hold: bool,
     /// Bandwidth of the observer, rad/s; 0 is off.
     observer_rad_s: f64,
     quantise_encoder: bool,
@@ -200,7 +202,8 @@ impl<T: Real> Plant<T> {
             brisk: model != stated || effects.iter().any(|e| e.effect.brisk()),
             last_span_s: tick_s,
             stiff: Stiff::of(model, rig, tick_s, lightest_share),
-            slopes: None,
+            slopes: Slopes::NONE,
+            slopes_hold: false,
             parameters,
             sensors: rig.sensors,
             amplifier: rig.amplifier.kind,
@@ -228,6 +231,7 @@ impl<T: Real> Plant<T> {
             last_rates: [[T::ZERO; STATES]; 2],
             last_rub: Rub::NONE,
             moving: false,
+            was_imposed: false,
             observer_rad_s: 0.0,
             quantise_encoder: false,
         }
@@ -251,7 +255,7 @@ impl<T: Real> Plant<T> {
     ) {
         self.time_s = time_s;
         self.moving = false;
-        self.slopes = None;
+        self.slopes_hold = false;
         self.x[SPEED] = T::from(shaft_speed_rad_s);
         self.x[FLOW] = T::from(axial_m_s);
         self.x[ANGLE] = T::from(angle_rad);
@@ -310,9 +314,10 @@ impl<T: Real> Plant<T> {
     /// taken one by one.
     ///
     /// Runge-Kutta of order 4; over ticks that the caller knows to be smooth Adams' method of order 3, at
-    /// half the cost, or a quarter of it where they are calm. A stiff plant takes linearly implicit steps.
+    /// half the cost, or a quarter of it where they are calm. A stiff plant takes linearly implicit steps, one for several
+    /// ticks where hardly anything moves in them.
     pub fn stride(&mut self, ticks: &[Tick], commands: Option<&[f64]>) {
-        if self.stiff.is_none() && self.observer_rad_s == 0.0 {
+        if self.observer_rad_s == 0.0 {
             return T::advance(self, ticks, commands);
         }
         for (k, tick) in ticks.iter().enumerate() {
@@ -327,11 +332,10 @@ impl<T: Real> Plant<T> {
         let blade = !self.inflow_hooks.is_empty() || !self.foil_hooks.is_empty();
         let hooked = blade || !self.balance_hooks.is_empty();
         match (self.stiff, hooked, blade, self.used_states) {
-            (Some(stiff), .., ..=OWN) => self.step_stiff::<OWN>(&ticks[0], commands.map(|all| all[0]), stiff),
-            (Some(stiff), .., ..=SOME) => {
-                self.step_stiff::<SOME>(&ticks[0], commands.map(|all| all[0]), stiff)
-            }
-            (Some(stiff), ..) => self.step_stiff::<STATES>(&ticks[0], commands.map(|all| all[0]), stiff),
+            (Some(stiff), .., ..=OWN) => self.stiff_as::<OWN>(ticks, commands, stiff),
+            (Some(stiff), .., ..=FEW) => self.stiff_as::<FEW>(ticks, commands, stiff),
+            (Some(stiff), .., ..=SOME) => self.stiff_as::<SOME>(ticks, commands, stiff),
+            (Some(stiff), ..) => self.stiff_as::<STATES>(ticks, commands, stiff),
             (_, false, ..) => self.step_as::<false, false, OWN>(ticks, commands),
             (_, _, false, ..=OWN) => self.step_as::<true, false, OWN>(ticks, commands),
             (_, _, true, ..=OWN) => self.step_as::<true, true, OWN>(ticks, commands),

@@ -6,6 +6,7 @@
 //! within the tick is followed to where it settles. The derivative may be rough without costing order; it is
 //! taken by differences where the shaft's acceleration leads: from rest, blades that do not turn yet would
 //! show no slope. The shaft's own is the steeper of there and here: a drive at its limit shows no back-EMF.
+//! Where hardly anything moves, one such step alone does, over several ticks at once where the caller allows it.
 //! Whether a plant takes this step is settled once from the stated rig, so that a response stays smooth in the
 //! parameters.
 
@@ -21,6 +22,9 @@ const CALM: f64 = 1e-2;
 /// Part of the largest speed and flow by which a calm plant may have moved since its derivative was taken: the loads' slopes go
 /// with the speed, and a derivative that is off by a little costs no order.
 const KEPT: f64 = 2e-2;
+/// Part of the largest speed and flow by which one step alone may end elsewhere than it began: it is off by a third of that at
+/// most, and where a slow state goes on so, by half of it in all.
+const QUIET: f64 = 2e-4;
 /// Step of differences, as a part of what is moved.
 const DIFFERENCE: f64 = 1e-6;
 
@@ -40,6 +44,12 @@ impl<T: Real, const N: usize> Push<T, N> {
         let moves = |place: usize, top: f64| self.rates[place].re().abs() * tick_s > part * top;
         !moves(SPEED, stiff.top_rad_s) && !moves(FLOW, stiff.top_m_s)
     }
+
+    /// Whether a step from here ended close by.
+    fn hardly_moved(&self, to: &[T; N], stiff: Stiff) -> bool {
+        let moved = |place: usize, top: f64| (to[place] - self.x[place]).re().abs() > QUIET * top;
+        !moved(SPEED, stiff.top_rad_s) && !moved(FLOW, stiff.top_m_s)
+    }
 }
 
 /// Derivative of the rates, as far as it is fast: by shaft speed and axial flow of all states, and of each
@@ -54,6 +64,9 @@ pub(super) struct Slopes<T, const N: usize> {
 }
 
 impl<T: Real, const N: usize> Slopes<T, N> {
+    pub(super) const NONE: Self =
+        Self { about: [0.0; 2], by_speed: [T::ZERO; N], by_flow: [T::ZERO; N], by_itself: [T::ZERO; N] };
+
     /// Whether the plant is still about where the derivative was taken.
     fn hold_at(&self, x: &[T], stiff: Stiff) -> bool {
         let near = |place: usize, top: f64| (x[place].re() - self.about[place]).abs() < KEPT * top;
@@ -73,24 +86,66 @@ impl<T: Real, const N: usize> Slopes<T, N> {
 }
 
 impl<T: Real> Plant<T> {
-    pub(super) fn step_stiff<const N: usize>(&mut self, tick: &Tick, command: Option<f64>, stiff: Stiff) {
+    /// Steps through ticks under commands in place of their own, at once where hardly anything moves and else one by one.
+    pub(super) fn stiff_as<const N: usize>(
+        &mut self,
+        ticks: &[Tick],
+        commands: Option<&[f64]>,
+        stiff: Stiff,
+    ) {
+        if ticks.len() > 1 && self.step_quiet::<N>(ticks, commands, stiff) {
+            return;
+        }
+        for (k, tick) in ticks.iter().enumerate() {
+            self.step_stiff::<N>(tick, commands.map(|all| all[k]), stiff);
+        }
+    }
+
+    /// Several ticks in one implicit step, if hardly anything moves in them; else nothing is done. Whatever keeps a memory
+    /// of each tick's command has its ticks one by one.
+    fn step_quiet<const N: usize>(&mut self, ticks: &[Tick], commands: Option<&[f64]>, stiff: Stiff) -> bool {
+        let remembers = !self.drive_hooks.is_empty() || self.command_lag.is_some();
+        if remembers || !self.slow || self.brisk || self.quantise_encoder {
+            return false;
+        }
+        let (last, span_s) = (&ticks[ticks.len() - 1], self.tick_s * ticks.len() as f64);
+        let (x, current_a): ([T; N], T) = (each(|i| self.x[i]), self.current_a);
+        let drive = self.drive_over(&ticks[0], commands.map(|all| all[0]));
+        if drive.speed_rad_s.is_some() || drive.at_limit.is_some() {
+            return false;
+        }
+        let drive = self.drive_to_last((ticks, commands), drive, [x[SPEED]; 2]);
+        self.x[SPEED] = x[SPEED];
+        let mut balance = Balance::default();
+        let whole = self.push(last, &drive, &x, 1.0, stiff, &mut balance);
+        let slopes = self.slopes_kept(last, &drive, &whole, span_s, stiff);
+        let to = slopes.advance(&whole, span_s, whole.rub, false);
+        if !whole.hardly_moved(&to, stiff) {
+            self.current_a = current_a;
+            return false;
+        }
+        self.end_stiff(ticks, &drive, to, &mut balance);
+        true
+    }
+
+    fn step_stiff<const N: usize>(&mut self, tick: &Tick, command: Option<f64>, stiff: Stiff) {
         let drive = self.drive_over(tick, command);
         let mut balance = Balance::default();
         let mut x: [T; N] = each(|i| self.x[i]);
-        if N == OWN {
-            let whole = self.push(tick, &drive, &x, 1.0, stiff, &mut balance);
-            if whole.moves_less(CALM, self.tick_s, stiff) {
-                let kept = self.slopes.take().filter(|kept| kept.hold_at(&self.x, stiff));
-                let slopes = kept.map_or_else(
-                    || self.slopes_ahead(tick, &drive, &whole, (1.0, self.tick_s), stiff.top_rad_s),
-                    |kept| kept.resized(),
-                );
-                self.slopes = Some(slopes.resized());
-                x = self.stiff_part(tick, &drive, &x, (0.0, 1.0), stiff, (&whole, &slopes), &mut balance);
-                return self.end_stiff(tick, &drive, x, &mut balance);
-            }
+        let ticks = std::slice::from_ref(tick);
+        let whole = self.push(tick, &drive, &x, 1.0, stiff, &mut balance);
+        if whole.moves_less(CALM, self.tick_s, stiff) {
+            let slopes = self.slopes_kept(tick, &drive, &whole, self.tick_s, stiff);
+            let imposed = drive.speed_rad_s.is_some();
+            let to = slopes.advance(&whole, self.tick_s, whole.rub, imposed);
+            x = if !imposed && whole.hardly_moved(&to, stiff) {
+                to
+            } else {
+                self.stiff_part(tick, &drive, &x, (0.0, 1.0), stiff, (&whole, &slopes), &mut balance)
+            };
+            return self.end_stiff(ticks, &drive, x, &mut balance);
         }
-        self.slopes = None;
+        self.slopes_hold = false;
         let part = 1.0 / stiff.steps as f64;
         for step in 0..stiff.steps {
             let from = step as f64 * part;
@@ -105,16 +160,33 @@ impl<T: Real> Plant<T> {
             );
             x = self.stiff_part(tick, &drive, &x, (from, until), stiff, (&whole, &slopes), &mut balance);
         }
-        self.end_stiff(tick, &drive, x, &mut balance);
+        self.end_stiff(ticks, &drive, x, &mut balance);
+    }
+
+    /// The derivative that the plant goes on with while it is about where it was taken.
+    fn slopes_kept<const N: usize>(
+        &mut self,
+        tick: &Tick,
+        drive: &Course<T>,
+        here: &Push<T, N>,
+        step_s: f64,
+        stiff: Stiff,
+    ) -> Slopes<T, N> {
+        if !self.slopes_hold || !self.slopes.hold_at(&self.x, stiff) {
+            let slopes = self.slopes_ahead(tick, drive, here, (1.0, step_s), stiff.top_rad_s);
+            (self.slopes, self.slopes_hold) = (slopes.resized(), true);
+        }
+        self.slopes.resized()
     }
 
     fn end_stiff<const N: usize>(
         &mut self,
-        tick: &Tick,
+        ticks: &[Tick],
         drive: &Course<T>,
         mut x: [T; N],
         balance: &mut Balance<T>,
     ) {
+        let tick = &ticks[ticks.len() - 1];
         if let Some(limit) = drive.at_limit {
             x[SPEED] = limit.no_further(x[SPEED]);
         }
@@ -123,7 +195,7 @@ impl<T: Real> Plant<T> {
         self.rates::<true, true, N>(&x, &end, balance);
         self.moving = false;
         end.current_a = drive.shown_a(end.current_a);
-        self.arrive(std::slice::from_ref(tick), &x, end, balance);
+        self.arrive(ticks, &x, end, balance);
     }
 
     /// What moves a state under the inputs at a part of the tick.

@@ -279,3 +279,32 @@ fn what_a_limit_hides_still_settles_where_a_finer_step_does() {
         }
     }
 }
+
+#[test]
+fn several_quiet_ticks_at_once_end_where_single_ones_do() {
+    let rig = Rig::from_toml(IN_AIR).unwrap();
+    let stated = Parameters::stated(&rig);
+    let warming: &[f64] = &[2e-4, 1e-7, 2.0];
+    for effects in [&[] as &[(&Descriptor, &[f64])], &[(find("friction_warm_up").unwrap(), warming)]] {
+        let mut one = Plant::new(ModelName::Model2, &rig, &stated, effects, TICK_S);
+        let mut five = Plant::new(ModelName::Model2, &rig, &stated, effects, TICK_S);
+        let mut most = [0.0_f64; 2];
+        // Steps, and a slow rise after each.
+        let tick = |k: usize| Tick {
+            time_s: k as f64 * TICK_S,
+            command: 15.0 * LEVELS[k / 75 % 8] + 0.002 * (k % 75) as f64,
+            ..Tick::default()
+        };
+        for k in (0..TICKS).step_by(5) {
+            let ticks: Vec<Tick> = (k..k + 5).map(tick).collect();
+            ticks.iter().for_each(|tick| one.step(tick));
+            five.stride(&ticks, None);
+            let (a, b) = (one.truth(), five.truth());
+            most[0] = most[0].max((a.shaft_speed_rad_s - b.shaft_speed_rad_s).abs());
+            most[1] = most[1].max((a.thrust_n - b.thrust_n).abs());
+        }
+        let top = 15.0 / stated.get(P::TorqueConstantNmA);
+        assert!(most[0] < 1e-3 * top, "{most:?} of {top}, {}", effects.len());
+        assert!(most[0] > 0.0, "none were passed at once");
+    }
+}
