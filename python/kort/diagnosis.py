@@ -10,7 +10,7 @@ from typing import Any
 
 from . import _kort
 from .recording import Source, given
-from .reports import Channel, HeldOut, Parameter, asked, build, write_text
+from .reports import Channel, FittedEffect, HeldOut, Parameter, asked, build, write_text
 
 
 @dataclass(frozen=True)
@@ -23,6 +23,8 @@ class Baseline:
     """Its parameters."""
     channels: dict[str, Channel]
     """Its errors by column."""
+    effects: list[FittedEffect] | None = None
+    """Effects that are taken to be there, because the rig states them or ``with_effects`` does; none where nothing is."""
 
 
 @dataclass(frozen=True)

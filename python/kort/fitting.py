@@ -10,21 +10,7 @@ from typing import Any
 
 from . import _kort
 from .recording import Source, given
-from .reports import Channel, Parameter, asked, build, write_text
-
-
-@dataclass(frozen=True)
-class FittedEffect:
-    """An effect that was fitted with the model."""
-
-    effect: str
-    """Catalogue identifier."""
-    path: str
-    """drive, shaft, blade, flow or sensor."""
-    equation: str
-    """Its equation."""
-    parameters: list[Parameter]
-    """Its fitted values."""
+from .reports import Channel, FittedEffect, Parameter, asked, build, write_text
 
 
 @dataclass(frozen=True)

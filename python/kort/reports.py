@@ -30,6 +30,20 @@ class Parameter:
 
 
 @dataclass(frozen=True)
+class FittedEffect:
+    """An effect that was fitted with the model."""
+
+    effect: str
+    """Catalogue identifier."""
+    path: str
+    """drive, shaft, blade, flow or sensor."""
+    equation: str
+    """Its equation."""
+    parameters: list[Parameter]
+    """Its fitted values."""
+
+
+@dataclass(frozen=True)
 class Channel:
     """Errors of a model on one column, root mean square over full scale (1)."""
 

@@ -66,6 +66,10 @@ def test_diagnose_names_what_was_hidden(cases: Path, tmp_path: Path) -> None:
     report.write_html(tmp_path / "report.html")
     assert "coulomb" in (tmp_path / "report.html").read_text()
     assert len(report.plot().axes) == 2
+    known = kort.diagnose(recording, cases / "coulomb-friction.rig.toml", with_effects=["coulomb_friction"])
+    mirrors(known, known.document)
+    assert [effect.effect for effect in known.baseline.effects or []] == ["coulomb_friction"]
+    assert known.verdict == "no_mismatch"
 
 
 def test_simulate_gives_the_rows_that_the_program_writes(tmp_path: Path, kort_program: str) -> None:

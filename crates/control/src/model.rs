@@ -197,6 +197,7 @@ impl ControlModel {
                 AmplifierKind::Speed => self.speed_max_rad_s,
             },
             supply_v: self.supply_v.unwrap_or(0.0),
+            current_limit_a: rig.amplifier.current_limit_a,
             winding_resistance_ohm: rig.motor.winding_resistance_ohm.map_or(0.0, |r| r.value),
             inertia_kg_m2: self.inertia_kg_m2,
             tick_s: self.period_s,
@@ -206,6 +207,7 @@ impl ControlModel {
             turned_rad: f64::INFINITY,
             angle_rad: [0.0; 2],
             reverses: true,
+            loaded: rig.is_loaded(),
         }
     }
 

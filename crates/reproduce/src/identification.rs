@@ -65,6 +65,7 @@ fn levels(paper: &Paper, effect: &str) -> Vec<Level> {
         current_a: LARGEST_TORQUE_N_M / kt,
         command: LARGEST_TORQUE_N_M / kt,
         supply_v: 120.0,
+        current_limit_a: LARGEST_TORQUE_N_M / kt,
         winding_resistance_ohm: 2.2,
         inertia_kg_m2: 0.01,
         tick_s: 0.002,
@@ -74,6 +75,7 @@ fn levels(paper: &Paper, effect: &str) -> Vec<Level> {
         turned_rad: f64::INFINITY,
         angle_rad: [0.0; 2],
         reverses: true,
+        loaded: true,
     };
     // Twice the size at which a fit would start: a few percent of the loads.
     let found = effects::find(effect);

@@ -103,6 +103,7 @@ mod tests {
             current_a: 9.0,
             command: 9.0,
             supply_v: 120.0,
+            current_limit_a: 9.0,
             winding_resistance_ohm: 2.2,
             inertia_kg_m2: 0.01,
             tick_s: 0.002,
@@ -112,6 +113,7 @@ mod tests {
             turned_rad: f64::INFINITY,
             angle_rad: [0.0; 2],
             reverses: true,
+            loaded: true,
         }
     }
 

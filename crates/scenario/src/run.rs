@@ -263,6 +263,7 @@ pub fn scale(rig: &Rig, p: &Parameters, peak: f64, tick_s: f64, duration_s: f64)
         current_a: current.max(1e-9),
         command: peak.max(1e-9),
         supply_v: rig.amplifier.supply_v.unwrap_or(0.0),
+        current_limit_a: rig.amplifier.current_limit_a,
         winding_resistance_ohm: rig.motor.winding_resistance_ohm.map_or(0.0, |r| r.value),
         inertia_kg_m2: p.get(Parameter::InertiaKgM2),
         tick_s,
@@ -272,6 +273,7 @@ pub fn scale(rig: &Rig, p: &Parameters, peak: f64, tick_s: f64, duration_s: f64)
         turned_rad: f64::INFINITY,
         angle_rad: [0.0; 2],
         reverses: true,
+        loaded: rig.is_loaded(),
     }
 }
 

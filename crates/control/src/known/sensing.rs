@@ -51,6 +51,7 @@ impl Sensing {
         let expected = Sensed {
             current_a: measured.current_a.unwrap_or(0.0),
             shaft_angle_rad: measured.shaft_angle_rad.unwrap_or(0.0),
+            pulled_rad: 0.0,
             shaft_speed_rad_s: seen,
             thrust_n: self.seen_n,
             torque_n_m: 0.0,

@@ -1,6 +1,7 @@
 //! A recording made ready for simulation: inputs on the control grid, responses on the log grid.
 
 use kort_thruster::plant::{Leap, Stimulus};
+use kort_thruster::real::Real;
 use kort_thruster::rig::{AmplifierKind, Rig};
 
 use crate::gaps::unsampled;
@@ -74,14 +75,15 @@ impl Response {
     }
 
     /// Its value in a simulated row.
-    pub fn of<T: Copy>(self, row: &kort_thruster::plant::Sensed<T>) -> T {
+    pub fn of<T: Real>(self, row: &kort_thruster::plant::Sensed<T>) -> T {
         match self {
             Self::Current => row.current_a,
             Self::ShaftSpeed => row.shaft_speed_rad_s,
             Self::Thrust => row.thrust_n,
             Self::Torque => row.torque_n_m,
             Self::Flow => row.flow_m_s,
-            Self::ShaftAngle => row.shaft_angle_rad,
+            // Its rates are compared, and what an observer pulled is no motion.
+            Self::ShaftAngle => row.shaft_angle_rad - row.pulled_rad,
         }
     }
 }

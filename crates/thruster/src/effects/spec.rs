@@ -21,6 +21,8 @@ pub struct Scale {
     pub command: f64,
     /// Nominal supply, V (zero if not stated).
     pub supply_v: f64,
+    /// Stated limit of the current, A (infinite if not stated).
+    pub current_limit_a: f64,
     /// Stated winding resistance, ohm (zero if not stated).
     pub winding_resistance_ohm: f64,
     /// Stated inertia, kg m^2.
@@ -39,12 +41,21 @@ pub struct Scale {
     pub angle_rad: [f64; 2],
     /// Whether command or shaft speed ever went astern.
     pub reverses: bool,
+    /// Whether a propeller or a stated load takes torque while the shaft turns steadily.
+    pub loaded: bool,
 }
 
 impl Scale {
     /// What a quantity with this largest size ranges over: both ways, or ahead alone where the shaft never went astern.
     pub fn both_ways(&self, size: f64) -> [f64; 2] {
         [if self.reverses { -size } else { 0.0 }, size]
+    }
+
+    /// How large friction commonly is, N m: a tenth of the largest torque where something else takes the rest. A shaft that
+    /// nothing loads turns steadily under what its friction takes, and any share of the torque may be that: root mean
+    /// square of what lies evenly between none and all.
+    pub fn friction_n_m(&self) -> f64 {
+        self.torque_n_m * if self.loaded { 0.1 } else { 1.0 / 3.0_f64.sqrt() }
     }
 
     /// A rig of no size: names and units of parameters do not depend on it.
@@ -56,6 +67,7 @@ impl Scale {
         current_a: 1.0,
         command: 1.0,
         supply_v: 1.0,
+        current_limit_a: 1.0,
         winding_resistance_ohm: 1.0,
         inertia_kg_m2: 1.0,
         tick_s: 0.002,
@@ -65,6 +77,7 @@ impl Scale {
         turned_rad: f64::INFINITY,
         angle_rad: [0.0; 2],
         reverses: true,
+        loaded: true,
     };
 }
 
@@ -133,6 +146,11 @@ impl Spec {
     /// A strength that is there (1) or not (0) and is never fitted.
     pub const fn switch(name: &'static str) -> Self {
         Self { held: true, mean: 1.0, ..Self::strength(name, "1", 1.0, 0.0, 1.0) }
+    }
+
+    /// What is taken for a quantity that the rig does not state, and never fitted; zero where the rig states it.
+    pub const fn taken(name: &'static str, unit: &'static str, value: f64) -> Self {
+        Self { held: true, mean: value, ..Self::strength(name, unit, value, 0.0, f64::INFINITY) }
     }
 
     /// Another prior standard deviation.

@@ -8,6 +8,7 @@ use crate::real::Real;
 #[derive(Clone, Copy)]
 pub(super) struct Filters<T> {
     pub(super) angle_rad: T,
+    pub(super) pulled_rad: T,
     pub(super) speed_rad_s: T,
     pub(super) thrust_n: T,
     pub(super) last_thrust_n: T,
@@ -86,6 +87,7 @@ impl<T: Real> Filters<T> {
     pub(super) const fn still() -> Self {
         Self {
             angle_rad: T::ZERO,
+            pulled_rad: T::ZERO,
             speed_rad_s: T::ZERO,
             thrust_n: T::ZERO,
             last_thrust_n: T::ZERO,
@@ -149,6 +151,7 @@ impl<T: Real> Plant<T> {
         let angle = self.encoded(angle_rad);
         let f = &mut self.filters;
         f.angle_rad = angle;
+        f.pulled_rad = self.pulled_rad;
         // Angle differenced at the control rate, then a first-order filter.
         let raw = self.counted.speed_rad_s(angle);
         f.speed_rad_s = match self.decays.speed {
@@ -208,6 +211,7 @@ impl<T: Real> Plant<T> {
         Sensed {
             current_a: self.current_a,
             shaft_angle_rad: f.angle_rad,
+            pulled_rad: f.pulled_rad,
             shaft_speed_rad_s: f.speed_rad_s,
             thrust_n: f.thrust_n,
             torque_n_m: f.torque_n_m,

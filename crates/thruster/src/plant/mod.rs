@@ -109,6 +109,8 @@ pub struct Plant<T = f64> {
     slopes_hold: bool,
     /// Bandwidth of the observer, rad/s; 0 is off.
     observer_rad_s: f64,
+    /// How far it has pulled the angle, rad.
+    pulled_rad: T,
     quantise_encoder: bool,
 }
 
@@ -233,6 +235,7 @@ impl<T: Real> Plant<T> {
             moving: false,
             was_imposed: false,
             observer_rad_s: 0.0,
+            pulled_rad: T::ZERO,
             quantise_encoder: false,
         }
     }

@@ -2,7 +2,8 @@
 //!
 //! A free run of what integrates or is unstable (an angle, a pendulum) drifts away from the recording for
 //! reasons that are no physics; a pull of about 1 Hz takes that away and leaves what is faster to be seen.
-//! What the sensors show is always the prediction, made before the pull.
+//! What the sensors show is always the prediction, made before the pull; by how much the angle was pulled till then is told
+//! with it, for whoever takes rates of it.
 
 use super::{ANGLE, Plant, SPEED, Tick};
 use crate::real::Real;
@@ -30,6 +31,7 @@ impl<T: Real> Plant<T> {
             let by = behind * (1.4 * reach).min(1.0);
             self.x[SPEED] += behind * (reach * self.observer_rad_s);
             self.x[ANGLE] += by;
+            self.pulled_rad += by;
             self.counted.shift(by);
         } else if let Some(speed) = tick.observed_speed_rad_s {
             let behind = T::from(speed) - shown.shaft_speed_rad_s;
@@ -71,5 +73,29 @@ mod tests {
         let size = Tick { observed_size_rad_s: Some(8.0), ..Tick::default() };
         assert!((ends_at(5.0, &size) - 8.0).abs() < 0.01);
         assert!((ends_at(-5.0, &size) + 8.0).abs() < 0.01);
+    }
+
+    /// Under a torque that it does not know, the shaft runs ahead of the recorded one: its speed and the rate of its angle
+    /// must tell the same of it.
+    #[test]
+    fn the_pull_is_no_motion_in_the_rate_of_the_angle() {
+        let rig = "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = 0.01\ntorque_constant_nm_a = 1.0\n";
+        let rig = Rig::from_toml(rig).unwrap();
+        let w = std::f64::consts::TAU;
+        let mut plant: Plant =
+            Plant::new(ModelName::Model2, &rig, &Parameters::stated(&rig), &[], 0.002).with_observer(w);
+        let mut before = plant.sensed();
+        for k in 0..5000 {
+            before = plant.sensed();
+            // It stands, and 0.1 N m drive it.
+            let tick =
+                Tick { time_s: 0.002 * f64::from(k), observed_angle_rad: Some(0.0), ..Tick::default() };
+            plant.step(&Tick { command: 0.1, ..tick });
+        }
+        let now = plant.sensed();
+        let moved = (now.shaft_angle_rad - now.pulled_rad) - (before.shaft_angle_rad - before.pulled_rad);
+        let speed = now.shaft_speed_rad_s;
+        assert!((speed - 1.4 * 10.0 / w).abs() < 0.05 * speed, "{speed}");
+        assert!((moved / 0.002 - speed).abs() < 0.01 * speed, "{} {speed}", moved / 0.002);
     }
 }

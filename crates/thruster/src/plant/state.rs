@@ -235,6 +235,8 @@ pub struct Sensed<T = f64> {
     pub current_a: T,
     /// Shaft angle, rad.
     pub shaft_angle_rad: T,
+    /// How far an observer had pulled that angle, rad: no motion of the shaft.
+    pub pulled_rad: T,
     /// Shaft speed after differencing and filter, rad/s.
     pub shaft_speed_rad_s: T,
     /// Thrust after the sensor's filter, N.
@@ -261,6 +263,7 @@ impl<T: Real> Sensed<T> {
         Self {
             current_a: mix(self.current_a, later.current_a),
             shaft_angle_rad: mix(self.shaft_angle_rad, later.shaft_angle_rad),
+            pulled_rad: mix(self.pulled_rad, later.pulled_rad),
             shaft_speed_rad_s: mix(self.shaft_speed_rad_s, later.shaft_speed_rad_s),
             thrust_n: mix(self.thrust_n, later.thrust_n),
             torque_n_m: mix(self.torque_n_m, later.torque_n_m),
@@ -297,7 +300,7 @@ at_rest! {
         foil
     }
     Sensed {
-        current_a shaft_angle_rad shaft_speed_rad_s thrust_n torque_n_m flow_m_s true_speed_rad_s true_thrust_n
+        current_a shaft_angle_rad pulled_rad shaft_speed_rad_s thrust_n torque_n_m flow_m_s true_speed_rad_s true_thrust_n
         supply_v,
         since_mean_rad_s2
     }

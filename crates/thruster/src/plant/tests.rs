@@ -157,7 +157,7 @@ fn a_supply_that_brakes_within_a_stride_is_not_passed_over() {
                viscous_friction_nm_s = 3e-4\nwinding_resistance_ohm = 0.9\n[amplifier]\nkind = \"current\"\n\
                current_limit_a = 20\nsupply_v = 10\n[sensors]\n";
     let rig = Rig::from_toml(rig).expect("a rig");
-    let limit = (&crate::effects::voltage_limit_backemf::DESCRIPTOR, &[0.0, 1.0][..]);
+    let limit = (&crate::effects::voltage_limit_backemf::DESCRIPTOR, &[0.0, 1.0, 0.0][..]);
     let ends_at = |of: usize| {
         let mut plant: Plant = Plant::new(ModelName::Model2, &rig, &Parameters::stated(&rig), &[limit], 1e-3);
         let ticks: Vec<Tick> = (0..3000)

@@ -65,6 +65,7 @@ impl Bench {
             current_a: 9.0,
             command: top,
             supply_v: 120.0,
+            current_limit_a: 9.0,
             winding_resistance_ohm: 2.2,
             inertia_kg_m2: 0.01,
             tick_s: TICK_S,
@@ -74,6 +75,7 @@ impl Bench {
             turned_rad: f64::INFINITY,
             angle_rad: [0.0; 2],
             reverses: true,
+            loaded: true,
         };
         Self { rig, stimulus: Stimulus { ticks, logs }, scale }
     }

@@ -144,6 +144,7 @@ fn cogging_has_several_orders_at_once() {
         current_a: 1.0,
         command: 1.0,
         supply_v: 0.0,
+        current_limit_a: f64::INFINITY,
         winding_resistance_ohm: 0.0,
         inertia_kg_m2: INERTIA,
         tick_s: TICK_S,
@@ -153,6 +154,7 @@ fn cogging_has_several_orders_at_once() {
         turned_rad: f64::INFINITY,
         angle_rad: [0.0; 2],
         reverses: true,
+        loaded: true,
     };
     let mut values = vec![0.0; (cogging.parameters)(&scale).len()];
     let lines = [(72.0, 0.05, 0.03), (18.0, -0.02, 0.0), (12.0, 0.0, 0.01), (144.0, 0.004, 0.0)];
@@ -180,9 +182,9 @@ fn a_voltage_drive_stops_at_its_supply() {
         (0..1000).for_each(|_| plant.step(&Tick { command: 14.0, supply_v, ..Tick::default() }));
         plant.truth().shaft_speed_rad_s
     };
-    let (free, limited) = (top(&[], None), top(&[("voltage_limit_backemf", &[0.0, 1.0])], None));
+    let (free, limited) = (top(&[], None), top(&[("voltage_limit_backemf", &[0.0, 1.0, 0.0])], None));
     assert!((limited / free - 10.0 / 14.0).abs() < 1e-3, "{limited} {free}");
-    let recorded = top(&[("voltage_limit_backemf", &[0.0, 1.0])], Some(7.0));
+    let recorded = top(&[("voltage_limit_backemf", &[0.0, 1.0, 0.0])], Some(7.0));
     assert!((recorded / free - 0.5).abs() < 1e-3, "{recorded}");
     let sagging = top(&[("supply_sag", &[4.0, 0.0, 1.0])], None);
     assert!(sagging < 0.999 * free && sagging > 0.8 * free, "{sagging} {free}");
