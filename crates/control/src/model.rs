@@ -207,7 +207,6 @@ impl ControlModel {
             turned_rad: f64::INFINITY,
             angle_rad: [0.0; 2],
             reverses: true,
-            loaded: rig.is_loaded(),
         }
     }
 

@@ -75,7 +75,6 @@ fn levels(paper: &Paper, effect: &str) -> Vec<Level> {
         turned_rad: f64::INFINITY,
         angle_rad: [0.0; 2],
         reverses: true,
-        loaded: true,
     };
     // Twice the size at which a fit would start: a few percent of the loads.
     let found = effects::find(effect);

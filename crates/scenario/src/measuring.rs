@@ -113,7 +113,6 @@ mod tests {
             turned_rad: f64::INFINITY,
             angle_rad: [0.0; 2],
             reverses: true,
-            loaded: true,
         }
     }
 

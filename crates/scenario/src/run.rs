@@ -273,7 +273,6 @@ pub fn scale(rig: &Rig, p: &Parameters, peak: f64, tick_s: f64, duration_s: f64)
         turned_rad: f64::INFINITY,
         angle_rad: [0.0; 2],
         reverses: true,
-        loaded: rig.is_loaded(),
     }
 }
 

@@ -68,7 +68,6 @@ pub fn scale(all: &[Prepared], rig: &Rig) -> Scale {
             all.iter().map(|p| p.time_s[p.time_s.len() - 1]).fold(f64::NEG_INFINITY, f64::max),
         ],
         reverses: goes_astern(all, speed, command),
-        loaded: rig.is_loaded(),
         angle_known: angle_known(all),
         turned_rad: turned_rad(all),
         angle_rad: ends_rad(all).filter(|_| angle_known(all)).unwrap_or([0.0; 2]),

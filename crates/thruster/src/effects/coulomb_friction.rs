@@ -42,7 +42,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 fn parameters(scale: &Scale) -> Vec<Spec> {
     vec![
         Spec::strength("coulomb_torque_n_m", "N m", 0.02 * scale.torque_n_m, 0.0, scale.torque_n_m)
-            .sigma(scale.friction_n_m()),
+            .sigma(0.1 * scale.torque_n_m),
         Spec::shape("stribeck_rise", "1", 0.3, 0.0, 2.0).prior(0.0, 0.5),
         Spec::shape(
             "stribeck_speed_rad_s",

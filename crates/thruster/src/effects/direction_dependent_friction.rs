@@ -56,11 +56,8 @@ fn needs(rig: &Rig, available: &Available) -> Result<(), &'static str> {
 fn parameters(scale: &Scale) -> Vec<Spec> {
     let torque = scale.torque_n_m;
     let viscous = torque / scale.shaft_speed_rad_s;
-    let usual = scale.friction_n_m();
-    let dry = |name| Spec::strength(name, "N m", 0.02 * torque, 0.0, torque).sigma(usual);
-    let slope = |name| {
-        Spec::strength(name, "N m s", 0.02 * viscous, 0.0, viscous).sigma(usual / scale.shaft_speed_rad_s)
-    };
+    let dry = |name| Spec::strength(name, "N m", 0.02 * torque, 0.0, torque).sigma(0.1 * torque);
+    let slope = |name| Spec::strength(name, "N m s", 0.02 * viscous, 0.0, viscous).sigma(0.1 * viscous);
     vec![
         dry("dry_ahead_n_m"),
         dry("dry_astern_n_m"),

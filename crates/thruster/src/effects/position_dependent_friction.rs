@@ -49,7 +49,7 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
         if scale.angle_known { spec } else { Spec { start: 0.0, held: true, ..spec } }
     };
     vec![
-        Spec::strength("mean_friction_n_m", "N m", 0.05 * torque, 0.0, torque).sigma(scale.friction_n_m()),
+        Spec::strength("mean_friction_n_m", "N m", 0.05 * torque, 0.0, torque).sigma(0.1 * torque),
         wave("once_sin_share"),
         wave("once_cos_share"),
         wave("twice_sin_share"),

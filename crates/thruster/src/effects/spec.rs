@@ -41,21 +41,12 @@ pub struct Scale {
     pub angle_rad: [f64; 2],
     /// Whether command or shaft speed ever went astern.
     pub reverses: bool,
-    /// Whether a propeller or a stated load takes torque while the shaft turns steadily.
-    pub loaded: bool,
 }
 
 impl Scale {
     /// What a quantity with this largest size ranges over: both ways, or ahead alone where the shaft never went astern.
     pub fn both_ways(&self, size: f64) -> [f64; 2] {
         [if self.reverses { -size } else { 0.0 }, size]
-    }
-
-    /// How large friction commonly is, N m: a tenth of the largest torque where something else takes the rest. A shaft that
-    /// nothing loads turns steadily under what its friction takes, and any share of the torque may be that: root mean
-    /// square of what lies evenly between none and all.
-    pub fn friction_n_m(&self) -> f64 {
-        self.torque_n_m * if self.loaded { 0.1 } else { 1.0 / 3.0_f64.sqrt() }
     }
 
     /// A rig of no size: names and units of parameters do not depend on it.
@@ -77,7 +68,6 @@ impl Scale {
         turned_rad: f64::INFINITY,
         angle_rad: [0.0; 2],
         reverses: true,
-        loaded: true,
     };
 }
 

@@ -28,9 +28,8 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 
 /// Never negative: friction gives no energy away. Less than the rig states is told by its own number, within its tolerance.
 fn parameters(scale: &Scale) -> Vec<Spec> {
-    let [full, usual] =
-        [scale.torque_n_m, scale.friction_n_m()].map(|torque| torque / scale.shaft_speed_rad_s);
-    vec![Spec::strength("viscous_friction_nm_s", "N m s", 0.02 * full, 0.0, full).sigma(usual)]
+    let full = scale.torque_n_m / scale.shaft_speed_rad_s;
+    vec![Spec::strength("viscous_friction_nm_s", "N m s", 0.02 * full, 0.0, full).sigma(0.1 * full)]
 }
 
 struct ViscousFriction<T> {

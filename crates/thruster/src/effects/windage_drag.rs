@@ -31,9 +31,8 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
 };
 
 fn parameters(scale: &Scale) -> Vec<Spec> {
-    let [full, usual] =
-        [scale.torque_n_m, scale.friction_n_m()].map(|torque| torque / scale.shaft_speed_rad_s.powi(2));
-    vec![Spec::strength("windage_nm_s2", "N m s^2", 0.03 * full, 0.0, full).sigma(usual)]
+    let full = scale.torque_n_m / scale.shaft_speed_rad_s.powi(2);
+    vec![Spec::strength("windage_nm_s2", "N m s^2", 0.03 * full, 0.0, full).sigma(0.1 * full)]
 }
 
 struct WindageDrag<T> {

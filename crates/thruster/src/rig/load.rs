@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::keys::is_known;
 use super::read::Reader;
-use super::{Quantity, Rig, RigError};
+use super::{Quantity, RigError};
 use crate::parameters::Parameter;
 
 /// What else hangs on the shaft (`[load]`, its `kind` first).
@@ -47,18 +47,6 @@ pub enum Load {
         /// Incline, rad, positive where turning ahead lifts.
         incline_rad: Quantity,
     },
-}
-
-impl Rig {
-    /// Whether a propeller or a stated load takes torque while the shaft turns steadily; else all of it is friction's.
-    pub fn is_loaded(&self) -> bool {
-        self.propeller.is_some()
-            || match self.load {
-                Load::None | Load::TwoMass { .. } => false,
-                Load::Pendulum { .. } | Load::Fan { .. } => true,
-                Load::Slide { incline_rad, .. } => incline_rad.value != 0.0,
-            }
-    }
 }
 
 impl Load {

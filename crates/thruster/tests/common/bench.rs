@@ -75,7 +75,6 @@ impl Bench {
             turned_rad: f64::INFINITY,
             angle_rad: [0.0; 2],
             reverses: true,
-            loaded: true,
         };
         Self { rig, stimulus: Stimulus { ticks, logs }, scale }
     }

@@ -121,7 +121,6 @@ pub fn bench(name: &'static str, text: &str) -> Bench {
             turned_rad: f64::INFINITY,
             angle_rad: [0.0; 2],
             reverses: true,
-            loaded: true,
         },
         rig,
         parameters,

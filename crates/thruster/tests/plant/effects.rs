@@ -154,7 +154,6 @@ fn cogging_has_several_orders_at_once() {
         turned_rad: f64::INFINITY,
         angle_rad: [0.0; 2],
         reverses: true,
-        loaded: true,
     };
     let mut values = vec![0.0; (cogging.parameters)(&scale).len()];
     let lines = [(72.0, 0.05, 0.03), (18.0, -0.02, 0.0), (12.0, 0.0, 0.01), (144.0, 0.004, 0.0)];
