@@ -63,7 +63,8 @@ impl<T: Real> Effect<T> for CurrentSaturation<T> {
     }
 
     fn drive(&mut self, _: &Tick, drive: &mut Drive<T>) {
-        if !drive.current_limit_a.re().is_finite() {
+        // A rig may state the effect and no limit: nothing is cut off then.
+        if !drive.current_limit_a.re().is_finite() && self.limit_taken_a > 0.0 {
             drive.current_limit_a = self.limit_taken_a;
         }
         drive.current_limit_a *= T::ONE - self.cut;

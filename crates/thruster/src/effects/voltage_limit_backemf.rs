@@ -113,7 +113,8 @@ impl<T: Real> Effect<T> for VoltageLimit<T> {
 
     fn drive(&mut self, _: &Tick, drive: &mut Drive<T>) {
         drive.voltage_limited = true;
-        if !drive.supply_v.re().is_finite() {
+        // A rig may state the effect and no supply: nothing runs out then.
+        if !drive.supply_v.re().is_finite() && self.supply_taken_v > 0.0 {
             drive.supply_v = self.supply_taken_v;
         }
         drive.supply_v *= T::ONE - self.lost_share;

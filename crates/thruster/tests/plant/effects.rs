@@ -185,8 +185,34 @@ fn a_voltage_drive_stops_at_its_supply() {
     assert!((limited / free - 10.0 / 14.0).abs() < 1e-3, "{limited} {free}");
     let recorded = top(&[("voltage_limit_backemf", &[0.0, 1.0, 0.0])], Some(7.0));
     assert!((recorded / free - 0.5).abs() < 1e-3, "{recorded}");
+    // A supply that the rig states is what there is, whatever is taken for one that is not stated.
+    let taken = top(&[("voltage_limit_backemf", &[0.0, 1.0, 3.0])], None);
+    assert_eq!(taken, limited);
     let sagging = top(&[("supply_sag", &[4.0, 0.0, 1.0])], None);
     assert!(sagging < 0.999 * free && sagging > 0.8 * free, "{sagging} {free}");
+}
+
+/// A current drive whose rig states neither supply nor limit ends at what is taken for them, and at nothing where nothing is.
+#[test]
+fn limits_that_a_rig_does_not_state_are_where_they_are_taken() {
+    let rig = Rig::from_toml(
+        "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = 0.01\ntorque_constant_nm_a = 1.0\n\
+         winding_resistance_ohm = 2.0\nviscous_friction_nm_s = 0.1\n[amplifier]\nkind = \"current\"\n",
+    )
+    .unwrap();
+    let top = |effect: (&str, &[f64])| {
+        let mut plant = plant(&rig, &[effect], TICK_S);
+        (0..2000).for_each(|_| plant.step(&Tick { command: 5.0, ..Tick::default() }));
+        plant.truth().shaft_speed_rad_s
+    };
+    // 5 A against 0.1 N m s: 50 rad/s, where it would take 60 V.
+    for free in [top(("voltage_limit_backemf", &[0.1, 1.0, 0.0])), top(("current_saturation", &[0.1, 0.0]))] {
+        assert!((free - 50.0).abs() < 0.1, "{free}");
+    }
+    let limited = top(("voltage_limit_backemf", &[0.5, 1.0, 60.0]));
+    assert!((limited - 25.0).abs() < 0.1, "{limited}");
+    let cut = top(("current_saturation", &[0.2, 5.0]));
+    assert!((cut - 40.0).abs() < 0.1, "{cut}");
 }
 
 /// A speed is differenced from the encoder's angle and filtered, whatever moves the encoder.
