@@ -242,7 +242,7 @@ fn what_hides_below_what_a_strong_name_is_excused_for_shows_at_a_second_look() {
         &encoder_filter_lag::DESCRIPTOR,
         &torque_ripple_cogging::DESCRIPTOR,
     ];
-    for (cogging_n_m, shows) in [(5e-5, false), (1.1e-4, true)] {
+    for (cogging_n_m, shows) in [(5e-5, false), (1.5e-4, true)] {
         with_search_of(recording(|angle| cogging_n_m * (angle + 1.0).sin()), effects.clone(), |search| {
             let nothing = Set::new();
             search.hold(&nothing, "");
