@@ -188,8 +188,12 @@ mod tests {
     use crate::posterior::Fitted;
 
     fn decided(costs: &[(&[&'static str], f64)], circumstances: &Circumstances) -> Decision {
-        let of =
-            |(set, cost): &(&[&'static str], f64)| Fitted { set: set.to_vec(), alone: *cost, cost: *cost };
+        let of = |(set, cost): &(&[&'static str], f64)| Fitted {
+            set: set.to_vec(),
+            alone: *cost,
+            cost: *cost,
+            unfinished: false,
+        };
         let constants =
             PosteriorConstants { surprise: 5.0, beside_unknown: 0.75, ..Constants::built_in().posterior };
         let fitted = costs.iter().map(of).collect();

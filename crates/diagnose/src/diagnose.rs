@@ -1,5 +1,7 @@
 //! The diagnosis: prepare, search, decide, check on held-out data, and write the report.
 
+use std::collections::BTreeMap;
+
 use kort_identify::data::{DataError, Series, available};
 use kort_identify::hypothesis::Hypothesis;
 use kort_identify::setup::Setup;
@@ -9,12 +11,13 @@ use kort_thruster::rig::Rig;
 use serde::Serialize;
 
 use crate::constants::Constants;
-use crate::left;
-use crate::posterior::{Explanation, Fitted, NEAR, Posterior};
+use crate::posterior::{Fitted, Posterior};
 use crate::report::Report;
 use crate::search::{Search, Set};
 use crate::traces::Traces;
+use crate::unfinished::unfinished;
 use crate::unknown;
+use crate::words;
 use crate::write::Writer;
 
 /// How to diagnose.
@@ -83,44 +86,33 @@ pub fn diagnose(
     }
     progress("looking for what has no name");
     unknown::look(&mut search, &best, rig, &offered, progress);
-    let (explanations, set_aside) = explanations(&search, &constants);
-    if set_aside {
-        notes.push(
-            "the odds alone do not part the baseline from what is told; it is set aside because it leaves more than noise of such sensors can be"
-                .into(),
-        );
-    }
+    progress("weighing what leaves more than noise");
+    let before = explanations(&search, &constants, &BTreeMap::new());
+    let unfinished = unfinished(&search, &before);
+    let explanations = explanations(&search, &constants, &unfinished);
+    let told = |posterior: &Posterior| posterior.told().map(|e| e.set().clone());
+    notes.extend(words::overtaken(told(&before).as_ref(), told(&explanations).as_ref()));
     progress("scoring on held-out data");
     let evidence = search.fits.iter().map(|(set, fit)| Evidence {
         effects: set.clone(),
         cost: fit.cost(),
-        rarity: search.rarity(set),
+        rarity: search.rarity(set) + unfinished.get(set).unwrap_or(&0.0),
     });
     let evidence = evidence.collect();
     let (report, traces) = Writer::new(&search, explanations, &series, rig, options).write(notes, thin);
     Ok(Diagnosis { report, traces, evidence })
 }
 
-/// Probabilities of all sets that were fitted. What the baseline alone leaves is no noise of sensors where it is larger than
-/// theirs or follows the machine; where it is likeliest all the same and a set near it leaves none of that, it is set
-/// aside, and it is said that it was: a constant is one fact, however plain it is.
-fn explanations(search: &Search, constants: &Constants) -> (Posterior, bool) {
-    let of = |keep: &dyn Fn(&Set) -> bool| {
-        let kept = search.fits.iter().filter(|(set, _)| keep(set));
-        let fitted =
-            kept.map(|(set, fit)| Fitted { set: set.clone(), alone: fit.cost(), cost: search.cost(set) });
-        Posterior::new(fitted.collect(), search.temper(), &constants.posterior)
-    };
-    let all = of(&|_| true);
-    let leaves_more = |set: &Set| left::leaves_more(search.problem, &search.fits[set]);
-    let Some(likeliest) = all.told().filter(|e| e.set().is_empty() && leaves_more(e.set())) else {
-        return (all, false);
-    };
-    let near = |e: &&Explanation| !e.set().is_empty() && e.probability >= NEAR * likeliest.probability;
-    if !all.sets.iter().filter(near).any(|e| !leaves_more(e.set())) {
-        return (all, false);
-    }
-    (of(&|set| !set.is_empty()), true)
+/// Probabilities of all sets that were fitted. Some leave more than noise; what must be there beside those makes them rarer.
+fn explanations(search: &Search, constants: &Constants, beside: &BTreeMap<Set, f64>) -> Posterior {
+    let temper = search.temper();
+    let fitted = search.fits.iter().map(|(set, fit)| Fitted {
+        set: set.clone(),
+        alone: fit.cost(),
+        cost: search.cost(set) + 2.0 * temper * beside.get(set).unwrap_or(&0.0),
+        unfinished: beside.contains_key(set),
+    });
+    Posterior::new(fitted.collect(), temper, &constants.posterior)
 }
 
 /// Effects that can act here and are no part of the baseline.

@@ -27,6 +27,7 @@ mod search;
 #[cfg(test)]
 mod stand;
 pub mod traces;
+mod unfinished;
 mod unknown;
 mod unparted;
 mod words;

@@ -1,5 +1,8 @@
 //! What descriptors of terms without a name have in common: no words of a catalogue, and prior odds of a fifth.
 
+/// Odds that physics without a name is at work, before any data: rarer than what the catalogue holds.
+pub const COMMONNESS: f64 = 0.2;
+
 macro_rules! nameless {
     ($($field:ident: $value:expr,)*) => {
         Descriptor {
@@ -7,7 +10,7 @@ macro_rules! nameless {
             confused_with: &[],
             separated_by: "",
             reference: "",
-            commonness: 0.2,
+            commonness: crate::nameless::COMMONNESS,
             shifts_time: false,
             nonparametric: true,
             same_as: &[],

@@ -13,8 +13,10 @@ pub struct Fitted {
     pub set: Set,
     /// What the recordings and its sizes cost it: twice the negative log of its evidence.
     pub alone: f64,
-    /// Its cost with the prior odds of its members.
+    /// Its cost with the prior odds of its members, and of what else must be there.
     pub cost: f64,
+    /// Whether it leaves more than noise: then something without a name must be there.
+    pub unfinished: bool,
 }
 
 /// A set of effects with what speaks for it.
@@ -49,6 +51,8 @@ pub fn doubt(constants: &PosteriorConstants, effects: usize, gain: f64) -> f64 {
 
 /// Gains below this are none, whatever the data.
 const LEAST_GAIN: f64 = 1.0;
+/// Odds of one to one.
+const EVEN: f64 = 1.0;
 
 /// All sets that were fitted, likeliest first.
 #[derive(Clone, Debug, PartialEq)]
@@ -178,12 +182,15 @@ impl Posterior {
     }
 
     /// Doubt of a set's member by what the recordings cost more without it: the least of what was fitted of the others.
-    /// None was where the baseline is set aside; what is gained is not known then and the odds are even.
+    /// Where that leaves more than noise and the set does not, the cost does not tell what is gained: the odds are even then
+    /// at the worst, as they are where none of the others was fitted.
     fn doubt_in(&self, explanation: &Explanation, member: &str) -> f64 {
-        let set = explanation.set();
+        let Fitted { set, alone, unfinished, .. } = &explanation.fitted;
         let smaller = |e: &&Explanation| e.set().iter().all(|id| *id != member && set.contains(id));
-        let least = self.sets.iter().filter(smaller).map(|e| e.fitted.alone).reduce(f64::min);
-        least.map_or(1.0, |least| doubt(&self.constants, set.len(), least - explanation.fitted.alone))
+        let others = self.sets.iter().filter(smaller).map(|e| &e.fitted);
+        let Some(least) = others.min_by(|a, b| a.alone.total_cmp(&b.alone)) else { return EVEN };
+        let doubt = doubt(&self.constants, set.len(), least.alone - alone);
+        if least.unfinished && !unfinished { doubt.min(EVEN) } else { doubt }
     }
 }
 
@@ -196,9 +203,12 @@ mod tests {
     }
 
     fn of(costs: &[(&[&'static str], f64)], temper: f64) -> Posterior {
-        let fitted =
-            costs.iter().map(|(set, cost)| Fitted { set: set.to_vec(), alone: *cost, cost: *cost }).collect();
-        Posterior::new(fitted, temper, &constants())
+        let all = costs.iter().map(|(set, cost)| fitted(set, *cost, false)).collect();
+        Posterior::new(all, temper, &constants())
+    }
+
+    fn fitted(set: &[&'static str], cost: f64, unfinished: bool) -> Fitted {
+        Fitted { set: set.to_vec(), alone: cost, cost, unfinished }
     }
 
     #[test]
@@ -290,5 +300,16 @@ mod tests {
     fn where_nothing_smaller_stands_the_odds_are_even() {
         let all = of(&[(&["a"], 0.0), (&["b"], 90.0)], 1.0);
         assert!((all.in_place(Beside::Nothing).probability("a") - 0.5).abs() < 1e-9);
+    }
+
+    #[test]
+    fn where_the_smaller_set_leaves_more_than_noise_the_odds_are_even_at_the_worst() {
+        let at = |gain: f64, unfinished: bool, both: bool| {
+            let all = vec![fitted(&["a"], 0.0, both), Fitted { cost: 90.0, ..fitted(&[], gain, unfinished) }];
+            Posterior::new(all, 1.0, &constants()).in_place(Beside::Nothing).probability("a")
+        };
+        assert!((at(2.0, true, false) - 0.5).abs() < 1e-9);
+        assert!(at(2.0, false, false) < 0.1 && at(2.0, true, true) < 0.1);
+        assert!(at(300.0, true, false) > 0.9, "what is gained all the same counts");
     }
 }

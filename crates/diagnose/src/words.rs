@@ -14,6 +14,7 @@ use crate::locate;
 use crate::report::{
     Alternative, Baseline, EmpiricalTerm, Finding, Mismatch, NextExperiment, Remainder, Verdict,
 };
+use crate::search::Set;
 
 /// Standard deviations from what is stated beyond which a coefficient is spoken of.
 const STRAINED: f64 = 2.6;
@@ -105,6 +106,18 @@ pub fn nrmse(problem: &Problem, residual: &Stack) -> BTreeMap<String, f64> {
         .into_iter()
         .map(|(name, (sum, n))| (name.to_string(), (sum / n.max(1) as f64).sqrt() / full[name]))
         .collect()
+}
+
+/// That something else would be told if what it leaves could be noise.
+pub fn overtaken(by_odds: Option<&Set>, told: Option<&Set>) -> Option<String> {
+    let (by_odds, told) = (by_odds?, told?);
+    (by_odds != told).then(|| {
+        let names: Vec<String> = by_odds.iter().map(|id| plain(id)).collect();
+        format!(
+            "by its odds {} would be told; it leaves more than noise of such sensors can be, so something without a name would have to act beside it, and that has odds of its own",
+            if names.is_empty() { "the baseline alone".into() } else { names.join(" and ") }
+        )
+    })
 }
 
 /// A name that is likely and of no size.
