@@ -66,13 +66,17 @@ pub fn evidence(
 /// are made of it.
 pub fn why_not(worse: f64, gained: f64, temper: f64, nothing_found: bool) -> String {
     let odds = (worse / (2.0 * temper)).exp();
-    let odds = if odds < 1e6 { format!("odds of {odds:.1} to 1") } else { "more than a million to 1".into() };
+    let odds = match odds {
+        few if few < 10.0 => format!("odds of {few:.1} to 1"),
+        many if many < 1e6 => format!("odds of {many:.0} to 1"),
+        _ => "odds of more than a million to 1".into(),
+    };
     let against = format!("in twice the log-evidence, which counts as {odds} against it");
     if nothing_found {
         return format!("adding it costs {worse:.0} more than it gains, {against}");
     }
-    let of = if gained > 0.0 { format!(" (of {gained:.0} gained in all)") } else { String::new() };
-    format!("the best set with it is worse by {worse:.0}{of}, {against}")
+    let of = if gained > 0.0 { format!(" (it gains {gained:.0} over the baseline)") } else { String::new() };
+    format!("the best set with it is worse than the best of all{of} by {worse:.0}, {against}")
 }
 
 /// A nameless term with its numbers.

@@ -168,11 +168,11 @@ impl Prepared {
         }
         let usual_s = gaps.iter().sum::<f64>() / gaps.len() as f64;
         let (what, of) = match self.driving {
-            Driving::Command(_) => ("the command", "a delay of the drive"),
-            _ => ("what drives the model", "how late a response comes"),
+            Driving::Command(_) => ("steps of the command", "a delay of the drive"),
+            _ => ("jumps of what drives the model", "how late a response comes"),
         };
         Some(format!(
-            "{}: {} of {} steps of {what} may fall between rows, {usual_s:.3} s apart in the mean; where each lay is fitted, so {of} within that shows only in part: log {what} at the control rate",
+            "{}: {} of {} {what} lie somewhere between a row and the one before it, {usual_s:.3} s apart in the mean; where is fitted, so {of} within that shows only in part: a log at the control rate would tell",
             self.name,
             gaps.len(),
             self.edges.len(),

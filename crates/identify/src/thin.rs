@@ -36,7 +36,7 @@ pub struct Thin {
 impl Thin {
     /// What is told of them follows no channel better than a shaft at rest does.
     pub fn unpredicted() -> Self {
-        let why = "nothing that was recorded follows what drives: with all that would be told, no channel is followed better than by a thruster at rest. The log may be too slow for its command, or its columns may belong to different machines or times";
+        let why = "nothing that was recorded follows what drives: with all that would be told, no channel is followed better than by a machine at rest. The log may be too slow for its command, or its columns may belong to different machines or times";
         Self { why: why.into(), still: true, of_the_log: false }
     }
 }
@@ -52,7 +52,7 @@ pub fn too_thin(recordings: &[Prepared], rig: &Rig) -> Option<Thin> {
     if recordings.iter().all(|recording| is_still(recording, &limits)) {
         let driver = recordings.first().map_or("", |recording| recording.driving.column());
         let why = format!(
-            "nothing moves: {driver} and what answers it show no more than sensors do at rest; record the thruster at work"
+            "nothing moves: {driver} and what answers it show no more than sensors do at rest; record the machine at work"
         );
         return Some(Thin { why, still: true, of_the_log: false });
     }

@@ -23,8 +23,7 @@ pub(super) fn spikes(series: &Series, name: &str, column: &[f64], out: &mut Chec
     let found: Vec<usize> = known
         .into_iter()
         .filter(|k| {
-            let alone = (column[k - 1] - column[k + 1]).abs() < 0.2 * jump(*k);
-            usual > 0.0 && jump(*k) > limit && alone && !turns_round(&commands, *k)
+            usual > 0.0 && jump(*k) > limit && alone(column, *k, jump(*k)) && !turns_round(&commands, *k)
         })
         .collect();
     if let Some(first) = found.first() {
@@ -36,6 +35,16 @@ pub(super) fn spikes(series: &Series, name: &str, column: &[f64], out: &mut Chec
         ));
         found.into_iter().for_each(|k| out.masked[k] = true);
     }
+}
+
+/// Whether a row alone stands out by so much: its neighbours are near each other and near theirs, as those of a pulse that
+/// the log has three rows of are not.
+fn alone(column: &[f64], row: usize, by: f64) -> bool {
+    let near = |a: usize, b: usize| {
+        let step = column.get(a).zip(column.get(b)).map_or(0.0, |(a, b)| (a - b).abs());
+        !step.is_finite() || step < 0.2 * by
+    };
+    near(row - 1, row + 1) && (row < 2 || near(row - 2, row - 1)) && near(row + 1, row + 2)
 }
 
 /// Whether a command goes one way and back again from row to row about this one: what follows it then does so too.
@@ -76,5 +85,22 @@ mod tests {
             "{}",
             notes(&current)
         );
+    }
+
+    #[test]
+    fn a_pulse_that_has_neighbours_is_no_spike() {
+        let rig = Rig::from_toml(
+            "[propeller]\nkind = \"none\"\n[motor]\ninertia_kg_m2 = 0.01\ntorque_constant_nm_a = 1.0\n",
+        )
+        .unwrap();
+        let left_out = |pulse: [f64; 3]| {
+            let mut current: Vec<f64> = (0..2000).map(|k| 1.5 * (0.02 * k as f64).sin()).collect();
+            pulse.iter().enumerate().for_each(|(j, by)| current[1050 + j] += by);
+            let time_s = (0..2000).map(|k| 0.01 * k as f64).collect();
+            let log = Series { name: "log".into(), time_s, columns: vec![("current_a".into(), current)] };
+            check(&log, &rig).masked.iter().filter(|masked| **masked).count()
+        };
+        assert_eq!(left_out([0.0, 9.0, 0.0]), 1);
+        assert_eq!(left_out([4.0, 9.0, 4.0]), 0, "a braking current that lasts three rows");
     }
 }

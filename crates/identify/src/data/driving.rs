@@ -31,10 +31,11 @@ pub(super) fn choose_driving(series: &Series, rig: &Rig, speed_driven: bool) -> 
     if varies("current_a") && varies("shaft_speed_rad_s")
         || varies("current_a") && rig.amplifier.kind != AmplifierKind::Speed
     {
-        // Noise of its sensor never turned the shaft: what makes it weaker would pass for physics.
+        // Noise of its sensor never turned the shaft: what makes it weaker would pass for physics. And a command that is held
+        // from a shaft at rest on is a step.
         let noise = series.column("current_a").is_some_and(is_noise);
         return Some(match commands.iter().find(held) {
-            Some(command) if noise => Driving::Command(command),
+            Some(command) if noise || starts_from_rest(series) => Driving::Command(command),
             _ => Driving::Current,
         });
     }
@@ -56,6 +57,17 @@ pub(super) fn choose_driving(series: &Series, rig: &Rig, speed_driven: bool) -> 
         Some(command) => Driving::Command(command),
         None => Driving::Speed,
     })
+}
+
+/// A shaft stands where it turns by less than this share of its fastest.
+const STANDING: f64 = 0.02;
+
+/// Whether the shaft stands at the first row and turns later.
+fn starts_from_rest(series: &Series) -> bool {
+    let Some(column) = series.column("shaft_speed_rad_s") else { return false };
+    let mut speeds = column.iter().filter(|v| v.is_finite()).map(|v| v.abs());
+    let fastest = speeds.clone().fold(0.0, f64::max);
+    speeds.next().is_some_and(|first| first < STANDING * fastest)
 }
 
 /// A command that is recorded for a drive of another kind than the rig's, and the rig's kind, where the log has none of its
@@ -178,6 +190,27 @@ mod tests {
         assert_eq!(of(3.0, 0.0), Some(Driving::Command("current_cmd_a")));
         assert_eq!(of(3.0, 0.02), Some(Driving::Current), "a current that wanders turned the shaft");
         assert_eq!(of(0.0, 0.0), Some(Driving::Current), "no command is known");
+    }
+
+    #[test]
+    fn a_command_that_is_held_from_rest_on_is_a_step() {
+        let rig =
+            Rig::from_toml(include_str!("../../../../config/thrusters/whitcomb-yoerger-1999.toml")).unwrap();
+        let of = |first_rad_s: f64| {
+            let settles = |k: usize| (-0.02 * k as f64).exp();
+            let columns = vec![
+                ("current_cmd_a".into(), vec![3.0; 500]),
+                ("current_a".into(), (0..500).map(|k| 3.0 - settles(k)).collect()),
+                (
+                    "shaft_speed_rad_s".into(),
+                    (0..500).map(|k| 40.0 - (40.0 - first_rad_s) * settles(k)).collect(),
+                ),
+            ];
+            let time_s = (0..500).map(|k| 0.01 * k as f64).collect();
+            choose_driving(&Series { name: "log".into(), time_s, columns }, &rig, false)
+        };
+        assert_eq!(of(0.0), Some(Driving::Command("current_cmd_a")));
+        assert_eq!(of(9.0), Some(Driving::Current), "what turned it before is not known");
     }
 
     #[test]
