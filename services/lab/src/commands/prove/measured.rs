@@ -22,6 +22,8 @@ const CHANGED: usize = 3;
 /// # Errors
 /// A folder, key or rig that cannot be read; an output file that cannot be written.
 pub fn run(folder: &Path, prove: &Prove) -> Result<Outcome, Failure> {
+    // What the checkout comes to while this runs is another program.
+    let stamp = stamp::stamp();
     let sets = read(folder, &prove.set)?;
     let catalogue: Vec<&str> = kort_thruster::effects::ALL.iter().map(|effect| effect.id).collect();
     let jobs: Vec<(&Set, &File, bool)> = sets
@@ -49,7 +51,7 @@ pub fn run(folder: &Path, prove: &Prove) -> Result<Outcome, Failure> {
     let results = jobs.par_iter().map(one).collect::<Result<Vec<_>, _>>()?;
     drop(bar);
     let (compared, hidden): (Vec<Compared>, Vec<Vec<Concealed>>) = results.into_iter().unzip();
-    let measured = Measured::new(stamp::stamp(), compared, hidden.into_iter().flatten().collect());
+    let measured = Measured::new(stamp, compared, hidden.into_iter().flatten().collect());
     // The result is printed whatever becomes of its page.
     let written = prove.markdown.as_ref().map_or(Ok(()), |path| {
         write_text(path, &placed(path, &measured.markdown())?)?;
