@@ -27,7 +27,7 @@ pub fn left_aside(
 fn swinging(verdict: Verdict, problem: &Problem) -> Option<String> {
     let whole = problem.scale.turned_rad >= std::f64::consts::TAU;
     (!whole && verdict != Verdict::NoMismatch).then(|| {
-        "an eccentric encoder and friction by position are not looked for: the shaft made no whole turn, so nothing tells that what follows its angle comes again. Record one if it may turn. A weight that hangs on it belongs into the rig's [load]".into()
+        "an eccentric encoder and friction by position are not looked for: the shaft made no whole turn, so nothing tells that what follows its angle comes again. Record whole turns if it may turn; if an arm swings on it instead, see that the rig states its weight as [load]".into()
     })
 }
 

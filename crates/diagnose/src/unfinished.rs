@@ -14,7 +14,8 @@ use crate::nameless::COMMONNESS;
 use crate::posterior::Posterior;
 use crate::search::{Search, Set};
 
-/// Sets that are less likely than this share of the likeliest move no probability that is printed, whether they pay or not.
+/// Of sets that are less likely than this share of the likeliest it is not asked: whether they pay moves what is printed by a
+/// few hundredths of itself.
 const MATTERS: f64 = 0.01;
 
 /// Negative log of the prior odds of what else must be there beside a set, for each set that leaves more than noise, of those
