@@ -37,14 +37,14 @@ pub(super) fn spikes(series: &Series, name: &str, column: &[f64], out: &mut Chec
     }
 }
 
-/// Whether a row alone stands out by so much: its neighbours are near each other and near theirs, as those of a pulse that
-/// the log has three rows of are not.
+/// Whether a row alone stands out by so much: its neighbours are near each other, and on one side at least near theirs, as those
+/// of a pulse that the log has three rows of are not.
 fn alone(column: &[f64], row: usize, by: f64) -> bool {
     let near = |a: usize, b: usize| {
         let step = column.get(a).zip(column.get(b)).map_or(0.0, |(a, b)| (a - b).abs());
         !step.is_finite() || step < 0.2 * by
     };
-    near(row - 1, row + 1) && (row < 2 || near(row - 2, row - 1)) && near(row + 1, row + 2)
+    near(row - 1, row + 1) && (row < 2 || near(row - 2, row - 1) || near(row + 1, row + 2))
 }
 
 /// Whether a command goes one way and back again from row to row about this one: what follows it then does so too.
@@ -101,6 +101,7 @@ mod tests {
             check(&log, &rig).masked.iter().filter(|masked| **masked).count()
         };
         assert_eq!(left_out([0.0, 9.0, 0.0]), 1);
+        assert_eq!(left_out([9.0, 0.0, 9.0]), 2, "two of three rows");
         assert_eq!(left_out([4.0, 9.0, 4.0]), 0, "a braking current that lasts three rows");
     }
 }
