@@ -3,6 +3,7 @@
 use kort_thruster::rig::{AmplifierKind, Rig};
 
 use super::fill::filled;
+use super::start::starts_from_rest;
 use super::{Driving, FEWEST_ROWS, Response, Series};
 
 /// The driving column, by preference: a command that fits the drive, then measured current, then speed; and
@@ -57,17 +58,6 @@ pub(super) fn choose_driving(series: &Series, rig: &Rig, speed_driven: bool) -> 
         Some(command) => Driving::Command(command),
         None => Driving::Speed,
     })
-}
-
-/// A shaft stands where it turns by less than this share of its fastest.
-const STANDING: f64 = 0.02;
-
-/// Whether the shaft stands at the first row and turns later.
-fn starts_from_rest(series: &Series) -> bool {
-    let Some(column) = series.column("shaft_speed_rad_s") else { return false };
-    let mut speeds = column.iter().filter(|v| v.is_finite()).map(|v| v.abs());
-    let fastest = speeds.clone().fold(0.0, f64::max);
-    speeds.next().is_some_and(|first| first < STANDING * fastest)
 }
 
 /// A command that is recorded for a drive of another kind than the rig's, and the rig's kind, where the log has none of its

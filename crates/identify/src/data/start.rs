@@ -9,13 +9,9 @@ const STANDING_SHARE: f64 = 0.1;
 /// shaft that stands although something is asked for was asked just now, and for nothing until then. A logger that a
 /// drive's enabling starts begins so.
 pub(super) fn start_state(series: &Series, prepared: &Prepared) -> ([f64; 4], Option<f64>) {
-    let first =
-        |name: &str| series.column(name).and_then(|c| c.iter().take(10).copied().find(|v| v.is_finite()));
-    let speed_scale = series
-        .column("shaft_speed_rad_s")
-        .map_or(0.0, |c| c.iter().filter(|v| v.is_finite()).fold(0.0_f64, |m, v| m.max(v.abs())));
+    let first = |name: &str| first_of(series, name);
     let (speed, angle) = (first("shaft_speed_rad_s").unwrap_or(0.0), first("shaft_angle_rad").unwrap_or(0.0));
-    if speed.abs() < 0.01 * speed_scale || speed_scale == 0.0 {
+    if starts_from_rest(series) || fastest(series) == 0.0 {
         let asked = prepared.command.first().copied().unwrap_or(0.0);
         let range = prepared.command.iter().fold(0.0_f64, |m, c| m.max(c.abs()));
         let just_now =
@@ -35,6 +31,24 @@ pub(super) fn start_state(series: &Series, prepared: &Prepared) -> ([f64; 4], Op
     let asked = if prepared.driving == Driving::Power { None } else { prepared.command.first().copied() };
     let current = first("current_a").or(asked).unwrap_or(0.0);
     ([speed, flow, current, angle], None)
+}
+
+/// A shaft stands where it turns by less than this share of its fastest.
+const STANDING: f64 = 0.01;
+
+/// Whether the shaft stands at the first row and turns later.
+pub(super) fn starts_from_rest(series: &Series) -> bool {
+    first_of(series, "shaft_speed_rad_s").unwrap_or(0.0).abs() < STANDING * fastest(series)
+}
+
+/// Fastest that the shaft was recorded to turn, rad/s; zero where no speed is.
+fn fastest(series: &Series) -> f64 {
+    let of = |column: &[f64]| column.iter().filter(|v| v.is_finite()).fold(0.0_f64, |m, v| m.max(v.abs()));
+    series.column("shaft_speed_rad_s").map_or(0.0, of)
+}
+
+fn first_of(series: &Series, name: &str) -> Option<f64> {
+    series.column(name)?.iter().take(10).copied().find(|v| v.is_finite())
 }
 
 #[cfg(test)]
