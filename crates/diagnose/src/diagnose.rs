@@ -92,6 +92,7 @@ pub fn diagnose(
     let explanations = explanations(&search, &constants, &unfinished);
     let told = |posterior: &Posterior| posterior.told().map(|e| e.set().clone());
     notes.extend(words::overtaken(told(&before).as_ref(), told(&explanations).as_ref()));
+    notes.extend(told(&explanations).and_then(|set| search.in_disguise(&set)).map(words::disguised));
     progress("scoring on held-out data");
     let evidence = search.fits.iter().map(|(set, fit)| Evidence {
         effects: set.clone(),

@@ -126,18 +126,35 @@ pub fn at_its_best(problem: &Problem, fit: &Fit) -> Fit {
 /// Effects of a fit that do less, on every channel, than our equations may err by, each with what it does at most over
 /// full scale: such a name would be one for the error of an equation.
 pub fn negligible(problem: &Problem, fit: &Fit, actions: &[Vec<f64>]) -> Vec<(&'static str, f64)> {
-    // The form error alone: doubts of stamps and of what runs between samples are no error of an equation.
-    let signal: Vec<f64> = problem.spectrum.bands.iter().map(|band| band.signal).collect();
-    let share = problem.criterion.form_error.powi(2);
-    let signals = problem.spectrum.variances(&signal);
+    let signals = signals(problem);
     let small = |(member, action): (&Member, &Vec<f64>)| {
         let acts = problem.spectrum.variances(action);
-        let mut channels = acts.iter().flatten().zip(signals.iter().flatten());
-        let full = problem.recordings.iter().flat_map(|r| &r.channels).map(|c| c.full_scale);
-        let most = acts.iter().flatten().zip(full).map(|(v, full)| v.sqrt() / full).fold(0.0, f64::max);
-        channels.all(|(acts, signal)| *acts < share * signal).then_some((member.effect.id, most))
+        within_form_error(problem, &acts, &signals).then(|| (member.effect.id, largest(problem, action)))
     };
     sized(problem, fit, actions).filter_map(small).collect()
+}
+
+/// Whether an action, as powers of the spectrum's bands, does less on every channel than our equations may err by.
+pub fn is_negligible(problem: &Problem, action: &[f64]) -> bool {
+    within_form_error(problem, &problem.spectrum.variances(action), &signals(problem))
+}
+
+/// What an action does at most on any channel, over full scale.
+pub fn largest(problem: &Problem, action: &[f64]) -> f64 {
+    let acts = problem.spectrum.variances(action);
+    let full = problem.recordings.iter().flat_map(|r| &r.channels).map(|c| c.full_scale);
+    acts.iter().flatten().zip(full).map(|(v, full)| v.sqrt() / full).fold(0.0, f64::max)
+}
+
+fn signals(problem: &Problem) -> Vec<Vec<f64>> {
+    let signal: Vec<f64> = problem.spectrum.bands.iter().map(|band| band.signal).collect();
+    problem.spectrum.variances(&signal)
+}
+
+/// The form error alone: doubts of stamps and of what runs between samples are no error of an equation.
+fn within_form_error(problem: &Problem, acts: &[Vec<f64>], signals: &[Vec<f64>]) -> bool {
+    let share = problem.criterion.form_error.powi(2);
+    acts.iter().flatten().zip(signals.iter().flatten()).all(|(acts, signal)| *acts < share * signal)
 }
 
 /// Effects of a fit that have a size, with what they do.

@@ -14,6 +14,7 @@ macro_rules! nameless {
             shifts_time: false,
             nonparametric: true,
             same_as: &[],
+            holds: &[],
             forms: &[],
             $($field: $value,)*
         }

@@ -14,7 +14,7 @@ use crate::locate;
 use crate::report::{
     Alternative, Baseline, EmpiricalTerm, Finding, Mismatch, NextExperiment, Remainder, Verdict,
 };
-use crate::search::Set;
+use crate::search::{Disguised, Set};
 
 /// Standard deviations from what is stated beyond which a coefficient is spoken of.
 const STRAINED: f64 = 2.6;
@@ -130,6 +130,16 @@ pub fn negligible(id: &str, share: f64) -> String {
         "{} would fit, but does no more than {:.2} % of full scale, less than the equations themselves may err: it is not stated",
         capital(&plain(id)),
         100.0 * share
+    )
+}
+
+/// A name that the data would rather have than a plainer one, and that is hardly more than it.
+pub fn disguised(disguised: Disguised) -> String {
+    format!(
+        "{} would fit better than {}, but differs from it by no more than {:.2} % of full scale, less than the equations themselves may err: the plainer name is stated",
+        capital(&plain(disguised.effect)),
+        plain(disguised.plainer),
+        100.0 * disguised.share
     )
 }
 

@@ -6,12 +6,16 @@ mod elsewhere;
 mod every_start;
 mod expand;
 mod forms;
+mod plainer;
+mod price;
 mod relatives;
 mod second_look;
 mod stand_in;
 #[cfg(test)]
 mod tests;
 mod two_at_once;
+
+pub use plainer::Disguised;
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -23,8 +27,7 @@ use kort_thruster::effects::Descriptor;
 use rayon::prelude::*;
 
 use crate::constants::{Constants, PosteriorConstants, SearchConstants};
-use crate::flexible::{TERMS, is_term};
-use crate::posterior;
+use crate::flexible::TERMS;
 use crate::probe::{Probe, probe, ways};
 use crate::screen::Screened;
 
@@ -64,6 +67,8 @@ pub struct Search<'a, 'p> {
     ways: Vec<usize>,
     /// Least noise that a set is held to: of all sets under no name, lower ones under effects without a size.
     floors: BTreeMap<&'static str, Floor>,
+    /// Names that do no more than a plainer one, by the set with that in their place.
+    disguised: BTreeMap<Set, Disguised>,
     constants: SearchConstants,
     odds: PosteriorConstants,
 }
@@ -84,51 +89,10 @@ impl<'a, 'p> Search<'a, 'p> {
             probes: BTreeMap::new(),
             ways: Vec::new(),
             floors: BTreeMap::new(),
+            disguised: BTreeMap::new(),
             constants: constants.search,
             odds: constants.posterior,
         }
-    }
-
-    /// Cost of a set: of its fit, and of the prior odds of each effect.
-    pub fn cost(&self, set: &Set) -> f64 {
-        self.fits.get(set).map_or(f64::INFINITY, |fit| self.cost_of(fit) + self.prior(set))
-    }
-
-    fn prior(&self, set: &Set) -> f64 {
-        set.iter().map(|id| self.price_of(id)).sum()
-    }
-
-    /// What speaks against a set before any data, as a natural logarithm.
-    pub fn rarity(&self, set: &Set) -> f64 {
-        set.iter().map(|id| self.rarity_of(id)).sum()
-    }
-
-    /// An effect is one of the catalogue, more or less common. What has no name is rarer than all of them together, and
-    /// at one of the places where it may be.
-    fn rarity_of(&self, id: &str) -> f64 {
-        let commonness = self.descriptor(id).map_or(1.0, |d| d.commonness);
-        let alike = if is_term(id) { TERMS.len() } else { self.effects.len().max(1) };
-        (alike as f64 / commonness).ln()
-    }
-
-    /// What a choice among the ways in which an effect may act costs, on the scale on which a fit prices its numbers:
-    /// an order of the shaft's angle is a number that happens to be whole.
-    fn choice_of(&self, id: &str) -> f64 {
-        let place = self.effects.iter().position(|e| e.id == id);
-        2.0 * place.and_then(|k| self.ways.get(k)).map_or(0.0, |ways| (*ways as f64).ln())
-    }
-
-    /// What one more member adds to a cost before any data. Costs are tempered as a whole where they become
-    /// odds, so the logarithm of its prior odds counts that much more among them.
-    pub fn price_of(&self, id: &str) -> f64 {
-        2.0 * self.temper() * self.rarity_of(id) + self.choice_of(id)
-    }
-
-    /// How far costs count as odds, as far as is known by now.
-    pub fn temper(&self) -> f64 {
-        let baseline = self.fits.get(&Set::new()).map_or(f64::NAN, Fit::cost);
-        let least = self.fits.values().map(Fit::cost).fold(f64::INFINITY, f64::min);
-        posterior::temper(&self.odds, baseline - least)
     }
 
     /// An effect or term of any set.
@@ -365,6 +329,9 @@ impl<'a, 'p> Search<'a, 'p> {
     fn keep(&mut self, set: Set, fit: Fit) {
         let (known, cost) = (self.fits.get(&set).map(|known| self.cost_of(known)), self.cost_of(&fit));
         if fit.broke_down() || known.is_some_and(|known| known <= cost) {
+            return;
+        }
+        if self.is_plainer(&set, &fit) {
             return;
         }
         // What was seen from a worse place, with the command's steps elsewhere, is looked at again.

@@ -61,6 +61,7 @@ impl Search<'_, '_> {
             probes: self.probes.clone(),
             ways: self.ways.clone(),
             floors: floors.collect(),
+            disguised: BTreeMap::new(),
             constants: self.constants,
             odds: self.odds,
         };

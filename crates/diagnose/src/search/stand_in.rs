@@ -50,7 +50,7 @@ impl Search<'_, '_> {
 }
 
 /// An effect that begins with the sizes of another on the same path: each with the mean of those of its unit.
-fn taking_over(effect: &'static Descriptor, old: &Member, scale: &Scale) -> Member {
+pub(super) fn taking_over(effect: &'static Descriptor, old: &Member, scale: &Scale) -> Member {
     let mut new = Member::new(effect, scale);
     if effect.path != old.effect.path {
         return new;

@@ -23,6 +23,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     shifts_time: false,
     nonparametric: false,
     same_as: &[],
+    holds: &[],
     forms: &[&[0], &[1], &[0, 1], &[2, 3, 4], &[0, 2, 3, 4]],
     parameters,
     starts: |scale| {

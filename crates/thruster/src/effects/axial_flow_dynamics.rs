@@ -23,6 +23,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     shifts_time: false,
     nonparametric: false,
     same_as: &[],
+    holds: &[],
     forms: &[],
     parameters,
     starts: |_| vec![vec![1.0, 1.0, 1.0, 2.5, 1.0]],

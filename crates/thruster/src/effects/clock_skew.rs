@@ -30,6 +30,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     shifts_time: true,
     nonparametric: false,
     same_as: &[],
+    holds: &[],
     forms: &[&[0], &[1], &[2], &[3], &[0, 4], &[1, 4], &[2, 4], &[3, 4]],
     parameters,
     starts: |_| [0.04, 0.12].iter().map(|delay| vec![*delay, *delay, *delay, *delay, 0.0]).collect(),

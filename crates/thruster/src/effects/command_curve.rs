@@ -27,6 +27,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     shifts_time: false,
     nonparametric: false,
     same_as: &[],
+    holds: &[],
     forms: &[&[0], &[0, 1], &[3, 4, 5, 6]],
     parameters,
     starts: |scale| {

@@ -21,6 +21,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     shifts_time: false,
     nonparametric: false,
     same_as: &[],
+    holds: &[],
     forms: &[],
     parameters,
     starts: |scale| [0.05, 0.25, 0.4, 0.6].iter().map(|cut| vec![*cut, limit_taken_a(scale)]).collect(),

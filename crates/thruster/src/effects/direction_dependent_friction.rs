@@ -27,6 +27,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     shifts_time: false,
     nonparametric: false,
     same_as: &[&["coulomb_friction", "torque_channel_bias"], &["coulomb_friction", "viscous_friction"]],
+    holds: &["coulomb_friction"],
     forms: &[&[0, 1], &[2, 3], &[0, 1, 2, 3]],
     parameters,
     starts: |scale| {

@@ -26,6 +26,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     shifts_time: false,
     nonparametric: false,
     same_as: &[],
+    holds: &[],
     forms: &[],
     parameters,
     starts: |_| [0.4, 0.9].map(|share| vec![share]).to_vec(),

@@ -28,6 +28,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     shifts_time: false,
     nonparametric: false,
     same_as: &[],
+    holds: &[],
     forms: &[&[0], &[1], &[2], &[0, 1], &[1, 2]],
     parameters,
     starts: one_start,

@@ -24,6 +24,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     shifts_time: false,
     nonparametric: false,
     same_as: &[],
+    holds: &[],
     forms: &[&[0, 1], &[2, 3], &[0, 1, 2, 3]],
     parameters,
     starts: |_| [1.0, 0.0].map(|disc| vec![0.01, 0.01, 0.01, 0.01, disc]).to_vec(),

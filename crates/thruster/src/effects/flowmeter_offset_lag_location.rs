@@ -24,6 +24,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     shifts_time: false,
     nonparametric: false,
     same_as: &[],
+    holds: &[],
     forms: &[&[2], &[3], &[2, 3], &[0, 4], &[1, 4], &[0, 1, 4], &[0, 1, 2, 3, 4]],
     parameters,
     starts: |scale| {

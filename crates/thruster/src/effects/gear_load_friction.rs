@@ -27,6 +27,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     shifts_time: false,
     nonparametric: false,
     same_as: &[],
+    holds: &[],
     forms: &[&[0], &[0, 1]],
     parameters,
     starts: |_| vec![vec![0.1, 1.0], vec![0.25, 1.0], vec![0.25, 0.0]],

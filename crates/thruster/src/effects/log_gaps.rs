@@ -19,6 +19,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     shifts_time: false,
     nonparametric: false,
     same_as: &[],
+    holds: &[],
     forms: &[],
     parameters: |_| Vec::new(),
     starts: one_start,

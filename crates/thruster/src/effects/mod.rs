@@ -158,6 +158,8 @@ pub struct Descriptor {
     /// Sets of effects that do together exactly what this one does, under any excitation, at all of its sizes or where they
     /// are alike: no recording parts them.
     pub same_as: &'static [&'static [&'static str]],
+    /// Plainer effects that this one becomes at some of its values: friction that hardly differs by direction is dry friction.
+    pub holds: &'static [&'static str],
     /// Which of its parameters make sense without the others, by their places; none listed: all together.
     /// Those left out of a form stay at their prior means. See [`Descriptor::forms`].
     pub forms: &'static [&'static [usize]],

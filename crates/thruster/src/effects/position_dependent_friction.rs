@@ -21,6 +21,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     shifts_time: false,
     nonparametric: false,
     same_as: &[],
+    holds: &["coulomb_friction"],
     forms: &[&[0, 1, 2], &[0, 3, 4], &[0, 1, 2, 3, 4]],
     parameters,
     starts: |scale| {

@@ -27,6 +27,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     shifts_time: false,
     nonparametric: false,
     same_as: &[],
+    holds: &[],
     forms: &[],
     parameters,
     starts: |_| vec![vec![0.1, 0.08], vec![0.1, 1.5]],

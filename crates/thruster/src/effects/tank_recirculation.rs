@@ -19,6 +19,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     shifts_time: false,
     nonparametric: false,
     same_as: &[],
+    holds: &[],
     forms: &[],
     parameters,
     starts: |_| vec![vec![0.05, 2.0], vec![0.05, 4.0], vec![0.05, 20.0], vec![0.05, 50.0]],

@@ -23,6 +23,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     shifts_time: false,
     nonparametric: false,
     same_as: &[],
+    holds: &[],
     forms: &[&[0], &[0, 1]],
     parameters,
     starts: |_| vec![vec![0.003, 0.0], vec![0.03, 0.0], vec![0.1, 0.0]],

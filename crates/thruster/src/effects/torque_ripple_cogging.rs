@@ -41,6 +41,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     shifts_time: false,
     nonparametric: false,
     same_as: &[],
+    holds: &[],
     forms: FORMS,
     parameters,
     starts,

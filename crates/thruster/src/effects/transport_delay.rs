@@ -19,6 +19,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     shifts_time: true,
     nonparametric: false,
     same_as: &[],
+    holds: &[],
     forms: &[],
     parameters,
     starts: |_| [0.02, 0.05, 0.1].map(|delay| vec![delay]).to_vec(),

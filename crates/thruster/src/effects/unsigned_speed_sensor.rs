@@ -20,6 +20,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     shifts_time: false,
     nonparametric: false,
     same_as: &[],
+    holds: &[],
     forms: &[],
     parameters: |_: &Scale| vec![Spec::switch("unsigned")],
     starts: one_start,

@@ -23,6 +23,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     shifts_time: false,
     nonparametric: false,
     same_as: &[],
+    holds: &[],
     forms: &[&[0], &[0, 1]],
     parameters,
     starts: |_| vec![vec![0.5, 0.2], vec![0.5, 1.5]],

@@ -21,6 +21,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     shifts_time: false,
     nonparametric: false,
     same_as: &[],
+    holds: &[],
     forms: &[&[0], &[0, 1]],
     parameters,
     starts,
