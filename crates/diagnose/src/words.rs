@@ -65,6 +65,9 @@ pub fn evidence(
 /// Why an effect was set aside: how much worse the best set with it is, what the best set gains in all, and the odds that
 /// are made of it.
 pub fn why_not(worse: f64, gained: f64, temper: f64, nothing_found: bool) -> String {
+    if worse == 0.0 && !nothing_found {
+        return "nothing explains the recordings better: it is not stated because they have too little in them".into();
+    }
     let odds = (worse / (2.0 * temper)).exp();
     let odds = match odds {
         few if few < 10.0 => format!("odds of {few:.1} to 1"),
