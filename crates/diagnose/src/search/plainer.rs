@@ -5,7 +5,7 @@ use kort_identify::hypothesis::Member;
 use kort_thruster::effects::{Descriptor, Scale};
 
 use super::stand_in::taking_over;
-use super::{Search, Set};
+use super::{Search, Set, with, without};
 use crate::left::{is_negligible, largest};
 
 /// A name that does no more than a plainer one.
@@ -27,7 +27,9 @@ impl Search<'_, '_> {
     pub(super) fn is_plainer(&mut self, set: &Set, fit: &Fit) -> bool {
         let problem = self.problem;
         let members = problem.members(&fit.hypothesis, &fit.values);
-        for (at, member) in members.iter().enumerate() {
+        // What the rig states or the user takes for given is no member of the set.
+        let asked = |(_, member): &(usize, &Member)| set.contains(&member.effect.id);
+        for (at, member) in members.iter().enumerate().filter(asked) {
             for plainer in member.effect.holds.iter().filter_map(|id| self.descriptor(id)) {
                 let place = in_place_of(&members, at, plainer, &problem.scale);
                 let (hypothesis, columns) = problem.recompose(fit, &place);
@@ -36,8 +38,8 @@ impl Search<'_, '_> {
                 if !is_negligible(problem, &between) {
                     continue;
                 }
-                let mut smaller: Set = place.iter().map(|m| m.effect.id).collect();
-                smaller.sort_unstable();
+                let rest = without(set, member.effect.id);
+                let smaller = if rest.contains(&plainer.id) { rest } else { with(&rest, plainer.id) };
                 let cost = self.cost_of(fit) + self.prior(set);
                 if self.disguised.get(&smaller).is_none_or(|known| cost < known.cost) {
                     let share = largest(problem, &between);
