@@ -48,6 +48,8 @@ pub struct Differs {
     /// That channel: of those that were recorded, where it shows on one.
     channel: &'static str,
     recorded: bool,
+    /// Fastest that the shaft turns on it in either model, over the fastest that was recorded.
+    fastest: f64,
     /// The signal's scenario, with what was found in force.
     pub scenario: Scenario,
     /// The signal, in an engineer's words.
@@ -58,7 +60,12 @@ impl Differs {
     /// How much shows at most, and where.
     pub fn most(&self) -> String {
         let record = if self.recorded { "" } else { ", which was not recorded: record it" };
-        format!("{:.1} % of full scale in {}{record}", 100.0 * self.difference, self.channel)
+        let size = if self.difference < 1.0 {
+            format!("{:.1} % of full scale", 100.0 * self.difference)
+        } else {
+            "more than the full scale".into()
+        };
+        format!("{size} in {}{record}", self.channel)
     }
 
     /// What to run: this signal, or what the catalogue advises where it shows nothing.
@@ -77,6 +84,14 @@ impl Differs {
                 self.words
             )
         };
+        let why = if shows && self.fastest > RUNS_AWAY {
+            format!(
+                "{why}. In this model the shaft would reach {:.0} times the fastest speed that was recorded: run it at a share of its levels, or under a speed loop",
+                self.fastest
+            )
+        } else {
+            why
+        };
         Some(NextExperiment {
             separates: separates.map(str::to_string).collect(),
             excitation: if shows { self.words } else { advice }.into(),
@@ -93,7 +108,9 @@ pub fn where_they_differ(search: &Search, rig: &Rig, best: &Set, other: &Set) ->
         let scenario: Scenario = toml::from_str(text).ok()?;
         let a = respond(&scenario, rig, search, mine)?;
         let b = respond(&scenario, rig, search, theirs)?;
-        Some((scenario, *words, differences(&a, &b, &search.problem.scale)))
+        let fastest = [&a, &b].map(|speed| speed[0].iter().fold(0.0_f64, |m, s| m.max(s.abs())));
+        let fastest = fastest[0].max(fastest[1]) / search.problem.scale.shaft_speed_rad_s;
+        Some((scenario, *words, differences(&a, &b, &search.problem.scale), fastest))
     };
     let signals = SIGNALS.iter().filter(|signal| rig.propeller.is_some() || **signal != TOW);
     let all: Vec<_> = signals.filter_map(differ).collect();
@@ -103,17 +120,31 @@ pub fn where_they_differ(search: &Search, rig: &Rig, best: &Set, other: &Set) ->
         let each = all
             .iter()
             .enumerate()
-            .flat_map(|(k, (.., by))| by.iter().enumerate().map(move |(c, d)| (k, c, *d)));
-        each.filter(|(_, c, _)| recorded[*c] || !recorded_only).max_by(|x, y| x.2.total_cmp(&y.2))
+            .flat_map(|(k, (_, _, by, _))| by.iter().enumerate().map(move |(c, d)| (k, c, *d)));
+        // Where a shaft runs away everything differs by much: a run that keeps it goes before.
+        let keeps = |k: usize| all[k].3 <= RUNS_AWAY;
+        each.filter(|(_, c, _)| recorded[*c] || !recorded_only).max_by(|x, y| {
+            (keeps(x.0) && x.2 >= SHOWS).cmp(&(keeps(y.0) && y.2 >= SHOWS)).then(x.2.total_cmp(&y.2))
+        })
     };
     let (k, c, difference) = most(true).filter(|most| most.2 >= SHOWS).or_else(|| most(false))?;
-    let (scenario, words, _) = &all[k];
+    let (scenario, words, _, fastest) = &all[k];
     let scenario = with_effects(scenario.clone(), search, mine);
-    Some(Differs { difference, channel: CHANNELS[c], recorded: recorded[c], scenario, words })
+    Some(Differs {
+        difference,
+        channel: CHANNELS[c],
+        recorded: recorded[c],
+        fastest: *fastest,
+        scenario,
+        words,
+    })
 }
 
 /// Difference over full scale below which a signal shows nothing.
 const SHOWS: f64 = 0.003;
+/// Times the fastest speed recorded that a shaft may turn at on a test signal: full command takes a propeller that was logged at a
+/// ninth of it so far, and a dry shaft that nothing brakes further with every second.
+const RUNS_AWAY: f64 = 3.0;
 
 /// The rig with a largest command where it states none: as much as was recorded.
 fn with_largest_command(rig: &Rig, scale: &Scale, torque_constant_nm_a: f64) -> Rig {
@@ -226,12 +257,35 @@ mod tests {
         let (text, words) = STAIRCASE;
         let told = |difference: f64| {
             let scenario = toml::from_str(text).unwrap();
-            let differs = Differs { difference, channel: "current_a", recorded: false, scenario, words };
+            let (channel, recorded, fastest) = ("current_a", false, 1.0);
+            let differs = Differs { difference, channel, recorded, fastest, scenario, words };
             differs.told(["a", "b"].into_iter(), "how far".into(), "known weights on the stand").unwrap()
         };
         let (shown, not) = (told(2.0 * SHOWS), told(0.5 * SHOWS));
         assert!(shown.excitation == words && shown.why.contains("known weights"));
         assert_eq!(not.excitation, "known weights on the stand");
         assert!(not.why.contains(words) && !not.scenario.is_null());
+    }
+
+    #[test]
+    fn of_a_shaft_that_runs_away_no_multiple_of_its_full_scale_is_told() {
+        let (text, words) = STAIRCASE;
+        let told = |difference: f64, fastest: f64| {
+            let scenario = toml::from_str(text).unwrap();
+            let differs = Differs {
+                difference,
+                channel: "shaft_speed_rad_s",
+                recorded: true,
+                fastest,
+                scenario,
+                words,
+            };
+            let size = differs.most();
+            differs.told(["a"].into_iter(), size, "a coast-down").unwrap().why
+        };
+        let (kept, away) = (told(0.2, 1.5), told(40.0, 120.0));
+        assert!(kept.contains("20.0 % of full scale") && !kept.contains("speed loop"), "{kept}");
+        assert!(away.contains("more than the full scale in shaft_speed_rad_s"), "{away}");
+        assert!(away.contains("120 times the fastest speed"), "{away}");
     }
 }
