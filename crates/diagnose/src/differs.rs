@@ -100,34 +100,37 @@ pub fn where_they_differ(search: &Search, rig: &Rig, best: &Set, other: &Set) ->
         let b = respond(&scenario, rig, search, theirs)?;
         let fastest = [&a, &b].map(|speed| speed[0].iter().fold(0.0_f64, |m, s| m.max(s.abs())));
         let fastest = fastest[0].max(fastest[1]) / search.problem.scale.shaft_speed_rad_s;
-        Some((scenario, *words, differences(&a, &b, &search.problem.scale), fastest))
+        Some(Tried { scenario, words, differences: differences(&a, &b, &search.problem.scale), fastest })
     };
     let signals = SIGNALS.iter().filter(|signal| rig.propeller.is_some() || **signal != TOW);
-    let all: Vec<_> = signals.filter_map(differ).collect();
+    let mut all: Vec<Tried> = signals.filter_map(differ).collect();
     let channels: Vec<_> = search.problem.recordings.iter().flat_map(|r| &r.channels).collect();
     let recorded = CHANNELS.map(|channel| channels.iter().any(|c| c.response.name() == channel));
     let most = |recorded_only: bool| {
         let each = all
             .iter()
             .enumerate()
-            .flat_map(|(k, (_, _, by, _))| by.iter().enumerate().map(move |(c, d)| (k, c, *d)));
+            .flat_map(|(k, tried)| tried.differences.iter().enumerate().map(move |(c, d)| (k, c, *d)));
         // Where a shaft runs away everything differs by much: a run that keeps it goes before.
-        let keeps = |k: usize| all[k].3 <= RUNS_AWAY;
+        let keeps = |k: usize| all[k].fastest <= RUNS_AWAY;
         each.filter(|(_, c, _)| recorded[*c] || !recorded_only).max_by(|x, y| {
             (keeps(x.0) && x.2 >= SHOWS).cmp(&(keeps(y.0) && y.2 >= SHOWS)).then(x.2.total_cmp(&y.2))
         })
     };
     let (k, c, difference) = most(true).filter(|most| most.2 >= SHOWS).or_else(|| most(false))?;
-    let (scenario, words, _, fastest) = &all[k];
-    let scenario = with_effects(scenario.clone(), search, mine);
-    Some(Differs {
-        difference,
-        channel: CHANNELS[c],
-        recorded: recorded[c],
-        fastest: *fastest,
-        scenario,
-        words,
-    })
+    let Tried { scenario, words, fastest, .. } = all.swap_remove(k);
+    let scenario = with_effects(scenario, search, mine);
+    Some(Differs { difference, channel: CHANNELS[c], recorded: recorded[c], fastest, scenario, words })
+}
+
+/// A test signal on which two sets were simulated.
+struct Tried {
+    scenario: Scenario,
+    words: &'static str,
+    /// Root mean square over full scale, by channel.
+    differences: [f64; 5],
+    /// Fastest that the shaft turns in either, over the fastest that was recorded.
+    fastest: f64,
 }
 
 /// Difference over full scale below which a signal shows nothing.

@@ -62,12 +62,13 @@ pub fn evidence(
     out
 }
 
+/// Why a member of the best set is not stated.
+pub const TOO_LITTLE: &str =
+    "nothing explains the recordings better: it is not stated because they have too little in them";
+
 /// Why an effect was set aside: how much worse the best set with it is, what the best set gains in all, and the odds that
 /// are made of it.
 pub fn why_not(worse: f64, gained: f64, temper: f64, nothing_found: bool) -> String {
-    if worse == 0.0 && !nothing_found {
-        return "nothing explains the recordings better: it is not stated because they have too little in them".into();
-    }
     let odds = (worse / (2.0 * temper)).exp();
     let odds = match odds {
         few if few < 10.0 => format!("odds of {few:.1} to 1"),
@@ -137,7 +138,7 @@ pub fn negligible(id: &str, share: f64) -> String {
 }
 
 /// A name that the data would rather have than a plainer one, and that is hardly more than it.
-pub fn disguised(disguised: Disguised) -> String {
+pub fn disguised(disguised: &Disguised) -> String {
     format!(
         "{} would fit better than {}, but differs from it by no more than {:.2} % of full scale, less than the equations themselves may err: the plainer name is stated",
         capital(&plain(disguised.effect)),

@@ -361,15 +361,13 @@ impl<'a, 'p> Writer<'a, 'p> {
         others
             .into_iter()
             .take(ALTERNATIVES)
-            .map(|(probability, cost, effect)| Alternative {
-                effect: effect.into(),
-                probability,
-                why_not: words::why_not(
-                    (cost - best_cost).max(0.0),
-                    empty_cost - best_cost,
-                    self.search.temper(),
-                    self.best.is_empty(),
-                ),
+            .map(|(probability, cost, effect)| {
+                let (worse, gained) = ((cost - best_cost).max(0.0), empty_cost - best_cost);
+                let why_not = match self.best.contains(&effect) {
+                    true => words::TOO_LITTLE.into(),
+                    false => words::why_not(worse, gained, self.search.temper(), self.best.is_empty()),
+                };
+                Alternative { effect: effect.into(), probability, why_not }
             })
             .collect()
     }

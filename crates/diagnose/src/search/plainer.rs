@@ -9,7 +9,7 @@ use super::{Search, Set, with, without};
 use crate::left::{is_negligible, largest};
 
 /// A name that does no more than a plainer one.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Disguised {
     /// The name.
     pub effect: &'static str,
@@ -17,8 +17,10 @@ pub struct Disguised {
     pub plainer: &'static str,
     /// By how much they differ at most, over full scale.
     pub share: f64,
-    /// What the set costs with the name, its prior odds counted.
-    cost: f64,
+    /// The set with the name.
+    set: Set,
+    /// What that costs, its prior odds not counted: they move with the temper.
+    alone: f64,
 }
 
 impl Search<'_, '_> {
@@ -40,11 +42,13 @@ impl Search<'_, '_> {
                 }
                 let rest = without(set, member.effect.id);
                 let smaller = if rest.contains(&plainer.id) { rest } else { with(&rest, plainer.id) };
-                let cost = self.cost_of(fit) + self.prior(set);
-                if self.disguised.get(&smaller).is_none_or(|known| cost < known.cost) {
+                let alone = self.cost_of(fit);
+                let known = self.disguised.get(&smaller).map(|known| known.alone + self.prior(&known.set));
+                if known.is_none_or(|known| alone + self.prior(set) < known) {
                     let share = largest(problem, &between);
                     let (effect, plainer) = (member.effect.id, plainer.id);
-                    self.disguised.insert(smaller.clone(), Disguised { effect, plainer, share, cost });
+                    let disguised = Disguised { effect, plainer, share, set: set.clone(), alone };
+                    self.disguised.insert(smaller.clone(), disguised);
                 }
                 // Where it has been fitted it may have got lost on its way.
                 if self
@@ -61,8 +65,8 @@ impl Search<'_, '_> {
     }
 
     /// The name that the data would rather have in the place of a set's plainer one, if any.
-    pub fn in_disguise(&self, set: &Set) -> Option<Disguised> {
-        self.disguised.get(set).copied().filter(|disguised| disguised.cost < self.cost(set))
+    pub fn in_disguise(&self, set: &Set) -> Option<&Disguised> {
+        self.disguised.get(set).filter(|known| known.alone + self.prior(&known.set) < self.cost(set))
     }
 }
 
