@@ -52,6 +52,8 @@ pub struct Now<'a> {
     pub current_a: f64,
     /// Shaft angle, rad.
     pub angle_rad: f64,
+    /// How far it is ahead of what lies beyond an elastic link, rad.
+    pub twist_rad: f64,
     /// Shaft speed, rad/s.
     pub speed_rad_s: f64,
     /// Axial flow, m/s.

@@ -136,6 +136,7 @@ impl Bench<'_> {
             command,
             current_a: x[CURRENT],
             angle_rad: x[ANGLE],
+            twist_rad: x[TWIST],
             speed_rad_s: x[SPEED],
             flow_m_s: x[FLOW],
             motor_torque_n_m: last.motor_n_m,

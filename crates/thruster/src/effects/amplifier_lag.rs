@@ -16,7 +16,13 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
                Tl [s] and swings: Tl^2 u'' + 2 z Tl u' + u = u* + b 2 z Tl u*', z, b [1], b = 1 for a loop without its integral part",
     signature: "every response to a command is late and rounded by a fixed time, at all amplitudes and speeds; \
                 a recorded current shows the lag itself",
-    confused_with: &["transport_delay", "encoder_filter_lag", "entrained_water_inertia", "clock_skew"],
+    confused_with: &[
+        "transport_delay",
+        "encoder_filter_lag",
+        "entrained_water_inertia",
+        "clock_skew",
+        "flexible_coupling",
+    ],
     separated_by: "a chirp: phase slope against roll-off; the recorded current",
     reference: "Whitcomb & Yoerger, Comparative Experiments in the Dynamics and Model-Based Control of Marine Thrusters (their current amplifier: 2 ms)",
     commonness: 3.0,

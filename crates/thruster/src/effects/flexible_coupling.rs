@@ -13,10 +13,10 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     path: Path::Shaft,
     what: "a belt, a long shaft or a magnetic coupling twists between motor and load: two inertias on a spring",
     equation: "with d = q1 - q2 of motor and load: d'' + 2 z wn d' + wn^2 d = (tm - tf)/I1 - tl/I2, wn^2 = 1/(k Ir), I1 = (1 - s) I, \
-               I2 = s I, Ir = s (1 - s) I; speed is measured at the motor, blades and load turn with q2; k [rad/(N m)], s, \
-               z [1]",
-    signature: "speed rings at a fixed frequency after steps of torque, resonance and antiresonance in its spectrum; the load's \
-                side rings the other way",
+               I2 = s I, Ir = s (1 - s) I; the encoder shows the motor's q1 or the load's q2, with which the blades turn; k [rad/(N m)], \
+               s, z [1]",
+    signature: "speed rings at a fixed frequency after steps of torque: at the motor resonance and antiresonance in its spectrum; at the \
+                load, which rings the other way, it is late too",
     confused_with: &["stand_resonance", "gear_backlash", "amplifier_lag", "encoder_filter_lag"],
     separated_by: "a chirp at two amplitudes (play depends on amplitude, a spring does not); a tap on the load",
     reference: "Ellis & Lorenz 2000 (IEEE IAS, resonant load control); a measured belt drive: 3.2 Hz, damping 0.15",
@@ -29,8 +29,8 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
     parameters,
     starts: |scale| {
         // A ring shows a fit the way only from near its frequency.
-        let rings = (0..16).map(|k| compliance(scale, 1.2 * 1.25_f64.powi(k)));
-        rings.filter(|k| *k <= most(scale)).map(|k| vec![k, 0.5, 0.1]).collect()
+        let rings = (0..16).map(|k| compliance(scale, 1.2 * 1.25_f64.powi(k))).filter(|k| *k <= most(scale));
+        rings.flat_map(|k| [0.0, 1.0].map(|at_load| vec![k, 0.5, 0.1, at_load])).collect()
     },
     needs: free_shaft,
     build: both!(|values, context| {
@@ -38,6 +38,7 @@ pub const DESCRIPTOR: Descriptor = Descriptor {
             values[0],
             values[1],
             values[2],
+            values[3],
             context.parameters.get(P::InertiaKgM2),
             context,
         ))
@@ -61,6 +62,7 @@ fn parameters(scale: &Scale) -> Vec<Spec> {
         Spec::strength("compliance_rad_nm", "rad/(N m)", within(12.0), 0.0, most).sigma(within(5.0)),
         Spec::shape("load_inertia_share", "1", 0.5, 0.03, 0.97).sigma(0.25),
         Spec::shape("damping_ratio", "1", 0.1, 0.01, 1.0).sigma(0.15),
+        Spec::held("encoder_at_load", "1", 0.0, 0.0, 1.0),
     ]
 }
 
@@ -73,6 +75,9 @@ pub(crate) struct Coupling<T> {
     /// Twist under a unit of accelerating difference, s^2.
     give_s2: T,
     share: T,
+    /// How far the encoder turns ahead of both together, as a share of the twist: the load's share where it sits on the motor, less
+    /// one where it sits on the load.
+    encoder_share: T,
     lever_m: T,
     inertia_kg_m2: T,
     torque_constant_nm_a: T,
@@ -88,15 +93,23 @@ pub(crate) fn of_load<T: Real>(context: &Context<T>) -> Box<dyn Effect<T>> {
     let (stiffness, both) = (p.get(P::LoadStiffnessNmRad), motor + load);
     // c = 2 z wn Ir with wn = sqrt(k/Ir).
     let damping = p.get(P::LoadDampingNmS) / ((stiffness * motor * load / both).sqrt() * 2.0);
-    Box::new(Coupling::new(stiffness.recip(), load / both, damping, both, context))
+    Box::new(Coupling::new(stiffness.recip(), load / both, damping, T::ZERO, both, context))
 }
 
 /// Largest angle of the swing that one tick may take, rad: what the integrator follows.
 const SWING_A_TICK_RAD: f64 = 0.4;
 
 impl<T: Real> Coupling<T> {
-    /// From compliance, rad/(N m), the load's share of the inertia, the damping ratio and the inertia of both.
-    pub(crate) fn new(compliance: T, share: T, damping: T, inertia_kg_m2: T, context: &Context<T>) -> Self {
+    /// From compliance, rad/(N m), the load's share of the inertia, the damping ratio, where the encoder sits (0 the motor, 1 the
+    /// load) and the inertia of both.
+    pub(crate) fn new(
+        compliance: T,
+        share: T,
+        damping: T,
+        encoder_at_load: T,
+        inertia_kg_m2: T,
+        context: &Context<T>,
+    ) -> Self {
         let give_s2 = compliance * share * (T::ONE - share) * inertia_kg_m2;
         let most = (SWING_A_TICK_RAD / context.tick_s).powi(2);
         // 1/give where that can be followed, else the most; and a stiff coupling gives next to nothing.
@@ -106,6 +119,7 @@ impl<T: Real> Coupling<T> {
             damping_1_s: damping * 2.0 * stiffness_1_s2.sqrt(),
             give_s2,
             share,
+            encoder_share: share - encoder_at_load,
             lever_m: context.parameters.get(P::RadiusM) * REFERENCE_RADIUS,
             inertia_kg_m2,
             torque_constant_nm_a: context.parameters.get(P::TorqueConstantNmA),
@@ -156,10 +170,9 @@ impl<T: Real> Effect<T> for Coupling<T> {
         (self.twist_rad, self.relative_rad_s) = (own[0], own[1]);
     }
 
-    /// The encoder sits on the motor.
     fn sense(&mut self, _: &Tick, sensed: &mut Sensed<T>) {
-        let ahead_rad = self.share * self.twist_rad;
-        sensed.shaft_speed_rad_s += self.encoder.step(ahead_rad, self.share * self.relative_rad_s);
+        let ahead_rad = self.encoder_share * self.twist_rad;
+        sensed.shaft_speed_rad_s += self.encoder.step(ahead_rad, self.encoder_share * self.relative_rad_s);
         sensed.shaft_angle_rad += ahead_rad;
     }
 }

@@ -78,8 +78,14 @@ fn cold_friction_fades_while_the_shaft_turns() {
     assert!((gain(10, 0.5) - 0.5 / INERTIA).abs() < 0.5, "warm");
 }
 
-/// Two inertias on a spring, integrated finely.
-fn two_masses(share: f64, stiffness: f64, damping: f64, torque: impl Fn(f64) -> f64, end_s: f64) -> Vec<f64> {
+/// Speeds of two inertias on a spring, motor and load, integrated finely.
+fn two_masses(
+    share: f64,
+    stiffness: f64,
+    damping: f64,
+    torque: impl Fn(f64) -> f64,
+    end_s: f64,
+) -> Vec<[f64; 2]> {
     let fine_s = 1e-6;
     let steps = (TICK_S / fine_s).round() as usize;
     let (i1, i2) = ((1.0 - share) * INERTIA, share * INERTIA);
@@ -92,7 +98,7 @@ fn two_masses(share: f64, stiffness: f64, damping: f64, torque: impl Fn(f64) -> 
                 w2 += fine_s / i2 * passed;
                 twist += fine_s * (w1 - w2);
             }
-            w1
+            [w1, w2]
         })
         .collect()
 }
@@ -105,13 +111,18 @@ fn a_flexible_coupling_is_two_inertias_on_a_spring() {
     let (stiffness, damping) = (reduced * wn * wn, 2.0 * ratio * wn * reduced);
     let torque = |t: f64| if t < 0.5 { 0.2 } else { -0.1 };
     let wanted = two_masses(share, stiffness, damping, torque, 1.0);
-    let mut plant = plant(&dry(), &[("flexible_coupling", &[1.0 / stiffness, share, ratio])], TICK_S);
-    for (k, wanted) in wanted.iter().enumerate() {
-        plant.step(&Tick { command: torque(k as f64 * TICK_S), ..Tick::default() });
-        let seen = plant.sensed().shaft_speed_rad_s;
-        assert!((seen - wanted).abs() < 0.02, "{k}: {seen} {wanted}");
+    // An encoder on the motor, then on the load.
+    for side in [0, 1] {
+        let values = [1.0 / stiffness, share, ratio, side as f64];
+        let mut plant = plant(&dry(), &[("flexible_coupling", &values)], TICK_S);
+        for (k, wanted) in wanted.iter().enumerate() {
+            plant.step(&Tick { command: torque(k as f64 * TICK_S), ..Tick::default() });
+            let (seen, wanted) = (plant.sensed().shaft_speed_rad_s, wanted[side]);
+            assert!((seen - wanted).abs() < 0.02, "{k}: {seen} {wanted}");
+        }
     }
-    assert!(wanted.iter().fold(0.0_f64, |m, w| m.max(*w)) > 9.0);
+    assert!(wanted.iter().fold(0.0_f64, |m, w| m.max(w[0])) > 9.0);
+    assert!(wanted.iter().any(|[motor, load]| (motor - load).abs() > 1.0), "it twists");
 }
 
 #[test]
@@ -219,7 +230,7 @@ fn limits_that_a_rig_does_not_state_are_where_they_are_taken() {
 #[test]
 fn a_motor_that_moves_against_its_load_is_seen_through_the_speed_filter() {
     let rig = dry_filtered();
-    let soft: (&str, &[f64]) = ("flexible_coupling", &[2.0, 0.5, 0.1]);
+    let soft: (&str, &[f64]) = ("flexible_coupling", &[2.0, 0.5, 0.1, 0.0]);
     let loose: (&str, &[f64]) = ("gear_backlash", &[0.5, 0.4, 60.0, 0.5, 0.0]);
     for effect in [soft, loose] {
         let mut plant = plant(&rig, &[effect], TICK_S);

@@ -102,7 +102,7 @@ fn two_masses_are_a_flexible_coupling() {
     let (both, reduced) = (0.004, 0.0016 * 0.0024 / 0.004);
     let damping = 0.005 / (2.0 * (2.0_f64 * reduced).sqrt());
     let whole = Rig::from_toml(&DRY.replace("0.0016", "0.004")).unwrap();
-    let mut same = plant(&whole, &[("flexible_coupling", &[0.5, 0.0024 / both, damping])], TICK_S);
+    let mut same = plant(&whole, &[("flexible_coupling", &[0.5, 0.0024 / both, damping, 0.0])], TICK_S);
     for k in 0..300 {
         let torque = if k < 100 { 0.1 } else { -0.05 };
         step(&mut ours, torque);

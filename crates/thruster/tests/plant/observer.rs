@@ -88,7 +88,7 @@ fn the_angle_is_a_response_of_a_dry_shaft_from_its_start() {
 fn a_recording_of_the_same_effect_pulls_nothing() {
     let rig = dry_filtered();
     let late: (&str, &[f64]) = ("clock_skew", &[0.0, 0.02, 0.0, 0.0, 0.0]);
-    let soft: (&str, &[f64]) = ("flexible_coupling", &[2.0, 0.5, 0.1]);
+    let soft: (&str, &[f64]) = ("flexible_coupling", &[2.0, 0.5, 0.1, 0.0]);
     let loose: (&str, &[f64]) = ("gear_backlash", &[0.5, 0.4, 60.0, 0.5, 0.0]);
     for effect in [late, soft, loose] {
         for by_angle in [true, false] {

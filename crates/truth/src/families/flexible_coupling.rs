@@ -34,6 +34,8 @@ struct Coupling {
     form: Form,
     far_share: f64,
     damping: f64,
+    /// Whether the encoder turns with the far side; a tachometer stays on the motor.
+    read_far: bool,
     far_kg_m2: f64,
     natural_rad_s: f64,
 }
@@ -51,6 +53,7 @@ fn draw(form: usize, machine: &Machine, _: &Scale, dice: &mut Dice) -> Box<dyn P
         form,
         far_share,
         damping: dice.between(0.03, 0.25),
+        read_far: machine.sensors.tachometer_noise == 0.0 && dice.chance(0.4),
         far_kg_m2: machine.inertia_kg_m2 * far_share,
         natural_rad_s: STIFF_RAD_S,
     })
@@ -72,6 +75,12 @@ impl Physics for Coupling {
         };
         let damper = 2.0 * self.damping * self.natural_rad_s * reduced;
         Some(Link { far_share: self.far_share, torque_n_m: stiffness * spring + damper * slip })
+    }
+
+    fn encoder(&mut self, now: &Now, angle_rad: &mut f64) {
+        if self.read_far {
+            *angle_rad -= now.twist_rad;
+        }
     }
 
     fn quick(&self) -> bool {
