@@ -204,6 +204,8 @@ impl Case {
                 mend();
                 return None;
             }
+            // Of a drive that is away no sensor is said to be broken.
+            assert_eq!(last.faults & Fault::SensorNotFinite.bit(), 0, "{:#x}", last.faults);
             wait("zero at the motor", || {
                 self.drive_for(bench, 5);
                 (emulator.truth().command == 0.0).then_some(())
@@ -258,6 +260,8 @@ impl Case {
                 },
             );
         }
+        let log = bench.site.log();
+        assert!(log.contains("nothing came for") && log.contains("though bytes come"), "{log}");
         // What loses nothing stops nothing.
         for mischief in harmless {
             let read = (0..6).find_map(|_| {
@@ -327,7 +331,10 @@ impl Case {
         assert_eq!(outcome, Outcome::Refused, "{answer}");
         assert!(answer.contains("drive_unguarded (code 17)"), "{answer}");
         bench.send(20, |ports, _| ports.command.send(self.command).unwrap());
-        assert_eq!(bench.ask(RequestKind::ClearFaults).0, Outcome::Refused);
+        // It answers, so it is not lost, and what it is not asked for no sensor owes.
+        let (outcome, answer) = bench.ask(RequestKind::ClearFaults);
+        assert_eq!(outcome, Outcome::Refused);
+        assert!(answer.ends_with("still there: drive_unguarded (code 17)"), "{answer}");
         assert!(emulator.driven().is_none(), "it was driven");
     }
 }

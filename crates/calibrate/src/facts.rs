@@ -32,12 +32,14 @@ fn all_inside_of(independent: f64) -> f64 {
 }
 
 impl RestReading {
-    /// Tolerance of the mean; half a step more where noise is too small to carry over it.
+    /// Tolerance of the mean; half a step more where noise is too small to carry over it. A reading that never changed is a
+    /// whole number of steps: no step is larger than it. Zero where it always read nothing: its step is not known then.
     pub fn tolerance(&self) -> f64 {
         let independent = f64::from(self.count.max(1)) / self.memory.max(1.0);
         // About the mean of the same readings they scatter a little less than about the truth.
         let error = self.sigma / (independent - 1.0).max(1.0).sqrt();
-        all_inside_of(independent) * error + if self.sigma < 0.6 * self.step { 0.5 * self.step } else { 0.0 }
+        let step = if self.step > 0.0 { self.step } else { self.mean.abs() };
+        all_inside_of(independent) * error + if self.sigma < 0.6 * step { 0.5 * step } else { 0.0 }
     }
 }
 

@@ -90,11 +90,20 @@ pub fn steps(facts: &Facts, estimate: Option<&Estimate>) -> Vec<StepReport> {
     let mut out = Vec::new();
     if !facts.rest.is_empty() {
         let zeros = [("thrust_n", "N"), ("flow_m_s", "m/s"), ("torque_n_m", "N m"), ("current_a", "A")];
-        let zeros = zeros.into_iter().filter(|(signal, _)| facts.measures(signal)).map(|(signal, unit)| {
+        let mut zeros_of =
+            step("zeros", "the shaft stands; every sensor's reading at rest".into(), Vec::new());
+        for (signal, unit) in zeros.into_iter().filter(|(signal, _)| facts.measures(signal)) {
             let rest = facts.at_rest(signal);
-            stated(format!("zero_of_{signal}"), rest.mean, rest.tolerance(), unit)
-        });
-        out.push(step("zeros", "the shaft stands; every sensor's reading at rest".into(), zeros.collect()));
+            if rest.tolerance() > 0.0 {
+                let zero = stated(format!("zero_of_{signal}"), rest.mean, rest.tolerance(), unit);
+                zeros_of.quantities.push(zero);
+            } else {
+                zeros_of.skipped_because.push(format!(
+                    "{signal}: it read 0 throughout, so its zero lies within a digit, and how large that is did not show"
+                ));
+            }
+        }
+        out.push(zeros_of);
     }
     if facts.side != 0.0 {
         let words = format!(

@@ -71,13 +71,21 @@ pub enum Stop {
     },
     /// Motor and encoder agree, all that pushes says astern.
     #[error(
-        "the thruster pushes astern when it is driven ahead: {witness}\nhint: `reversed = true` in [thrusters.ID.drive] turns command, current, speed and angle together{or}"
+        "the thruster pushes astern when it is driven ahead: {witness}\nhint: `reversed = true` in [thrusters.ID.drive] turns command, current, speed and angle together"
     )]
     PushesAstern {
         /// What says so.
         witness: String,
-        /// What else it may be.
-        or: &'static str,
+    },
+    /// Motor and encoder agree, the only instrument that shows a push says astern.
+    #[error(
+        "`{signal}` or the thruster is reversed: driven ahead the shaft turns ahead and {witness}, and nothing else says which\nhint: look which way the water goes: if ahead, `scale = -1.0` for `{signal}` in [thrusters.ID.sensors.…]; if astern, `reversed = true` in [thrusters.ID.drive], which turns command, current, speed and angle together"
+    )]
+    SignalOrThrusterReversed {
+        /// The signal.
+        signal: &'static str,
+        /// What it says.
+        witness: String,
     },
     /// The shaft ran further than it was to.
     #[error(

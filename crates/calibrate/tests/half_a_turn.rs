@@ -102,7 +102,7 @@ fn found(reversed: Reversed, stop: Option<&Stop>) -> bool {
         | (Reversed::Motor, Some(Stop::MotorReversed { .. }))
         | (Reversed::Thrust, Some(Stop::SignalReversed { signal: "thrust_n", .. })) => true,
         // Without a flow meter that answers so early nothing else tells the cell from the whole thruster.
-        (Reversed::Thrust, Some(Stop::PushesAstern { or, .. })) => !or.is_empty(),
+        (Reversed::Thrust, Some(Stop::SignalOrThrusterReversed { signal, .. })) => *signal == "thrust_n",
         _ => false,
     }
 }

@@ -163,9 +163,7 @@ impl Thruster {
         self.desk().check(lease, now)?;
         self.ready()?;
         self.not_calibrated()?;
-        if let Some(fault) = Fault::in_set(self.heard().faults(now)).next() {
-            return Err(latched(fault));
-        }
+        none_latched(self.heard().faults(now))?;
         if !self.heard().armed(now) {
             self.desk().rest(now, "it was armed anew");
             // The servo arms only under a controller that asks for nothing: one that has not heard yet of a disarming
@@ -355,12 +353,16 @@ fn request(kind: RequestKind) -> Request {
     Request { kind: kind as u32, ..Request::default() }
 }
 
-fn latched(fault: Fault) -> Problem {
-    Problem::new(
-        Kind::FaultLatched,
-        format!("fault {} {} is latched: {}", fault.code(), fault.name(), fault.help()),
-    )
-    .hint("POST …/clear-faults once the cause is gone, then …/arm")
+/// Refuses while faults are latched, and names them all: the lowest code need not be the cause.
+fn none_latched(faults: u64) -> Result<(), Problem> {
+    let latched: Vec<String> = Fault::in_set(faults)
+        .map(|fault| format!("fault {} {} is latched: {}", fault.code(), fault.name(), fault.help()))
+        .collect();
+    if latched.is_empty() {
+        return Ok(());
+    }
+    let hint = "POST …/clear-faults once the cause is gone, then …/arm";
+    Err(Problem::new(Kind::FaultLatched, latched.join("; ")).hint(hint))
 }
 
 fn finite(value: f64) -> Option<f64> {

@@ -112,7 +112,9 @@ impl Devices {
                 self.shaft_read_ns = reading.stamp_ns;
             }
         }
-        if at.now_ns.saturating_sub(self.drive_read_ns) > self.drive.reading_life_ns() {
+        // One that answers and is not to be driven is not asked for readings: not lost.
+        let unguarded = faults & Fault::DriveUnguarded.bit() != 0;
+        if !unguarded && at.now_ns.saturating_sub(self.drive_read_ns) > self.drive.reading_life_ns() {
             faults |= Fault::DriveLost.bit();
         }
         for sensor in &mut self.sensors {

@@ -48,6 +48,9 @@ pub struct Inputs<'a> {
     pub devices: u64,
 }
 
+/// Faults of devices that show nothing while they last.
+const NOT_TELLING: u64 = Fault::DriveLost.bit() | Fault::DriveUnguarded.bit() | Fault::SensorLost.bit();
+
 impl Servo {
     /// A servo at rest; `started_ns` is now on CLOCK_MONOTONIC: nothing sent before counts.
     pub fn new(settings: Settings, started_ns: u64) -> Self {
@@ -90,6 +93,10 @@ impl Servo {
     /// One tick. Returns the drive for the amplifier; `None` means output stage off.
     pub fn tick(&mut self, inputs: &Inputs) -> Option<f64> {
         let mut faults = self.guard.inspect(inputs.measured, self.drive, inputs.ticks);
+        // What a device does not tell that is away, or not to be driven, is no sensor's fault.
+        if inputs.devices & NOT_TELLING != 0 {
+            faults &= !Fault::SensorNotFinite.bit();
+        }
         faults |= inputs.devices;
         self.devices = inputs.devices;
         faults |= std::mem::take(&mut self.raised);

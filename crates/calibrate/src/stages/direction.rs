@@ -148,15 +148,9 @@ pub(super) fn contradiction(facts: &Facts) -> Result<(), Stop> {
     match (thrust, flow) {
         (t, f) if t < 0.0 && f > 0.0 => return Err(against("thrust_n", " and flow goes ahead")),
         (t, f) if t > 0.0 && f < 0.0 => return Err(against("flow_m_s", " and thrust goes ahead")),
-        (t, f) if t < 0.0 && f < 0.0 => return Err(Stop::PushesAstern { witness, or: "" }),
-        (t, _) if t < 0.0 => {
-            let or = "; if it does push ahead, `thrust_n` has the wrong sign: `scale = -1.0` for it";
-            return Err(Stop::PushesAstern { witness, or });
-        }
-        (_, f) if f < 0.0 => {
-            let or = "; if it does push ahead, `flow_m_s` has the wrong sign: `scale = -1.0` for it";
-            return Err(Stop::PushesAstern { witness, or });
-        }
+        (t, f) if t < 0.0 && f < 0.0 => return Err(Stop::PushesAstern { witness }),
+        (t, _) if t < 0.0 => return Err(Stop::SignalOrThrusterReversed { signal: "thrust_n", witness }),
+        (_, f) if f < 0.0 => return Err(Stop::SignalOrThrusterReversed { signal: "flow_m_s", witness }),
         _ => (),
     }
     if torque < 0.0 {

@@ -2,9 +2,7 @@
 
 use std::time::Instant;
 
-use kort_proto::faults::Fault;
-
-use super::{Thruster, latched, lock};
+use super::{Thruster, lock, none_latched};
 use crate::calibration::{CalibrationInfo, CalibrationStep};
 use crate::problem::{Kind, Problem};
 
@@ -47,9 +45,7 @@ impl Thruster {
         self.holds(lease)?;
         self.ready()?;
         let now = Instant::now();
-        if let Some(fault) = Fault::in_set(self.heard().faults(now)).next() {
-            return Err(latched(fault));
-        }
+        none_latched(self.heard().faults(now))?;
         self.not_calibrated()?;
         if self.heard().armed(now) {
             let words = format!("thruster {} is armed; a calibration begins at rest", self.id);

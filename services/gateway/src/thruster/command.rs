@@ -3,9 +3,7 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use kort_proto::faults::Fault;
-
-use super::{Thruster, latched};
+use super::{Thruster, none_latched};
 use crate::desk::{Desk, check_range};
 use crate::excitation::Prepared;
 use crate::lease::{Lease, Wanted};
@@ -67,9 +65,7 @@ impl Thruster {
         desk.check(lease, now)?;
         self.ready()?;
         self.not_calibrated()?;
-        if let Some(fault) = Fault::in_set(heard.faults(now)).next() {
-            return Err(latched(fault));
-        }
+        none_latched(heard.faults(now))?;
         if !heard.armed(now) {
             return Err(Problem::new(
                 Kind::NotArmed,

@@ -234,7 +234,9 @@ fn found(rig: &Rig, seed: u64, drive_max: f64, share: f64, trouble: Trouble) -> 
         | (Some(Stop::NoMotion { .. }), Trouble::DeadSensor | Trouble::BlockedShaft)
         | (Some(Stop::SignalReversed { signal: "thrust_n", .. }), Trouble::ThrustReversed) => true,
         // Without a flow meter that answers so early nothing else tells the cell from the whole thruster.
-        (Some(Stop::PushesAstern { or, .. }), Trouble::ThrustReversed) => !or.is_empty(),
+        (Some(Stop::SignalOrThrusterReversed { signal, .. }), Trouble::ThrustReversed) => {
+            *signal == "thrust_n"
+        }
         _ => false,
     };
     let said = ended.stopped.map_or_else(|| "nothing".to_owned(), |stop| stop.to_string());

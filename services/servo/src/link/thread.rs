@@ -41,6 +41,8 @@ pub(super) struct Serving {
     /// The device has said something since the port was opened.
     answered: bool,
     driving: bool,
+    /// When bytes came last, on CLOCK_MONOTONIC, ns.
+    heard_ns: u64,
     /// When its time-out was confirmed, on CLOCK_MONOTONIC, ns.
     guarded_ns: u64,
     stamps: Stamps,
@@ -63,6 +65,7 @@ impl Serving {
             fault: None,
             answered: false,
             driving: false,
+            heard_ns: 0,
             guarded_ns: 0,
             stamps,
         }
@@ -122,6 +125,7 @@ impl Serving {
             port.send(&out)?;
             let silent_ns = monotonic_ns().saturating_sub(self.told.stamp_ns.max(self.guarded_ns));
             if self.told.guarded && silent_ns > self.wire.reading_life_ns {
+                self.complain(self.silence());
                 // Perhaps it still hears, though it is not heard: off, while it is known how it wants to be spoken to.
                 if std::mem::take(&mut self.driving) {
                     out.clear();
@@ -159,6 +163,20 @@ impl Serving {
         }
     }
 
+    /// What is seen of a device that gives no readings any more.
+    fn silence(&self) -> String {
+        let life_ms = self.wire.reading_life_ns / 1_000_000;
+        if monotonic_ns().saturating_sub(self.heard_ns) > self.wire.reading_life_ns / 2 {
+            return format!(
+                "nothing came for {life_ms} ms\nhint: its supply, the plug, both ends of the cable"
+            );
+        }
+        format!(
+            "no reading for {life_ms} ms, though bytes come\nhint: a line that is disturbed, another speed of the line, or another \
+             device on it"
+        )
+    }
+
     /// A new conversation: what was known of the device is known no more, its fault neither.
     fn begin(&mut self) {
         self.protocol.begin();
@@ -193,6 +211,7 @@ impl Serving {
         if bytes.is_empty() {
             return;
         }
+        self.heard_ns = monotonic_ns();
         self.converse(|protocol, heard| protocol.hear(bytes, heard));
     }
 

@@ -2,7 +2,8 @@
 //!
 //! A line is taken apart at its separators ([`columns`]), or by a regular expression whose groups are the columns
 //! (crate `regex`, whose matching time is bounded; own parsing would be a worse language of the same kind). Each column's unit
-//! must be given; a line in which any wanted column is no number, or one that cannot be, is no reading. Instruments that
+//! must be given; a line in which any wanted column is no number, or one that cannot be, is no reading, nor is one in which another unit follows the
+//! number: a switch of units on the instrument's front. Instruments that
 //! speak only when asked are sent `ask`.
 
 use std::path::PathBuf;
@@ -11,6 +12,7 @@ use kort_proto::signals::{SIGNALS, Signals};
 use regex::Regex;
 
 use super::Channel;
+use super::units::printed;
 use crate::link::{Ages, Heard, Lines, Protocol};
 
 /// Lines without a reading before the reason is said: the first one after opening is often torn.
@@ -29,8 +31,17 @@ pub struct SerialLine {
     pub ask: String,
     /// How often it is asked, Hz.
     pub rate_hz: f64,
-    /// Which column is which signal; columns count from one.
-    pub channels: Vec<Channel<usize>>,
+    /// Which column is which signal.
+    pub channels: Vec<Channel<Column>>,
+}
+
+/// A column of a line.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Column {
+    /// Its place, from one.
+    pub number: usize,
+    /// The unit that may follow it; none where the scale makes of it what it will: then the first that does.
+    pub unit: Option<&'static str>,
 }
 
 /// Listening to an instrument.
@@ -48,27 +59,29 @@ impl Listening {
     }
 
     /// The reading in a line, or which column is none.
-    fn read(&self, line: &str) -> Result<Signals, String> {
+    fn read(&mut self, line: &str) -> Result<Signals, String> {
         let groups = match &self.instrument.pattern {
             Some(pattern) => Some(pattern.captures(line).ok_or("does not match `pattern`")?),
             None => None,
         };
         let fields = if groups.is_none() { columns(line)? } else { Vec::new() };
         let mut signals = Signals::UNKNOWN;
-        for channel in &self.instrument.channels {
+        for channel in &mut self.instrument.channels {
+            let at = channel.from.number;
             let text = match &groups {
-                Some(groups) => groups.get(channel.from).map(|group| group.as_str()),
-                None => channel.from.checked_sub(1).and_then(|at| fields.get(at)).map(String::as_str),
+                Some(groups) => groups.get(at).map(|group| group.as_str()),
+                None => at.checked_sub(1).and_then(|at| fields.get(at)).map(String::as_str),
             };
-            let value = text.and_then(number);
-            let value = value.ok_or_else(|| format!("has no number in column {}", channel.from))?;
-            if let Some(signal) = SIGNALS.get(channel.place) {
-                let si = channel.si(value);
-                (signal.set)(
-                    &mut signals,
-                    si.map_err(|words| format!("in column {} {words}", channel.from))?,
-                );
+            let value = text.and_then(number).ok_or_else(|| format!("has no number in column {at}"))?;
+            let Some(signal) = SIGNALS.get(channel.place) else { continue };
+            if let Some(unit) = fields.get(at).and_then(|word| printed(word, signal.unit)) {
+                let expected = *channel.from.unit.get_or_insert(unit);
+                if unit != expected {
+                    return Err(format!("has {unit} after column {at}, and {expected} is expected"));
+                }
             }
+            let si = channel.si(value);
+            (signal.set)(&mut signals, si.map_err(|words| format!("in column {at} {words}"))?);
         }
         Ok(signals)
     }
@@ -170,7 +183,7 @@ mod tests {
     use crate::sensors::place;
     use proptest::prelude::*;
 
-    fn force(pattern: Option<&str>, from: usize) -> Listening {
+    fn force(pattern: Option<&str>, number: usize) -> Listening {
         Listening::new(SerialLine {
             port: PathBuf::new(),
             baud: 9600,
@@ -178,7 +191,7 @@ mod tests {
             ask: String::new(),
             rate_hz: 10.0,
             channels: vec![Channel {
-                from,
+                from: Column { number, unit: Some("kgf") },
                 place: place("thrust_n").unwrap(),
                 scale: -9.80665,
                 offset: 0.5,
@@ -232,6 +245,17 @@ mod tests {
         let expected = -4.2 * 9.80665 + 0.5;
         assert_eq!(thrusts(&mut force(None, 2), &[b"12,3; 4,2\r\n"]), [expected]);
         assert_eq!(thrusts(&mut force(Some(r"F=([-+,\d]+)"), 1), &[b"F=4,2 kg\n"]), [expected], "one number");
+    }
+
+    /// A switch of units on the instrument's front is a factor of two, or ten.
+    #[test]
+    fn another_unit_after_the_number_is_no_reading() {
+        let expected = -2.5 * 9.80665 + 0.5;
+        assert_eq!(thrusts(&mut force(None, 2), &[b"1 2.5 kg\n1 2.5\n1 2.5 kgf ok\n"]), [expected; 3]);
+        assert!(thrusts(&mut force(None, 2), &[b"1 2.5 lbf\n1 2.5 N\n"]).is_empty());
+        let mut any = force(None, 2);
+        any.instrument.channels[0].from.unit = None;
+        assert_eq!(thrusts(&mut any, &[b"1 2.5 N\n1 2.5 lb\n1 2.5 N\n"]).len(), 2, "the first it was");
     }
 
     #[test]

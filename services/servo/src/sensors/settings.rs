@@ -10,8 +10,8 @@ use regex::Regex;
 use serde::Deserialize;
 
 use super::iio::Iio;
-use super::serial_line::SerialLine;
-use super::units::to_si;
+use super::serial_line::{Column, SerialLine};
+use super::units::{printed, to_si};
 use super::{Channel, Plausible, place};
 use crate::claims::Claim;
 use crate::drives::{DEVICE, Wrong};
@@ -204,7 +204,11 @@ fn serial_line(keys: &Keys, plausible: &Plausible, wrong: &mut Wrong) -> Option<
             ));
             continue;
         };
-        let from = from.and_then(|from| usize::try_from(from).ok()).unwrap_or(1);
+        let number = from.and_then(|from| usize::try_from(from).ok()).unwrap_or(1);
+        // A scale may make of another unit the stated one.
+        let si = place(signal).and_then(|p| SIGNALS.get(p)).map_or("", |s| s.unit);
+        let unit_printed = printed(unit, si).filter(|_| given.scale.is_none_or(|scale| scale.abs() == 1.0));
+        let from = Column { number, unit: unit_printed };
         channels.extend(channel(signal, &key, from, unit, given, plausible, wrong));
     }
     let ask = keys.ask.clone().unwrap_or_default();

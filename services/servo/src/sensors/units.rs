@@ -45,6 +45,15 @@ pub fn to_si(unit: &str, si: &str) -> Result<(f64, f64), String> {
     })
 }
 
+/// The unit of this SI unit that a word of an instrument's line is, as it is named above: scales print masses for forces.
+pub fn printed(word: &str, si: &str) -> Option<&'static str> {
+    let word = match (word, si) {
+        ("kg" | "g" | "lb", "N") => format!("{word}f"),
+        _ => word.to_owned(),
+    };
+    UNITS.iter().find(|(printed, base, ..)| *printed == word && *base == si).map(|(name, ..)| *name)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -58,5 +67,7 @@ mod tests {
         let (factor, zero) = to_si("degF", "degC").unwrap();
         assert!((212.0 * factor + zero - 100.0).abs() < 1e-9);
         assert!(to_si("rpm", "N").unwrap_err().contains("kgf"));
+        assert_eq!([printed("kg", "N"), printed("lbf", "N")], [Some("kgf"), Some("lbf")]);
+        assert_eq!([printed("kg", "m/s"), printed("ST", "N")], [None, None]);
     }
 }

@@ -353,6 +353,15 @@ fn fault_name(code: u8) -> &'static str {
         37 => "PWM cycle overrun",
         38 => "over-temperature",
         39 => "started outside its position limits",
+        40 => "under-voltage",
+        41 => "configuration changed while it ran",
+        42 => "no encoder to commutate by",
+        43 => "no encoder of its output",
+        44 => "gate driver not enabled",
+        45 => "stop position beside limits",
+        46 => "its loop ran late",
+        47 => "back-EMF feedforward without an acceleration limit",
+        48 => "invalid limits",
         _ => "unknown to kort",
     }
 }
@@ -375,8 +384,8 @@ mod tests {
     #[test]
     fn faults_have_the_firmwares_names() {
         assert_eq!(
-            [33, 34, 38, 99].map(fault_name),
-            ["motor driver", "over-voltage", "over-temperature", "unknown to kort"]
+            [33, 34, 40, 99].map(fault_name),
+            ["motor driver", "over-voltage", "under-voltage", "unknown to kort"]
         );
     }
 }

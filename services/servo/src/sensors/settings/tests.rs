@@ -20,7 +20,8 @@ fn chosen(sensor: &str) -> Result<Vec<Chosen>, String> {
 fn a_source_is_read_with_what_it_leaves_out() {
     let line = "kind = \"serial_line\"\nport = \"/dev/ttyUSB0\"\nsignals = { thrust_n = { column = 2, unit = \"kgf\", scale = -1.0 } }";
     let Kind::SerialLine(line) = &chosen(line).unwrap()[0].kind else { panic!("no serial line") };
-    assert_eq!((line.baud, line.ask.as_str(), line.channels[0].from), (u32::try_from(BAUD).unwrap(), "", 2));
+    assert_eq!((line.baud, line.ask.as_str()), (u32::try_from(BAUD).unwrap(), ""));
+    assert_eq!(line.channels[0].from, Column { number: 2, unit: Some("kgf") });
     assert!((line.channels[0].scale + 9.806_65).abs() < 1e-12);
 }
 
