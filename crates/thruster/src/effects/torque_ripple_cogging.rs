@@ -29,7 +29,8 @@ const FORMS: &[&[usize]] = &[
 pub const DESCRIPTOR: Descriptor = Descriptor {
     id: "torque_ripple_cogging",
     path: Path::Drive,
-    what: "magnets and slots make torque vary with rotor angle: cogging (always there) and ripple (in proportion to current)",
+    what: "magnets and slots make torque vary with rotor angle: cogging (always there) and ripple (in proportion to current); at order 1 \
+           also a weight off the axis of a level shaft, which a rig states as [load]",
     equation: "tau += sum over up to six whole orders k of (As + Bs im) sin(k q) + (Ac + Bc im) cos(k q); A [N m], B [N m/A], q \
                shaft angle [rad]",
     signature: "lines at orders of shaft angle in speed and torque, their frequency follows the shaft; largest at creep speed",
