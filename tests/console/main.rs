@@ -195,6 +195,7 @@ fn a_bench_engineer_plays_signals_and_compares_runs() {
             page.show_as(theme, width);
             let wide = page.eval("document.documentElement.scrollWidth").as_u64().unwrap();
             assert!(wide <= width, "{theme} at {width} px: the page is {wide} px wide");
+            page.until("previewPlot.width === $('signal-plot').clientWidth");
             page.picture(&format!("{}/target/console-{theme}-{width}.png", env!("CARGO_MANIFEST_DIR")));
         }
         page.eval("$('run-live').click()");

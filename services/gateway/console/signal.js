@@ -23,6 +23,7 @@ function showLimit() {
   else if (Number(entry.value) > bound) entry.value = bound;
   limitPut = entry.value; $("signal-limit-unit").textContent = unitOf("limit");
 }
+const PREVIEW_HEIGHT = 120;
 let previewPlot = null, previewed = 0, scenario = null; // the chosen file: its name and text
 
 function showFields() {
@@ -64,11 +65,12 @@ async function showPreview() {
   const css = getComputedStyle(document.documentElement), color = (name) => css.getPropertyValue(name).trim();
   const axis = { stroke: color("--quiet"), grid: { stroke: color("--grid"), width: 1 }, ticks: { show: false } };
   previewPlot?.destroy();
-  previewPlot = new uPlot({ width: Math.max(200, $("signal-plot").clientWidth), height: 120, legend: { show: false }, cursor: { show: false }, scales: { x: { time: false } },
+  previewPlot = new uPlot({ width: Math.max(200, $("signal-plot").clientWidth), height: PREVIEW_HEIGHT, legend: { show: false }, cursor: { show: false }, scales: { x: { time: false } },
     axes: [{ ...axis, size: 26, values: (_, ticks) => ticks.map((t) => `${t} s`) }, { ...axis, size: 46 }], series: [{}, { stroke: color("--blue"), width: 1.5, points: { show: false } }] },
     [would.preview.map(([t]) => t), would.preview.map(([, v]) => v)], $("signal-plot"));
   $("signal-plot").setAttribute("aria-label", `course of the signal: ${would.name}, ${would.duration_s.toFixed(1)} s, up to ${would.peak.toFixed(1)} ${unit}`);
 }
+new ResizeObserver(([{ contentRect: { width } }]) => { if (previewPlot && width > 0 && width !== previewPlot.width) previewPlot.setSize({ width, height: PREVIEW_HEIGHT }); }).observe($("signal-plot"));
 function noSignal(kind, words) {
   previewPlot?.destroy(); previewPlot = null;
   $("signal-plot").setAttribute("aria-label", "no course to show");
