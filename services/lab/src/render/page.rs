@@ -4,8 +4,8 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::number;
 
-/// The whole look. Dark text on white, or light on dark for who asks for it, as the console shows it; tables and charts
-/// scroll inside their own boxes on a phone: a chart made as narrow as that could not be read.
+/// The whole look. Dark text on white, or light on dark for who asks for it, as the console shows it. On a phone tables
+/// scroll inside their own boxes; charts are as wide as the page, with larger letters, which the drawing shrinks again.
 const STYLE: &str = "
 :root { --ink: #1b2733; --soft: #5b6b7a; --line: #d8e0e7; --band: #f4f7fa; --accent: #0b6fb8; --paper: #fff; color-scheme: light dark; }
 * { box-sizing: border-box; }
@@ -25,7 +25,7 @@ thead th { border-bottom: 2px solid var(--line); white-space: nowrap; }
 td.n, th.n { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
 tbody tr:nth-child(even) { background: var(--band); }
 figure { margin: 1rem 0; }
-figure svg { max-width: 100%; min-width: 45rem; height: auto; display: block; }
+figure svg { max-width: 100%; height: auto; display: block; overflow: visible; }
 code, pre { font: .88em/1.45 ui-monospace, 'Cascadia Mono', Menlo, Consolas, monospace; }
 pre { background: var(--band); padding: .7rem .9rem; white-space: pre-wrap; overflow-wrap: anywhere; border-radius: 4px; }
 .note { border-left: 4px solid var(--accent); background: var(--band); padding: .6rem .9rem; margin: .8rem 0; }
@@ -37,6 +37,11 @@ td.bars { width: 45%; min-width: 8rem; }
 dl { display: grid; grid-template-columns: max-content 1fr; gap: .2rem 1rem; margin: .5rem 0; }
 dt { color: var(--soft); } dd { margin: 0; }
 footer { margin-top: 3rem; border-top: 1px solid var(--line); padding-top: .6rem; }
+@media screen and (max-width: 48rem) {
+  figure svg text { font-size: 15px; } figure svg text[transform] { translate: -16px 0; } }
+@media screen and (max-width: 36rem) {
+  figure svg text { font-size: 18px; } figure svg text[dy='-0.5ex'] { translate: 0 12px; }
+  figure svg text[transform] { font-size: 16px; translate: -20px 0; } }
 @media (max-width: 40rem) { body { padding: 1rem .8rem 3rem; font-size: 15px; } h1 { font-size: 1.3rem; }
   dl { grid-template-columns: 1fr; gap: 0; } dd { margin-bottom: .4rem; } }
 @media screen and (prefers-color-scheme: dark) {

@@ -89,7 +89,7 @@ impl Chart {
         let drawn = self.bounds().and_then(|bounds| self.draw_svg(&mut svg, bounds).ok());
         html! {
             figure {
-                @if drawn.is_some() { div class="scroll" { (PreEscaped(svg)) } } @else { p class="soft" { "nothing to draw" } }
+                @if drawn.is_some() { (PreEscaped(svg)) } @else { p class="soft" { "nothing to draw" } }
                 figcaption {
                     (self.caption)
                     @for (i, s) in self.series.iter().enumerate().filter(|(_, s)| !s.name.is_empty() && s.mark != Mark::Named) {
