@@ -169,10 +169,10 @@ impl Prepared {
         let usual_s = gaps.iter().sum::<f64>() / gaps.len() as f64;
         let (what, of) = match self.driving {
             Driving::Command(_) => ("steps of the command", "a delay of the drive"),
-            _ => ("jumps of what drives the model", "how late a response comes"),
+            _ => ("jumps of what drives the model", "a delay of the response"),
         };
         Some(format!(
-            "{}: {} of {} {what} lie somewhere between a row and the one before it, {usual_s:.3} s apart in the mean; where is fitted, so {of} within that shows only in part: a log at the control rate would tell",
+            "{}: {} of {} {what} fell between two rows of the log, {usual_s:.3} s apart in the mean. At which instant between them is fitted too, so {of} shorter than that shows only in part: a log at the control rate would tell",
             self.name,
             gaps.len(),
             self.edges.len(),
