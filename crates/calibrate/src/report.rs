@@ -76,6 +76,17 @@ fn torque_constant(estimate: &Estimate) -> Option<(f64, f64)> {
     Some((found.value / found.stated?, ALL_INSIDE * found.std_error / found.value))
 }
 
+/// A parameter for the report: by its key where the rig description has it, in words where its name alone says nothing.
+fn in_words(name: &str) -> &str {
+    match name {
+        "half_width" => "the half width of the dead band",
+        "centre" => "the centre of the dead band",
+        "kept_outside" => "how much of a command beyond the dead band the drive gives",
+        "delay_s" => "the drive's dead time",
+        name => name,
+    }
+}
+
 /// What was found, step by step; the estimated together come last.
 pub fn steps(facts: &Facts, estimate: Option<&Estimate>) -> Vec<StepReport> {
     let left_out = |step: &str| {
@@ -167,11 +178,12 @@ pub fn steps(facts: &Facts, estimate: Option<&Estimate>) -> Vec<StepReport> {
             let names: Vec<&str> = group
                 .parameters
                 .iter()
-                .map(String::as_str)
                 .filter(|name| *name != "sampling_delay_s")
+                .map(|name| in_words(name))
                 .collect();
             if !names.is_empty() {
-                together.skipped_because.push(format!("{} is not fixed: {}", names.join(", "), group.why));
+                let are = if names.len() > 1 { "are not fixed" } else { "is not fixed" };
+                together.skipped_because.push(format!("{} {are}: {}", names.join(", "), group.why));
             }
         }
         if torque_constant(estimate).is_none() {

@@ -30,9 +30,13 @@ impl Sheet {
         self.wrapped(text, "", "");
     }
 
-    /// An item of a list.
+    /// An item of a list; a hint in it begins a line.
     pub fn item(&mut self, text: &str) {
-        self.wrapped(text, "  - ", "    ");
+        let (said, hint) = text.split_once("\nhint:").unwrap_or((text, ""));
+        self.wrapped(said, "  - ", "    ");
+        if !hint.is_empty() {
+            self.more(&format!("hint:{hint}"));
+        }
     }
 
     /// Goes on under an item.
@@ -139,5 +143,15 @@ mod tests {
         assert!(text.lines().all(|l| l.chars().count() <= WIDTH));
         let ends: Vec<usize> = text.lines().rev().take(3).map(|l| l.chars().count()).collect();
         assert!(ends.iter().all(|e| *e == ends[0]), "{text}");
+    }
+
+    #[test]
+    fn a_hint_begins_a_line() {
+        let mut sheet = Sheet::new("t");
+        sheet.item("the motor is reversed, as thrust goes astern\nhint: swap two wires");
+        assert_eq!(
+            sheet.into_text(),
+            "t\n  - the motor is reversed, as thrust goes astern\n    hint: swap two wires\n"
+        );
     }
 }
