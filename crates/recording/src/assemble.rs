@@ -2,6 +2,7 @@
 
 mod angle;
 mod clock;
+mod take;
 
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
@@ -10,9 +11,10 @@ use crate::cell::{Cell, Odd};
 use crate::columns::{self, nearest};
 use crate::error::{Place, Problem};
 use crate::log::{Back, longest_is_read};
-use crate::map::{ColumnMap, Mapped, Time};
+use crate::map::{ColumnMap, Time};
 use crate::recording::{Column, Recording};
 use clock::{Clock, SECONDS};
+use take::Take;
 
 /// Name of the first column where rows come from a log of messages with a clock of its own.
 pub(crate) const CLOCK: &str = "the log's clock";
@@ -48,14 +50,6 @@ pub(crate) struct Assembler<'m> {
 enum TimeColumn {
     Stamps { index: usize, of_day: Option<usize>, clock: Clock, drop_stale: bool },
     Settled { settle_s: f64 },
-}
-
-/// One column to fill, from one source column.
-struct Take<'m> {
-    index: usize,
-    how: Option<&'m Mapped>,
-    sign_of: Option<(usize, f64)>,
-    command: bool,
 }
 
 impl<'m> Assembler<'m> {
@@ -133,14 +127,13 @@ impl<'m> Assembler<'m> {
             cell.number(place, &self.source[index], self.decimal_comma)
         };
         self.row.clear();
-        for take in &self.takes {
-            if self.foreign && cell(take.index).is_no_value() {
-                self.no_value.entry(take.index).or_default().add(place, &cell(take.index).text());
+        for take in &mut self.takes {
+            let (text, raw) = (cell(take.index), number(take.index)?);
+            let says_none = self.foreign && text.is_no_value() || take.is_none(raw);
+            if says_none && take.rest(place, text).is_none() {
+                self.no_value.entry(take.index).or_default().add(place, &text.text());
             }
-            let mut value = number(take.index)?;
-            if let Some(how) = take.how {
-                value = how.apply(value);
-            }
+            let mut value = take.value(raw, says_none);
             if let Some((index, zero)) = take.sign_of {
                 let side = number(index)? - zero;
                 value *= if side == 0.0 { 0.0 } else { side.signum() };
@@ -213,6 +206,7 @@ impl<'m> Assembler<'m> {
         recording.losses.extend(self.no_value.iter().filter_map(|(at, odd)| odd.no_value(&self.source[*at])));
         if self.foreign {
             angle::unwrap(&mut recording);
+            recording.notes.extend(self.takes.iter().flat_map(Take::notes));
         }
         if self.stale_rows > 0 {
             let rows = self.stale_rows;
@@ -299,7 +293,7 @@ fn native<'m>(source: &[String], recording: &mut Recording) -> Result<Plan<'m>, 
             return Err(Problem::UnitMissing { column: name.clone(), allowed });
         }
         recording.columns.push(Column::new(name.as_str(), Vec::new()));
-        takes.push(Take { index, how: None, sign_of: None, command: false });
+        takes.push(Take::own(index));
     }
     Ok((TimeColumn::Stamps { index: time, of_day: None, clock: SECONDS, drop_stale: false }, None, takes))
 }
@@ -347,8 +341,7 @@ fn mapped<'m>(source: &[String], map: &'m ColumnMap, recording: &mut Recording) 
             Some((source, zero)) => Some((find(source)?, *zero)),
             None => None,
         };
-        let command = column.name.contains("_cmd");
-        takes.push(Take { index: find(&column.source)?, how: Some(column), sign_of, command });
+        takes.push(Take::mapped(find(&column.source)?, column, sign_of));
         recording.columns.push(Column::new(column.name.as_str(), Vec::new()));
     }
     if !map.given.is_empty() {

@@ -118,6 +118,10 @@ pub struct Mapped {
     pub offset: f64,
     /// Straight-line table applied to the source first, held at its ends; empty for none.
     pub table: Vec<[f64; 2]>,
+    /// The source's number that stands for no value, as a pulse of 0 us.
+    pub none: Option<f64>,
+    /// What the column is where the source holds no value, SI; else it is not sampled then.
+    pub no_value: Option<f64>,
     /// Source column and the value at which the sign turns, for a sensor that shows no sign.
     pub sign_of: Option<(String, f64)>,
 }

@@ -1,5 +1,10 @@
 //! Why a recording cannot be compared with a model.
 
+/// A number as people write it; with an exponent only where it would be nothing but zeros.
+fn plain(value: f64) -> String {
+    if value == 0.0 || (1e-4..1e9).contains(&value.abs()) { value.to_string() } else { format!("{value:e}") }
+}
+
 /// Why a recording cannot be compared with a model.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum DataError {
@@ -49,7 +54,8 @@ pub enum DataError {
     },
     /// A value that no thruster gives.
     #[error(
-        "{recording}: {column} = {value:e} at {time_s} s is outside what is allowed: -{most:e} to {most:e}\nhint: is the unit right (a column map reads scale * source + offset)? a value not measured is an empty cell"
+        "{recording}: {column} = {} at {time_s} s is outside what is allowed: -{} to {}\nhint: is the unit right (a column map reads scale * source + offset)? a value not measured is an empty cell",
+        plain(*value), plain(*most), plain(*most)
     )]
     Implausible {
         /// The recording.
@@ -65,7 +71,8 @@ pub enum DataError {
     },
     /// Rows closer together than any log writes them.
     #[error(
-        "{recording}: rows are usually {interval_s:e} s apart; at least {least_s:e} s are needed\nhint: is time_s in seconds?"
+        "{recording}: rows are usually {} s apart; at least {} s are needed\nhint: is time_s in seconds?",
+        plain(*interval_s), plain(*least_s)
     )]
     TooFast {
         /// The recording.
@@ -97,4 +104,19 @@ pub enum DataError {
         /// The longest gap, from and to, s.
         gap_s: [f64; 2],
     },
+}
+
+#[cfg(test)]
+mod tests {
+    use super::DataError;
+
+    #[test]
+    fn numbers_stand_as_people_write_them() {
+        let said = |value: f64, most: f64| {
+            let (recording, column) = ("r".into(), "duty_cmd".into());
+            DataError::Implausible { recording, column, time_s: 2.0, value, most }.to_string()
+        };
+        assert!(said(-3.75, 2.0).contains("duty_cmd = -3.75 at 2 s is outside what is allowed: -2 to 2\n"));
+        assert!(said(3e300, 1e12).contains("duty_cmd = 3e300 at 2 s is outside what is allowed: -1e12 to 1e12"));
+    }
 }

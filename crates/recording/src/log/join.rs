@@ -60,12 +60,13 @@ impl Taken<'_> {
         last.filter(|_| self.held)
     }
 
-    /// The next message before this instant that has a value.
+    /// The next message before this instant that has a value; of a command also one that says that there is none, which ends
+    /// what stood before it.
     fn next_before(&mut self, end_s: f64) -> Option<(f64, f64)> {
         while let Some(stamp_s) = self.stamps_s.get(self.next).copied().filter(|stamp_s| *stamp_s < end_s) {
             let value = self.values[self.next];
             self.next += 1;
-            if value.is_finite() {
+            if value.is_finite() || self.held && value.is_infinite() {
                 return Some((stamp_s, value));
             }
         }
@@ -108,6 +109,7 @@ pub(crate) fn recording(name: &str, log: &Log, map: &ColumnMap) -> Result<Record
         rows.push(Place::Message(k as u64 + 1), |i| match i.checked_sub(1).map(|i| row[i]) {
             None => Cell::Number(near.at_s),
             Some(value) if value.is_nan() => Cell::Empty,
+            Some(value) if value.is_infinite() => Cell::Text("NaN"),
             Some(value) => Cell::Number(value),
         })?;
     }

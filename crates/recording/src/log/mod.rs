@@ -97,16 +97,19 @@ pub(crate) struct Topic {
 }
 
 /// One field of a topic.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Field {
     /// Name within the topic.
     pub name: String,
     /// Unit, as the format says it.
     pub unit: Option<String>,
-    /// One a message, NaN for none; empty if only the statistics were asked for.
+    /// One a message, NaN where it has no such field, infinite where that holds no finite number; empty if only the
+    /// statistics were asked for.
     pub values: Vec<f64>,
     /// Messages with a finite number in it.
     pub samples: u64,
+    /// Messages with NaN or infinity in it.
+    pub no_numbers: u64,
     /// Messages with a text in it.
     pub texts: u64,
     /// Least and greatest number.
@@ -181,8 +184,7 @@ impl<'w> Gather<'w> {
     /// Adds a field to a topic.
     pub fn field(&mut self, topic: usize, name: impl Into<String>, unit: Option<String>) -> usize {
         let of = &mut self.log.topics[topic];
-        let field = Field { name: name.into(), unit, values: Vec::new(), samples: 0, texts: 0, range: None };
-        of.fields.push(field);
+        of.fields.push(Field { name: name.into(), unit, ..Field::default() });
         let place = of.fields.len() - 1;
         if self.keeps(topic, place) {
             let of = &mut self.log.topics[topic];
@@ -257,18 +259,22 @@ impl<'w> Gather<'w> {
 
     /// A number of the message under way.
     pub fn set(&mut self, topic: usize, field: usize, value: f64) {
-        if self.skip || !value.is_finite() {
+        if self.skip {
             return;
         }
         let field = &mut self.log.topics[topic].fields[field];
+        if let Some(last) = field.values.last_mut() {
+            *last = if value.is_finite() { value } else { f64::INFINITY };
+        }
+        if !value.is_finite() {
+            field.no_numbers += 1;
+            return;
+        }
         field.samples += 1;
         field.range = Some(match field.range {
             Some((low, high)) => (low.min(value), high.max(value)),
             None => (value, value),
         });
-        if let Some(last) = field.values.last_mut() {
-            *last = value;
-        }
     }
 
     /// A text of the message under way.

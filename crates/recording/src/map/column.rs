@@ -24,6 +24,8 @@ pub(super) struct RawColumn {
     offset: Option<f64>,
     #[serde(default)]
     table: Vec<[f64; 2]>,
+    none: Option<f64>,
+    no_value: Option<f64>,
     sign_of: Option<String>,
     sign_zero: Option<f64>,
 }
@@ -71,6 +73,8 @@ impl RawColumn {
         let scale = wrong.take(at.scale(self.scale, self.divide_by.as_ref().map(|by| by.0.as_str()), given));
         let offset = wrong.take(at.finite("offset", self.offset, 0.0));
         let table = wrong.take(at.table(self.table));
+        let none = wrong.take(at.finite_if_any("none", self.none));
+        let no_value = wrong.take(at.finite_if_any("no_value", self.no_value));
         let sign_of = wrong.take(at.sign_of(self.sign_of.as_deref(), self.sign_zero, given));
         let source = wrong.take(given.fill(map, &self.source));
         Some(Mapped {
@@ -81,6 +85,8 @@ impl RawColumn {
             scale: scale?,
             offset: offset?,
             table: table?,
+            none: none?,
+            no_value: no_value?,
             sign_of: sign_of?,
             name,
         })
@@ -138,6 +144,10 @@ impl At<'_> {
         }
         let words = format!("= {value} is outside what is allowed: a finite number");
         Err(self.fail(key, &words, "correct the number"))
+    }
+
+    fn finite_if_any(&self, key: &str, value: Option<f64>) -> Result<Option<f64>, MapError> {
+        value.map(|value| self.finite(key, Some(value), value)).transpose()
     }
 
     fn sign(&self, sign: Option<f64>) -> Result<f64, MapError> {

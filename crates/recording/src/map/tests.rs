@@ -36,6 +36,8 @@ fn bad_numbers_and_keys_are_named() {
         ("table = [[1, 2]]", "table"),
         ("table = [[2, 2], [1, 0]]", "table"),
         ("sign_zero = 3", "sign_of"),
+        ("no_value = nan", "no_value"),
+        ("none = inf", "none"),
         ("scael = 3", "scael"),
     ] {
         let error = message(&format!("{HEAD}[columns.thrust_n]\nsource = \"f\"\nunit = \"N\"\n{line}"));
