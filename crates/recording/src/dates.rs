@@ -88,7 +88,7 @@ impl Order {
     }
 
     /// Since 1970, ns; a stamp without a zone as if it were UTC, for only differences count.
-    fn instant_ns(self, text: &str) -> Option<i128> {
+    pub(crate) fn instant_ns(self, text: &str) -> Option<i128> {
         let text = with_point(text);
         let mut parsed = Parsed::new();
         let clock = parsed.parse_items(text.as_bytes(), self.date()).ok()?;

@@ -117,6 +117,8 @@ mod tests {
             DataError::Implausible { recording, column, time_s: 2.0, value, most }.to_string()
         };
         assert!(said(-3.75, 2.0).contains("duty_cmd = -3.75 at 2 s is outside what is allowed: -2 to 2\n"));
-        assert!(said(3e300, 1e12).contains("duty_cmd = 3e300 at 2 s is outside what is allowed: -1e12 to 1e12"));
+        assert!(
+            said(3e300, 1e12).contains("duty_cmd = 3e300 at 2 s is outside what is allowed: -1e12 to 1e12")
+        );
     }
 }

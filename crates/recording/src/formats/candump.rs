@@ -1,5 +1,6 @@
 //! candump logs of SocketCAN's can-utils: `(1436509052.249713) can0 185#10270000` (`candump -L`, `-l`) and
-//! `(012.249713)  can0  185   [4]  10 27 00 00` (`candump -t a`, `-t z`).
+//! `(012.249713)  can0  185   [4]  10 27 00 00` (`candump -t a`, `-t z`; with a date `-t A`, since the frame before `-t d`; with the
+//! direction before the identifier `-x`).
 //!
 //! A frame has no fields, only bytes: a source says which of them are a number. `0x185.i16le[2]` is the signed number of 16 bits,
 //! least byte first, that begins at byte 2 of the frames with identifier 0x185; an extended identifier has eight digits.
@@ -8,6 +9,7 @@ use std::collections::HashMap;
 use std::io::BufRead;
 
 use super::stream::bytes;
+use crate::dates::Order;
 use crate::error::Problem;
 use crate::log::{Gather, Log};
 
@@ -24,26 +26,33 @@ pub(super) fn begins(start: &[u8]) -> bool {
 }
 
 /// A frame as a line has it.
-struct Frame<'l> {
+struct Frame {
     stamp_s: f64,
-    interface: &'l str,
+    interface: String,
     /// As sources write it.
     id: String,
     data: Vec<u8>,
 }
 
 /// A line that is a frame with data; a remote frame has none.
-fn frame(line: &str) -> Option<Frame<'_>> {
+fn frame(line: &str) -> Option<Frame> {
     let (stamp, rest) = line.strip_prefix('(')?.split_once(')')?;
-    let stamp_s = stamp.trim().parse::<f64>().ok().filter(|s| s.is_finite())?;
+    let stamp = stamp.trim();
+    let date_s = || Order::YearFirst.instant_ns(stamp).map(|ns| ns as f64 * 1e-9);
+    let stamp_s = stamp.parse::<f64>().ok().filter(|s| s.is_finite()).or_else(date_s)?;
     Some(Frame { stamp_s, ..unstamped(rest)? })
 }
 
 /// A frame without its stamp.
-fn unstamped(rest: &str) -> Option<Frame<'_>> {
+fn unstamped(rest: &str) -> Option<Frame> {
     let mut words = rest.split_whitespace();
-    let interface = words.next()?;
-    let what = words.next()?;
+    let interface = words.next()?.to_owned();
+    let mut what = words.next()?;
+    if matches!(what, "RX" | "TX") {
+        // Two flags follow, each a sign or a letter.
+        let flags = [words.next()?, words.next()?];
+        what = words.next().filter(|_| flags.iter().all(|flag| matches!(*flag, "-" | "B" | "E")))?;
+    }
     let (id, data) = match what.split_once('#') {
         Some((id, data)) => {
             // CAN FD: a second sign, and a digit of flags.
@@ -111,40 +120,72 @@ struct Topic {
     shown: usize,
 }
 
-/// The whole log.
-pub(super) fn log(mut input: impl BufRead, wanted: Option<&[String]>) -> Result<Log, Problem> {
-    let mut gather = Gather::new(NAME, "seconds as candump wrote them", wanted);
-    let mut topics: HashMap<(String, String), Topic> = HashMap::new();
-    // The first interface on which an identifier comes needs no name.
-    let mut first: HashMap<String, String> = HashMap::new();
-    let (mut line, mut number, mut bad, mut bad_at) = (Vec::new(), 0_u64, 0_u64, 0_u64);
-    loop {
-        line.clear();
-        let read = std::io::Read::take(&mut input, LONGEST).read_until(b'\n', &mut line);
-        match read {
-            Ok(0) => break,
-            Ok(_) => number += 1,
-            Err(e) => {
-                gather.loss(format!("the file ends in the middle of its data: {e}"));
-                break;
-            }
+/// Frames from which it is told what the stamps count from.
+const EARLY: usize = 64;
+
+/// Whether stamps are each since the frame before, as `-t d` prints them: they begin at 0 like those of `-t z`, which do not fall.
+fn are_steps(frames: &[Frame]) -> bool {
+    let stamps_s = || frames.iter().map(|frame| frame.stamp_s);
+    let falls = stamps_s().zip(stamps_s().skip(1)).filter(|(before, now)| now < before).count();
+    let later: Vec<f64> = stamps_s().skip(1).collect();
+    let alike = later.len() > 2 && later[0] > 0.0 && later.iter().all(|stamp_s| *stamp_s == later[0]);
+    stamps_s().next() == Some(0.0) && (falls * 10 > frames.len() || alike)
+}
+
+/// Frames on their way into a log.
+struct Bus<'w> {
+    gather: Gather<'w>,
+    wanted: Option<&'w [String]>,
+    topics: HashMap<(String, String), Topic>,
+    /// The first interface on which an identifier comes needs no name.
+    first: HashMap<String, String>,
+    early: Vec<Frame>,
+    /// Whether stamps are each since the frame before, once that is told; then the newest instant.
+    steps: Option<bool>,
+    now_s: f64,
+}
+
+impl Bus<'_> {
+    fn take(&mut self, frame: Frame) {
+        if self.steps.is_some() {
+            return self.put(frame);
         }
-        let text = String::from_utf8_lossy(&line);
-        if text.trim().is_empty() {
-            continue;
+        self.early.push(frame);
+        if self.early.len() >= EARLY {
+            self.tell();
         }
-        let Some(frame) = frame(text.trim()) else {
-            bad += 1;
-            bad_at = if bad == 1 { number } else { bad_at };
-            continue;
+    }
+
+    /// Tells what the stamps count from, and puts in what waited for it.
+    fn tell(&mut self) {
+        let steps = are_steps(&self.early);
+        if steps {
+            self.gather.note(
+                "the stamps are each since the frame before, as `candump -t d` prints them, and are added up"
+                    .into(),
+            );
+        }
+        self.steps = Some(steps);
+        for frame in std::mem::take(&mut self.early) {
+            self.put(frame);
+        }
+    }
+
+    fn put(&mut self, frame: Frame) {
+        let Self { gather, wanted, topics, first, .. } = self;
+        let stamp_s = if self.steps == Some(true) {
+            self.now_s += frame.stamp_s;
+            self.now_s
+        } else {
+            frame.stamp_s
         };
-        let interface = first.entry(frame.id.clone()).or_insert_with(|| frame.interface.to_string());
-        let name = if interface == frame.interface {
+        let interface = first.entry(frame.id.clone()).or_insert_with(|| frame.interface.clone());
+        let name = if *interface == frame.interface {
             frame.id.clone()
         } else {
             format!("{}:{}", frame.interface, frame.id)
         };
-        let topic = topics.entry((frame.interface.to_string(), frame.id)).or_insert_with(|| {
+        let topic = topics.entry((frame.interface, frame.id)).or_insert_with(|| {
             let asked: Vec<(&str, &str)> = wanted
                 .unwrap_or_default()
                 .iter()
@@ -159,15 +200,56 @@ pub(super) fn log(mut input: impl BufRead, wanted: Option<&[String]>) -> Result<
             Topic { place, numbers: numbers.collect(), shown: 0 }
         });
         if wanted.is_none() && topic.shown < frame.data.len().min(8) {
-            show(&mut gather, topic, frame.data.len().min(8));
+            show(gather, topic, frame.data.len().min(8));
         }
-        gather.message(topic.place, frame.stamp_s);
+        gather.message(topic.place, stamp_s);
         for (field, number) in &topic.numbers {
             if let Some(value) = number.read(&frame.data) {
                 gather.set(topic.place, *field, value);
             }
         }
     }
+}
+
+/// The whole log.
+pub(super) fn log(mut input: impl BufRead, wanted: Option<&[String]>) -> Result<Log, Problem> {
+    let mut bus = Bus {
+        gather: Gather::new(NAME, "seconds as candump wrote them", wanted),
+        wanted,
+        topics: HashMap::new(),
+        first: HashMap::new(),
+        early: Vec::new(),
+        steps: None,
+        now_s: 0.0,
+    };
+    let (mut line, mut number, mut bad, mut bad_at) = (Vec::new(), 0_u64, 0_u64, 0_u64);
+    loop {
+        line.clear();
+        let read = std::io::Read::take(&mut input, LONGEST).read_until(b'\n', &mut line);
+        match read {
+            Ok(0) => break,
+            Ok(_) => number += 1,
+            Err(e) => {
+                bus.gather.loss(format!("the file ends in the middle of its data: {e}"));
+                break;
+            }
+        }
+        let text = String::from_utf8_lossy(&line);
+        if text.trim().is_empty() {
+            continue;
+        }
+        match frame(text.trim()) {
+            Some(frame) => bus.take(frame),
+            None => {
+                bad += 1;
+                bad_at = if bad == 1 { number } else { bad_at };
+            }
+        }
+    }
+    if bus.steps.is_none() {
+        bus.tell();
+    }
+    let mut gather = bus.gather;
     if gather.is_empty() {
         return Err(Problem::Broken {
             format: NAME,
@@ -241,5 +323,50 @@ mod tests {
         let refused = super::log(plain.as_bytes(), None).unwrap_err();
         assert!(refused.to_string().contains("time stamp") && refused.hint().contains("-L"), "{refused}");
         assert!(begins(LOG.as_bytes()) && !begins(b"time_s,thrust_n\n0,1\n"));
+    }
+
+    /// The same frames as every way of candump to print them has it.
+    #[test]
+    fn every_kind_of_stamp_and_the_direction_are_read() {
+        let frames = |line: &dyn Fn(u32) -> String| {
+            let text: String = (0..200).map(|k| line(k) + "\n").collect();
+            assert!(begins(text.as_bytes()), "{text}");
+            let wanted = ["0x181.u8[0]".to_owned()];
+            let log = log(text.as_bytes(), Some(&wanted)).unwrap();
+            assert!(log.losses.is_empty(), "{:?}", log.losses);
+            let topic = &log.topics[0];
+            assert_eq!(topic.fields[0].values.len(), 200);
+            assert_eq!(topic.fields[0].values[199], 199.0);
+            (topic.stamps_s.iter().map(|stamp_s| stamp_s - topic.stamps_s[0]).collect::<Vec<_>>(), log.notes)
+        };
+        // Two steps in turn: 10 and 30 ms.
+        let at_us = |k: u32| 20_000 * k - 10_000 * (k % 2);
+        let data = |k: u32| format!("can0  181   [2]  {k:02X} 00");
+        let (plain, notes) = frames(&|k| {
+            format!("(176000000{}.{:06}) {}", at_us(k) / 1_000_000, at_us(k) % 1_000_000, data(k))
+        });
+        assert!(notes.is_empty(), "{notes:?}");
+        let same = |other: &[f64]| {
+            for (a, b) in plain.iter().zip(other) {
+                assert!((a - b).abs() < 1e-5, "{a} {b}");
+            }
+        };
+        let step_us = |k: u32| if k == 0 { 0 } else { at_us(k) - at_us(k - 1) };
+        let (steps, notes) = frames(&|k| format!(" (000.{:06})  {}", step_us(k), data(k)));
+        same(&steps);
+        assert!(notes[0].contains("-t d"), "{notes:?}");
+        let (zero, notes) =
+            frames(&|k| format!(" (00{}.{:06})  {}", at_us(k) / 1_000_000, at_us(k) % 1_000_000, data(k)));
+        same(&zero);
+        assert!(notes.is_empty(), "{notes:?}");
+        let (dates, _) = frames(&|k| {
+            format!(" (2025-10-09 08:53:2{}.{:06})  {}", at_us(k) / 1_000_000, at_us(k) % 1_000_000, data(k))
+        });
+        same(&dates);
+        let (extra, _) = frames(&|k| {
+            format!(" (00{}.{:06})  {}", at_us(k) / 1_000_000, at_us(k) % 1_000_000, data(k))
+                .replace("can0  ", "can0  RX - -  ")
+        });
+        same(&extra);
     }
 }
