@@ -13,7 +13,7 @@ use crate::log::{Gather, Log};
 /// How a file begins: the description of what describes the others.
 pub(super) const MAGIC: &[u8] = &[0xa3, 0x95, 0x80];
 const MARK: &[u8] = &[0xa3, 0x95];
-const NAME: &str = "ArduPilot DataFlash";
+pub(crate) const NAME: &str = "ArduPilot DataFlash";
 /// Type of the message that describes types.
 const FMT: u8 = 0x80;
 

@@ -13,7 +13,9 @@ mod stream;
 mod ulog;
 
 pub(crate) use candump::NAME as CANDUMP;
+pub(crate) use dataflash::NAME as DATAFLASH;
 pub use mcap::{Rows as LiveMcap, schema as message_schema, state_schema};
+pub(crate) use ulog::NAME as ULOG;
 
 use std::io::{self, BufRead, Seek, Write};
 use std::path::Path;
@@ -114,9 +116,9 @@ impl Content {
             Content::Zstd => "zstd",
             Content::Csv => "CSV",
             Content::Mcap => "MCAP",
-            Content::Ulog => "PX4 ULog",
-            Content::DataFlash => "ArduPilot DataFlash",
-            Content::Candump => "candump",
+            Content::Ulog => ULOG,
+            Content::DataFlash => DATAFLASH,
+            Content::Candump => CANDUMP,
             Content::Bag => "ROS 2 bag (sqlite)",
             Content::Blackbox => "Betaflight blackbox",
         }

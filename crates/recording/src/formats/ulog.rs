@@ -14,7 +14,7 @@ use crate::log::{Gather, Log};
 /// How a file begins, before version and start time.
 pub(super) const MAGIC: &[u8] = &[0x55, 0x4c, 0x6f, 0x67, 0x01, 0x12, 0x35];
 const SYNC: &[u8] = &[0x08, 0x00, b'S', 0x2f, 0x73, 0x13, 0x20, 0x25, 0x0c, 0xbb, 0x12];
-const NAME: &str = "PX4 ULog";
+pub(crate) const NAME: &str = "PX4 ULog";
 /// A message's data are at most this long, so no format may describe more.
 const LONGEST: usize = u16::MAX as usize;
 /// Formats within formats, before a description is taken for a circle.

@@ -11,7 +11,9 @@ pub(crate) mod stamps;
 mod survey;
 
 use crate::dates::Dates;
-pub use survey::{Example, FieldSurvey, GapSurvey, Incomplete, Lack, Proposal, Survey, TopicSurvey, survey};
+pub use survey::{
+    Example, FieldSurvey, GapSurvey, Incomplete, Lack, Proposal, Still, Survey, TopicSurvey, survey,
+};
 
 /// A stamp that lies further than this behind its topic's newest begins the clock anew, s; less is disorder of the
 /// logger.

@@ -12,6 +12,7 @@ use super::rules::{
 use super::survey::{Example, Proposal};
 use super::{Field, Log, Topic, shipped, stamps};
 use crate::columns;
+use crate::formats;
 use crate::map::ColumnMap;
 
 /// Fields chosen for a proposed map: (topic, field) and our column.
@@ -23,12 +24,20 @@ pub(super) fn propose(log: &Log) -> (Proposal, Chosen) {
     // A recording of our own with decimal commas needs a map that says so.
     let named = log.topics.iter().any(is_native);
     let native = named && !log.decimal_comma && !log.perhaps_decimal_comma;
+    // So does one whose stamps repeat or begin anew, or with cells that hold no number: it is refused as it is.
+    let refused = native && table && (log.resets > 0 || log.topics[0].stale > 0 || !log.lost_in.is_empty());
     let maps = shipped::fitting(log, table);
     let incomplete = if native || table || !maps.is_empty() { Vec::new() } else { shipped::in_part(log) };
-    let chosen = if named && table { own(&log.topics[0]) } else { choose(log, table) };
-    let map = (!native && (log.nameless || !chosen.is_empty())).then(|| toml(log, &chosen, table));
+    let chosen = match () {
+        () if refused => own_and_others(log),
+        () if named && table => own(&log.topics[0]),
+        () => choose(log, table),
+    };
+    let map =
+        ((!native || refused) && (log.nameless || !chosen.is_empty())).then(|| toml(log, &chosen, table));
     let without_response =
         maps.iter().filter(|map| !shipped::responds(map, log)).map(ColumnMap::call).collect();
+    let still = maps.iter().flat_map(|map| shipped::still(map, log)).collect();
     let examples = maps.iter().flat_map(|map| {
         let value =
             |key: &str| map.given.iter().find(|(known, _)| known == key).map(|(_, value)| value.clone());
@@ -42,8 +51,9 @@ pub(super) fn propose(log: &Log) -> (Proposal, Chosen) {
     let nothing = |_: &_| !native && map.is_none();
     let unchanging = fields.filter(nothing).filter(|(topic, field)| is_unchanging(topic, field, table));
     let unchanging = unchanging.map(|(topic, field)| topic.source(field)).collect();
-    let proposal = Proposal { native, shipped, examples, without_response, incomplete, unchanging, map };
-    (proposal, if native { Chosen::new() } else { chosen })
+    let proposal =
+        Proposal { native, shipped, examples, without_response, still, incomplete, unchanging, map };
+    (proposal, if native && !refused { Chosen::new() } else { chosen })
 }
 
 /// Rows that kort reads as they are: stamped in its way, without a name that lacks its unit, and with something beside the
@@ -60,6 +70,17 @@ fn own(topic: &Topic) -> Chosen {
     let known = |field: &Field| columns::find(&field.name).filter(|known| *known != columns::TIME);
     let fields = topic.fields.iter().enumerate();
     fields.filter_map(|(f, field)| Some(((0, f), known(field)?.name))).collect()
+}
+
+/// Those, and of the others what they lack: `motor_rpm` beside `thrust_n`.
+fn own_and_others(log: &Log) -> Chosen {
+    let mut chosen = own(&log.topics[0]);
+    for (place, column) in choose(log, true) {
+        if !chosen.contains_key(&place) && !chosen.values().any(|there| *there == column) {
+            chosen.insert(place, column);
+        }
+    }
+    chosen
 }
 
 fn choose(log: &Log, table: bool) -> Chosen {
@@ -89,8 +110,26 @@ fn choose(log: &Log, table: bool) -> Chosen {
     }
     if table {
         reread(&log.topics[0], &mut chosen);
+    } else if is_of_vehicle(log) {
+        of_controllers(log, &mut chosen);
     }
     chosen
+}
+
+/// Logs of vehicles whose speed controllers tell what they take out of the supply.
+fn is_of_vehicle(log: &Log) -> bool {
+    [formats::ULOG, formats::DATAFLASH].contains(&log.format)
+}
+
+/// The current that a vehicle's speed controller tells flows out of the supply, and is no motor's; the battery's is that of all.
+fn of_controllers(log: &Log, chosen: &mut Chosen) {
+    let current = chosen.iter().find(|((topic, field), column)| {
+        **column == "current_a" && !is_of_motor(&log.topics[*topic].fields[*field])
+    });
+    if let Some(place) = current.map(|(place, _)| *place) {
+        chosen.retain(|_, column| *column != "supply_current_a");
+        chosen.insert(place, "supply_current_a");
+    }
 }
 
 /// What the columns of a table tell of each other.
@@ -103,7 +142,7 @@ fn reread(topic: &Topic, chosen: &mut Chosen) {
     if let Some(current) = place(chosen, "current_a").filter(|at| !is_of_motor(field(*at)))
         && place(chosen, "supply_current_a").or(place(chosen, "current_cmd_a")).is_none()
         && (place(chosen, "power_w").is_some()
-            || place(chosen, "duty_cmd").is_some_and(|at| is_pulse(field(at))))
+            || place(chosen, "duty_cmd").is_some_and(|at| is_pulse(topic, field(at))))
     {
         chosen.insert(current, "supply_current_a");
     }
@@ -148,6 +187,17 @@ fn toml(log: &Log, chosen: &Chosen, table: bool) -> String {
         let _ = write!(out, "\n[columns.{column}]\nsource = {:?}\n", topic.source(field));
         let doubts = table && !(commanded && *column == "current_a");
         out += &unit_lines(column, topic, field, doubts);
+        if *column == "supply_current_a" && is_of_vehicle(log) && !is_of_supply(topic, field) {
+            out += "# taken for what flows out of the supply, as most speed controllers tell it; current_a if it is the motor's\n";
+        }
+        if column.contains("_cmd") && field.no_numbers > 0 && !table {
+            let _ = writeln!(
+                out,
+                "{}no_value = 0.0   # what it is where it holds no number, as in {} message(s) of this log: at rest?",
+                if log.format == formats::ULOG { "" } else { "# " },
+                field.no_numbers
+            );
+        }
     }
     out
 }
@@ -178,9 +228,10 @@ fn by_place(topic: &Topic) -> String {
 fn unit_lines(column: &str, topic: &Topic, field: &Field, doubts: bool) -> String {
     let (low, high) = field.range.unwrap_or_default();
     let seen = format!("{low} to {high} in this log");
-    if column == "duty_cmd" && is_pulse(field) {
+    if column == "duty_cmd" && is_pulse(topic, field) {
+        let none = if low == 0.0 { "none = 0   # no pulse\nno_value = 0.0\n" } else { "" };
         return format!(
-            "# unit = \"1\"\n# table = [[1000, 0.0], [2000, 1.0]]   pulses of {seen}: write which of them ask for nothing and for all ([1500, 0.0] in the middle of a drive that reverses), and take out both #\n"
+            "# unit = \"1\"\n# table = [[1000, 0.0], [2000, 1.0]]   pulses of {seen}: write which of them ask for nothing and for all ([1500, 0.0] in the middle of a drive that reverses), and take out both #\n{none}"
         );
     }
     if is_turns(column, field) {
@@ -231,3 +282,6 @@ fn doubt(column: &str, topic: &Topic, field: &Field) -> &'static str {
         _ => "",
     }
 }
+
+#[cfg(test)]
+mod tests;

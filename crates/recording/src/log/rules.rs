@@ -155,9 +155,13 @@ fn is_of_now(names: &[String]) -> bool {
     names.windows(2).any(|two| two[0] == "current" && NOW.contains(&two[1].as_str()))
 }
 
-/// A pulse of milliseconds for a speed controller.
-pub(super) fn is_pulse(field: &Field) -> bool {
-    unit_of(field).is_some_and(|unit| matches!(unit.symbol, "us" | "ms")) && has(&words(&field.name), PULSES)
+/// A pulse of milliseconds for a speed controller; ArduPilot calls its outputs `RCOU.C1` and so on.
+pub(super) fn is_pulse(topic: &Topic, field: &Field) -> bool {
+    let number = field.name.strip_prefix('C').is_some_and(|number| number.parse::<u8>().is_ok());
+    let output = number && topic.name.split('[').next() == Some("RCOU");
+    output
+        || unit_of(field).is_some_and(|unit| matches!(unit.symbol, "us" | "ms"))
+            && has(&words(&field.name), PULSES)
 }
 
 /// A speed, or an angle, of electrical turns.
@@ -255,7 +259,7 @@ pub(super) fn fit(rule: &Rule, topic: &Topic, field: &Field, table: bool) -> Opt
         return None;
     }
     let unit = unit_of(field);
-    let pulse = rule.column == "duty_cmd" && is_pulse(field);
+    let pulse = rule.column == "duty_cmd" && is_pulse(topic, field);
     // A share of something is a command only where the name says so.
     let unit_tells =
         || table && by_unit(rule.column, field) && (rule.column != "duty_cmd" || is_asked(topic, field));

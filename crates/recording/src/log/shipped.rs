@@ -3,13 +3,22 @@
 use std::collections::BTreeSet;
 
 use super::names::words;
-use super::rules::{ASKED, DRIVE};
-use super::survey::{Incomplete, Lack};
+use super::rules::{ASKED, COMMANDS, DRIVE};
+use super::survey::{Incomplete, Lack, Still};
 use super::{Field, Log, Topic, same_source};
 use crate::map::{ColumnMap, Time};
 
-/// Those that have all that they must, with what they ask for.
+/// What a model can be compared with.
+const RESPONSES: [&str; 5] = ["shaft_speed_rad_s", "shaft_angle_rad", "thrust_n", "torque_n_m", "flow_m_s"];
+
+/// Those that have all that they must, with what they ask for: first those whose command and response change.
 pub(super) fn fitting(log: &Log, table: bool) -> Vec<ColumnMap> {
+    let mut maps = complete(log, table);
+    maps.sort_by_key(|map| !still(map, log).is_empty());
+    maps
+}
+
+fn complete(log: &Log, table: bool) -> Vec<ColumnMap> {
     if log.format != "candump" {
         return ColumnMap::shipped().flat_map(|name| suited(name, log, table)).collect();
     }
@@ -42,10 +51,30 @@ fn is_in(log: &Log, source: &str) -> bool {
 
 /// Whether the map makes of this log a column that a model can be compared with.
 pub(super) fn responds(map: &ColumnMap, log: &Log) -> bool {
-    const RESPONSES: [&str; 5] =
-        ["shaft_speed_rad_s", "shaft_angle_rad", "thrust_n", "torque_n_m", "flow_m_s"];
     let mut columns = map.columns.iter().filter(|column| RESPONSES.contains(&column.name.as_str()));
     columns.any(|column| !column.optional || is_in(log, &column.source))
+}
+
+/// What the map takes for a command, or for a response, and never changes in this log, where nothing else of that kind does:
+/// another source was meant, or the motor stood.
+pub(super) fn still(map: &ColumnMap, log: &Log) -> Vec<Still> {
+    let range = |source: &str| {
+        said(log).find(|(topic, field)| same_source(&topic.source(field), source)).and_then(|(_, f)| f.range)
+    };
+    let of_kind = |is: &dyn Fn(&str) -> bool| {
+        let columns = map.columns.iter().filter(|column| is(&column.name));
+        let ranges: Vec<_> = columns.filter_map(|c| Some((c, range(&c.source)?))).collect();
+        let moves = ranges.iter().any(|(_, (low, high))| low < high);
+        let all = ranges.into_iter().filter(|_| !moves).map(|(column, (value, _))| Still {
+            map: map.call(),
+            column: column.name.clone(),
+            source: column.source.clone(),
+            value,
+        });
+        all.collect::<Vec<_>>()
+    };
+    let commands = of_kind(&|name| COMMANDS.iter().any(|(_, command)| *command == name));
+    [commands, of_kind(&|name| RESPONSES.contains(&name))].concat()
 }
 
 /// A shipped map as its example has it, where that suits the log; else with another value of one that it asks for: another motor,

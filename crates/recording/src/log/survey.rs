@@ -100,6 +100,8 @@ pub struct Proposal {
     pub examples: Vec<Example>,
     /// Those of them that give no measured response, for `kort convert`: there is nothing to compare a model with.
     pub without_response: Vec<String>,
+    /// Commands and responses of those that never change in this log; such maps stand last.
+    pub still: Vec<Still>,
     /// Where no shipped map fits: those that some of the log would come in by, and what they lack.
     pub incomplete: Vec<Incomplete>,
     /// A column map as TOML, made from names and units; to be checked by a person. None if nothing in the log looks
@@ -120,6 +122,19 @@ pub struct Example {
     pub value: String,
     /// In words.
     pub meaning: String,
+}
+
+/// What a shipped map takes, and never changes.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Still {
+    /// The map, as it stands behind `--columns`.
+    pub map: String,
+    /// Our column.
+    pub column: String,
+    /// What it is made of.
+    pub source: String,
+    /// What that is throughout, as the log has it.
+    pub value: f64,
 }
 
 /// A shipped map that has not all that it needs.

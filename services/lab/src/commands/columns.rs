@@ -162,7 +162,12 @@ fn proposal(found: &Survey) -> String {
         let _ = if refused {
             writeln!(
                 out,
-                "a recording of kort: it needs no map, and is refused as it is for what is said above"
+                "a recording of kort by its names, which is refused as it is for what is said above{}",
+                if found.proposal.map.is_some() {
+                    ": mend that, or bring it in by the map below"
+                } else {
+                    ""
+                }
             )
         } else {
             writeln!(out, "a recording of kort: no map is needed\n  kort diagnose {} --rig RIG", found.file)
@@ -173,6 +178,13 @@ fn proposal(found: &Survey) -> String {
         for example in found.proposal.examples.iter().filter(|example| example.map == *name) {
             let (key, value, meaning) = (&example.key, &example.value, &example.meaning);
             let _ = writeln!(out, "{key}={value} below is an example: write yours in its place ({meaning})");
+        }
+        for still in found.proposal.still.iter().filter(|still| still.map == *name) {
+            let (column, source, value) = (&still.column, &still.source, short(still.value));
+            let _ = writeln!(
+                out,
+                "{name} fits by its names, but {column} never changes in this log: {source} is {value} throughout"
+            );
         }
         let _ = if found.proposal.without_response.contains(name) {
             writeln!(
