@@ -1,7 +1,7 @@
 //! A ROS 2 bag in sqlite (`.db3`), by SQLite itself: tables `topics`, `messages` and, from ROS 2 Iron on,
 //! `message_definitions`.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::io::BufRead;
 
 use rusqlite::config::DbConfig;
@@ -83,6 +83,10 @@ fn read(data: &[u8], gather: &mut Gather<'_>) -> rusqlite::Result<bool> {
         }
         read += 1;
         bad += u64::from(!topic.message(gather, stamp_s, message));
+    }
+    let by_number: BTreeMap<_, _> = topics.iter().collect();
+    for topic in by_number.into_values() {
+        gather.losses(topic.losses());
     }
     if bad > 0 {
         gather.loss(format!("{bad} message(s) do not fit their type and were skipped"));

@@ -31,9 +31,10 @@ enum Kind {
 pub(super) struct Layout(Kind);
 
 /// A number or a text within a message, by its name.
-pub(super) enum Found {
+pub(super) enum Found<'d> {
     Number(f64),
-    Text,
+    /// Its bytes, as CDR has them.
+    Text(&'d [u8]),
 }
 
 impl Layout {
@@ -220,8 +221,9 @@ impl Reader<'_> {
             }
             Kind::Text(letter) => {
                 let length = usize::try_from(self.raw(4)?).ok()?.checked_mul(*letter)?;
+                let from = self.at;
                 self.pass(length)?;
-                take(&self.name, Found::Text);
+                take(&self.name, Found::Text(self.data.get(from..self.at)?));
             }
             Kind::Message(fields) => {
                 let before = self.name.len();

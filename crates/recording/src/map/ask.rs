@@ -45,7 +45,11 @@ impl Asked {
 }
 
 /// Names with their values.
-pub(super) struct Given(BTreeMap<String, String>);
+pub(super) struct Given {
+    values: BTreeMap<String, String>,
+    /// Those that have what another was given, with that one.
+    follow: BTreeMap<String, String>,
+}
 
 impl Given {
     /// From what the map asks and the user says; without a user the examples stand.
@@ -93,7 +97,34 @@ impl Given {
             let value = wrong.take(value(key, ask)).unwrap_or_else(|| "1".into());
             (key.clone(), value)
         });
-        Self(given.collect())
+        let mut all = Self { values: given.collect(), follow: BTreeMap::new() };
+        all.follow(map, wrong);
+        all
+    }
+
+    /// Gives a key whose default is another key, `place = { default = "{joint}" }`, what that one was given.
+    fn follow(&mut self, map: &str, wrong: &mut Wrong) {
+        for (key, value) in self.values.clone() {
+            let Some(other) = value.strip_prefix('{').and_then(|rest| rest.strip_suffix('}')) else {
+                continue;
+            };
+            match self.values.get(other).filter(|leader| !leader.starts_with('{')).cloned() {
+                Some(leader) => {
+                    self.values.insert(key.clone(), leader);
+                    self.follow.insert(key, other.to_owned());
+                }
+                None => wrong.say(fail(
+                    map,
+                    format!("`ask.{key}.default` = \"{value}\" is outside what is allowed: a text, or the name of another thing asked for in braces"),
+                    "[ask] lists what the user is asked for",
+                )),
+            }
+        }
+    }
+
+    /// Keys that have what another was given, with that one.
+    pub fn following(&self) -> impl Iterator<Item = (&str, &str)> {
+        self.follow.iter().map(|(key, other)| (key.as_str(), other.as_str()))
     }
 
     /// A text with what is given in the place of `{name}` and `{name+1}`.
@@ -113,7 +144,7 @@ impl Given {
                 Some((key, plus)) => (key, plus.trim().parse::<u64>().ok()),
                 None => (inside, Some(0)),
             };
-            let value = self.0.get(key.trim());
+            let value = self.values.get(key.trim());
             let filled = match (value, plus) {
                 (Some(value), Some(0)) => Some(value.clone()),
                 (Some(value), Some(plus)) => value
@@ -139,12 +170,14 @@ impl Given {
 
     /// What the map asks for without a default, and the value is that of its example: key and meaning.
     pub fn examples(&self, asks: &BTreeMap<String, Ask>) -> Vec<(String, String)> {
-        let is_example =
-            |(key, ask): &(&String, &Ask)| ask.default.is_none() && ask.example.as_ref() == self.0.get(*key);
+        let is_example = |(key, ask): &(&String, &Ask)| {
+            ask.default.is_none() && ask.example.as_ref() == self.values.get(*key)
+        };
         asks.iter().filter(is_example).map(|(key, ask)| (key.clone(), ask.meaning.clone())).collect()
     }
 
+    /// What was given, without what follows from it.
     pub fn into_pairs(self) -> Vec<(String, String)> {
-        self.0.into_iter().collect()
+        self.values.into_iter().filter(|(key, _)| !self.follow.contains_key(key)).collect()
     }
 }

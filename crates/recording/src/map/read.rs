@@ -111,8 +111,14 @@ pub(super) struct Asks {
 /// What a map asks for; of a shipped one, whose asking is sound.
 pub(super) fn asks(name: &str, text: &str) -> Option<Asks> {
     let raw: RawMap = toml::from_str(text).ok()?;
-    let given = Given::new(name, &raw.ask, None, &mut Wrong(Vec::new())).into_pairs();
-    Some(Asks { given, sources: raw.columns.into_values().map(|column| column.source).collect() })
+    let given = Given::new(name, &raw.ask, None, &mut Wrong(Vec::new()));
+    let followed = |source: String| {
+        given.following().fold(source, |source, (key, other)| {
+            source.replace(&format!("{{{key}}}"), &format!("{{{other}}}"))
+        })
+    };
+    let sources = raw.columns.into_values().map(|column| followed(column.source)).collect();
+    Some(Asks { sources, given: given.into_pairs() })
 }
 
 fn delimiter(map: &str, wanted: Option<&str>) -> Result<Option<u8>, MapError> {

@@ -45,6 +45,24 @@ fn bad_numbers_and_keys_are_named() {
     }
 }
 
+#[test]
+fn a_default_may_be_what_another_key_was_given() {
+    let text = |default: &str| {
+        format!(
+            "[ask]\njoint = {{ meaning = \"m\", default = \"0\" }}\nplace = {{ meaning = \"m\", default = \"{default}\" }}\n\
+             [time]\nclock = \"log\"\n[columns.thrust_n]\nsource = \"a[{{joint}}].b[{{place}}]\"\nunit = \"N\"\n"
+        )
+    };
+    let source = |said: &str| {
+        let map = read::map("m", &text("{joint}"), Some(&Asked::parse(said))).unwrap();
+        (map.columns[0].source.clone(), map.call())
+    };
+    assert_eq!(source("joint=2"), ("a[2].b[2]".into(), "m:joint=2".into()));
+    assert_eq!(source("joint=port,place=1"), ("a[port].b[1]".into(), "m:joint=port,place=1".into()));
+    let error = message(&text("{gear}"));
+    assert!(error.contains("`ask.place.default` = \"{gear}\""), "{error}");
+}
+
 /// Keys that nobody knows, values of another kind and what may not stand are told together; a key that is misspelt is not
 /// told as missing too.
 #[test]

@@ -1,6 +1,6 @@
 //! An MCAP file as a log of messages: every channel a topic, its numbers as fields, stamped with the log time.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::io::Read;
 
 use mcap::records::{MessageHeader, Record};
@@ -49,6 +49,12 @@ pub(in crate::formats) fn log(input: impl Read, wanted: Option<&[String]>) -> Re
     }
     if all.bad > 0 {
         all.gather.loss(format!("{} message(s) do not fit their schema and were skipped", all.bad));
+    }
+    let channels: BTreeMap<_, _> = all.channels.iter().collect();
+    for channel in channels.into_values() {
+        if let Channel::Cdr(topic) = channel {
+            all.gather.losses(topic.losses());
+        }
     }
     if !all.others.is_empty() {
         all.gather.note(format!(
