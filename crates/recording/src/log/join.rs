@@ -181,7 +181,17 @@ fn missing(log: &Log, map: &ColumnMap, wanted: &str) -> Problem {
     let more = if near.len() > 30 { ", …" } else { "" };
     near.truncate(30);
     let alike = all.iter().map(String::as_str).filter(|source| nearly_spelt(wanted, source));
+    // Which place of a list is meant nobody can tell from how it is written.
+    let list = |name: &str| name.rsplit_once('[').map(|(list, _)| format!("{list}["));
+    let places = all.iter().filter(|source| list(wanted).is_some() && list(source) == list(wanted));
+    let places: Vec<&str> = places.map(String::as_str).take(16).collect();
     let hint = match nearest(wanted, alike) {
+        Some(_) if !places.is_empty() => {
+            format!(
+                "say which of {} is meant, behind the colon of --columns or in the map",
+                places.join(", ")
+            )
+        }
         Some(near) => {
             format!("did you mean `{near}`? `kort columns LOG` lists what is in the log and which map fits")
         }
@@ -356,6 +366,13 @@ mod tests {
             Problem::MappedColumnMissing { column, found, hint, .. } => {
                 assert_eq!(column, "esc.rmp");
                 assert!(found.contains("esc[0].rpm") && hint.contains("esc[0].rpm"), "{found} {hint}");
+            }
+            other => panic!("{other}"),
+        }
+        let map = ColumnMap::from_toml("m", &MAP.replace("control[0]", "control[port]")).unwrap();
+        match recording("r", &log, &map).unwrap_err() {
+            Problem::MappedColumnMissing { hint, .. } => {
+                assert!(hint.contains("which of out.control[0] is meant"), "{hint}");
             }
             other => panic!("{other}"),
         }
