@@ -75,7 +75,7 @@ mod tests {
         // A pulse width less its middle, scaled before and not after.
         let words = implausible(&log(-998.5), 0.01).unwrap_err().to_string();
         assert!(
-            words.contains("duty_cmd = -9.985e2") && words.contains("scale * source + offset"),
+            words.contains("duty_cmd = -998.5") && words.contains("scale * source + offset"),
             "{words}"
         );
     }
