@@ -107,7 +107,7 @@ fn a_stream_ends_with_the_token_that_opened_it_and_commands_nothing_more() {
         let (mut socket, _) = tungstenite::connect(request).unwrap();
 
         // Another token that comes or goes is no reason.
-        token(&site, "eye", "viewer");
+        let eye = format!("Bearer {}", token(&site, "eye", "viewer"));
         for _ in 0..100 {
             assert!(!socket.read().unwrap().is_close());
         }
@@ -129,6 +129,14 @@ fn a_stream_ends_with_the_token_that_opened_it_and_commands_nothing_more() {
         };
         assert!(u16::from(frame.code) == 1008 && frame.reason.contains("revoked"), "{frame:?}");
         assert!(revoked.elapsed() < Duration::from_secs(2), "{:?}", revoked.elapsed());
+        // Nor does it hold command any longer.
+        let state = loop {
+            let (_, state) = ask(site.port, "GET", T1, &[("Authorization", &eye)], "");
+            if state["lease"].is_null() || revoked.elapsed() > Duration::from_secs(5) {
+                break state;
+            }
+        };
+        assert!(state["lease"].is_null() && revoked.elapsed() < Duration::from_secs(3), "{state}");
         kill(supervisor.id(), "TERM");
         supervisor.wait().unwrap();
     });

@@ -74,9 +74,6 @@ mod tests {
         assert!(implausible(&log(-1.02), 0.01).is_ok());
         // A pulse width less its middle, scaled before and not after.
         let words = implausible(&log(-998.5), 0.01).unwrap_err().to_string();
-        assert!(
-            words.contains("duty_cmd = -998.5") && words.contains("scale * source + offset"),
-            "{words}"
-        );
+        assert!(words.contains("duty_cmd = -998.5") && words.contains("scale * source + offset"), "{words}");
     }
 }

@@ -199,6 +199,16 @@ impl Desk {
         self.note_setpoint(now);
     }
 
+    /// Ends a lease whose token was revoked, or may only read now, as one whose time is over.
+    pub fn revoke(&mut self, may_command: impl Fn(&str) -> bool, now: Instant) {
+        if let Some(who) = self.lease.revoke(may_command) {
+            self.version += 1;
+            self.rest(now, "the token of its lease was revoked");
+            let words = format!("the lease of {who} ended: its token was revoked, or may command no more");
+            self.note(EventKind::LeaseExpired, &who, words);
+        }
+    }
+
     /// Notes something for the event log.
     pub fn note(&mut self, kind: EventKind, who: &str, detail: impl Into<String>) {
         self.notes.push(Note { kind, who: who.to_owned(), detail: detail.into() });

@@ -16,7 +16,7 @@ use crate::hosts::Hosts;
 use crate::problem::{Kind, Problem};
 use crate::serve::{Peer, Reserved};
 use crate::thruster::lock;
-use crate::token::{Identity, Role, Tokens};
+use crate::token::{Identity, LOCAL, Role, Tokens};
 
 /// A browser cannot send `Authorization` with a WebSocket: it offers its token as a subprotocol.
 const TOKEN_PROTOCOL: &str = "bearer.";
@@ -79,6 +79,11 @@ impl Gate {
     /// Is what somebody was let in by still in force?
     pub fn stands(&self, identity: &Identity) -> bool {
         self.tokens.stands(identity)
+    }
+
+    /// May whoever took a lease by the token of this name still command?
+    pub fn commands(&self, token: &str) -> bool {
+        !self.required && token == LOCAL || self.tokens.commands(token)
     }
 
     /// Who asks.

@@ -97,6 +97,13 @@ impl LeaseDesk {
         over
     }
 
+    /// Drops a lease that was taken by a token of which this says that it may command no more; whose it was.
+    pub fn revoke(&mut self, may_command: impl Fn(&str) -> bool) -> Option<String> {
+        let lease = self.lease.take_if(|lease| !may_command(&lease.token))?;
+        self.expired += 1;
+        Some(lease.who())
+    }
+
     /// Leases granted and leases that ran out since start.
     pub fn counts(&self) -> (u64, u64) {
         (self.granted, self.expired)

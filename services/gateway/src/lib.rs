@@ -48,7 +48,7 @@ mod windows;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use kort_proto::config::Config;
 use kort_proto::transport::Deployment;
@@ -233,6 +233,19 @@ async fn serve(
         loop {
             beat.tick().await;
             beating.beat();
+        }
+    });
+
+    let looking = Arc::clone(&app);
+    tokio::spawn(async move {
+        // A lease outlives its token by no more than a stream does.
+        let mut look = tokio::time::interval(Duration::from_secs(1));
+        loop {
+            look.tick().await;
+            let gate = looking.gate();
+            for thruster in looking.thrusters() {
+                thruster.desk().revoke(|token| gate.commands(token), Instant::now());
+            }
         }
     });
 

@@ -298,6 +298,12 @@ impl Tokens {
         Some(identity)
     }
 
+    /// Is there a token of this name that may command?
+    pub fn commands(&self, name: &str) -> bool {
+        self.refresh();
+        lock(&self.known).book.tokens.get(name).is_some_and(|entry| entry.role >= Role::Pilot)
+    }
+
     /// Is what somebody was let in by still in force? A stream outlives many a change of the file.
     pub fn stands(&self, identity: &Identity) -> bool {
         self.refresh();
