@@ -43,6 +43,9 @@ fn every_error_is_a_problem_document_with_its_type() {
             ("POST", &lease, &[JSON], r#"{"holder": "a", "ttl_ms": 0.5}"#, 422, "invalid-field"),
             ("POST", &lease, &[JSON], r#"{"holder": ""}"#, 422, "out-of-range"),
             ("POST", &lease, &[JSON], r#"{"holder": "supervisor"}"#, 422, "out-of-range"),
+            ("POST", &lease, &[JSON], r#"{"holder": "  "}"#, 422, "out-of-range"),
+            ("POST", &lease, &[JSON], r#"{"holder": "bench "}"#, 422, "out-of-range"),
+            ("POST", &lease, &[JSON], r#"{"holder": "\u202egnp"}"#, 422, "out-of-range"),
             ("POST", &lease, &[JSON], r#"{"holder": "a", "ttl_ms": 60001}"#, 422, "out-of-range"),
             ("POST", &lease, &[JSON], r#"{"holder": "a", "ttl_ms": 0}"#, 422, "out-of-range"),
             ("POST", &lease, &[JSON], r#"{"holder": "a", "ttl_ms": -5}"#, 422, "out-of-range"),
@@ -143,5 +146,32 @@ fn a_setpoint_that_is_not_allowed_never_reaches_the_drive() {
         let accepted = put_json(port, "PUT", path, &id, r#"{"thrust_n": 60}"#);
         assert_eq!(accepted.status, 200, "{}", accepted.text());
         stack.watch().until("thrust", |t| (t.signals.thrust_n - 60.0).abs() < 12.0);
+    });
+}
+
+/// A wish that a route does not know is no wish to change something all the same; a stop is a stop with whatever behind it.
+#[test]
+fn a_change_with_a_query_that_its_route_does_not_know_is_not_made() {
+    common::in_real_time(|| {
+        let stack = Stack::start();
+        let paths = stack.get("/openapi.json").expect("the document")["paths"].as_object().unwrap().clone();
+        let mut asked = 0;
+        for (path, operations) in &paths {
+            let at = path.replace("{id}", "t1").replace(['{', '}'], "");
+            for method in ["POST", "PUT", "DELETE"] {
+                if operations.get(method.to_lowercase()).is_none() {
+                    continue;
+                }
+                let query = format!("{at}?no_such_wish=true");
+                if at.ends_with("/stop") || at.ends_with("/disarm") {
+                    assert_eq!(send(stack.site.port, method, &query, &[], &[]).status, 200, "{query}");
+                    continue;
+                }
+                let answer = send(stack.site.port, method, &query, &[], &[]);
+                assert_problem(&answer, 400, "malformed-query", &format!("{method} {query}"));
+                asked += 1;
+            }
+        }
+        assert!(asked > 20, "{asked} changes");
     });
 }

@@ -5,10 +5,12 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use axum::body::Bytes;
+use axum::http::Method;
 use kort_control::ControllerConfig;
 use kort_proto::transport::{Deployment, Watched};
 use tokio::sync::watch;
 use utoipa::openapi::OpenApi;
+use utoipa::openapi::path::ParameterIn;
 
 use crate::analysis::Analyses;
 use crate::calibration::Calibrations;
@@ -167,6 +169,22 @@ impl App {
     pub(crate) fn publish(&self, document: OpenApi) {
         let _ = self.patterns.set(document.paths.paths.keys().cloned().collect());
         let _ = self.document.set(Document(document));
+    }
+
+    /// Names that the query of a documented route may hold.
+    pub(crate) fn query_names(&self, path: &str, method: &Method) -> Option<Vec<&str>> {
+        let Document(document) = self.document.get()?;
+        let item = document.paths.paths.get(self.pattern(path))?;
+        let operation = match *method {
+            Method::POST => &item.post,
+            Method::PUT => &item.put,
+            Method::DELETE => &item.delete,
+            Method::PATCH => &item.patch,
+            _ => return None,
+        };
+        let parameters = operation.as_ref()?.parameters.iter().flatten();
+        let of_query = parameters.filter(|parameter| parameter.parameter_in == ParameterIn::Query);
+        Some(of_query.map(|parameter| parameter.name.as_str()).collect())
     }
 
     /// The OpenAPI document, with the setpoints that are allowed now.

@@ -155,7 +155,7 @@ pub fn is_open(path: &str) -> bool {
 }
 
 /// Does this bring a thruster to zero?
-fn stops(path: &str) -> bool {
+pub fn stops(path: &str) -> bool {
     path == "/v1/stop" || of_thruster(path) == Some("disarm")
 }
 

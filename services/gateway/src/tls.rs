@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::io::Write;
-use std::os::unix::fs::OpenOptionsExt;
+use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 use std::time::SystemTime;
@@ -92,6 +92,12 @@ fn load(keys: &Tls) -> Result<ServerConfig, TlsError> {
         return Err(TlsError::new(&keys.certificate, "holds no certificate"));
     }
     in_our_hands(&keys.key).map_err(|foreign| TlsError::new(&foreign.path, foreign.why))?;
+    // A group may read it, as Debian's `ssl-cert` does.
+    let mode = fs::metadata(&keys.key).map(|about| about.mode()).unwrap_or_default();
+    if mode & 0o004 != 0 {
+        let why = format!("may be read by everybody on this machine (mode {:o}): chmod 600", mode & 0o7777);
+        return Err(TlsError::new(&keys.key, why));
+    }
     let key = PrivateKeyDer::from_pem_file(&keys.key).map_err(|error| TlsError::new(&keys.key, error))?;
     let mut config = ServerConfig::builder_with_provider(Arc::new(ring::default_provider()))
         .with_safe_default_protocol_versions()
@@ -124,6 +130,7 @@ fn make(keys: &Tls, names: Vec<String>) -> Result<(), TlsError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::os::unix::fs::PermissionsExt;
 
     #[test]
     fn a_certificate_is_made_once_and_read_anew_when_it_changes() {
@@ -138,6 +145,11 @@ mod tests {
         let first = fs::read(&keys.certificate).unwrap();
         Certificate::open(&keys, names()).unwrap();
         assert_eq!(fs::read(&keys.certificate).unwrap(), first, "made once");
+        // A key that everybody may read is no secret any more.
+        fs::set_permissions(&keys.key, fs::Permissions::from_mode(0o644)).unwrap();
+        let refused = Certificate::open(&keys, names()).unwrap_err().to_string();
+        assert!(refused.contains("mode 644") && refused.contains("key.pem"), "{refused}");
+        fs::set_permissions(&keys.key, fs::Permissions::from_mode(0o600)).unwrap();
         let before = certificate.config();
         fs::write(&keys.certificate, "broken").unwrap();
         certificate.refresh();

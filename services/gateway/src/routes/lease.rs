@@ -71,6 +71,22 @@ impl LeaseGrant {
 }
 
 /// Takes command. Every accepted command renews the lease; when it ends, thrust is ramped to zero.
+/// Controls, marks without width, and those that turn the direction of text: by them a name in console and log would be read as
+/// another.
+fn is_unseen(c: char) -> bool {
+    let mark = matches!(
+        c,
+        '\u{ad}'
+            | '\u{61c}'
+            | '\u{180e}'
+            | '\u{200b}'..='\u{200f}'
+            | '\u{2028}'..='\u{202e}'
+            | '\u{2060}'..='\u{206f}'
+            | '\u{feff}'
+    );
+    c.is_control() || mark
+}
+
 #[utoipa::path(post, path = "/v1/thrusters/{id}/lease", tag = "command", request_body = LeaseRequest,
     params(("id" = String, Path, description = "Name of the thruster", example = "t1")),
     responses(
@@ -88,11 +104,11 @@ async fn take(
     Json(request): Json<LeaseRequest>,
 ) -> Result<(StatusCode, axum::Json<LeaseGrant>), Problem> {
     let thruster = app.thruster(&id)?;
-    let chars = request.holder.chars().count();
-    if !(1..=HOLDER_CHARS_MAX).contains(&chars) || request.holder.chars().any(char::is_control) {
+    let (name, chars) = (&request.holder, request.holder.chars().count());
+    if !(1..=HOLDER_CHARS_MAX).contains(&chars) || name.trim() != name || name.chars().any(is_unseen) {
         return Err(Problem::new(
             Kind::OutOfRange,
-            format!("holder = {:?} has {chars} characters; allowed are 1 to {HOLDER_CHARS_MAX}, none of them control characters", request.holder),
+            format!("holder = {name:?} has {chars} characters; allowed are 1 to {HOLDER_CHARS_MAX}, no blank first or last, none that is not seen"),
         )
         .hint("a short name that others recognise, for example \"bench\""));
     }

@@ -16,6 +16,7 @@ mod health;
 mod history;
 mod lease;
 mod metrics;
+mod queries;
 mod recording_sets;
 mod recordings;
 mod rig;
@@ -86,6 +87,7 @@ pub fn router(app: Arc<App>) -> Router {
         .fallback(unknown_route)
         .layer(DefaultBodyLimit::max(BODY_BYTES_MAX))
         .layer(TimeoutLayer::with_status_code(StatusCode::REQUEST_TIMEOUT, Duration::from_secs(10)))
+        .layer(middleware::from_fn_with_state(Arc::clone(&app), queries::known))
         .layer(middleware::from_fn_with_state(Arc::clone(&app), gate::check))
         .layer(middleware::from_fn_with_state(Arc::clone(&app), problems_only))
         .with_state(app)
