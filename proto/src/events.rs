@@ -144,6 +144,11 @@ impl EventLog {
         Ok(Self { folder: folder.to_owned(), unwritten: Arc::default() })
     }
 
+    /// Where it lies.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
     /// Appends an event; whoever else appends does not get in between.
     ///
     /// # Errors
@@ -164,6 +169,8 @@ impl EventLog {
     }
 
     fn write(&self, unwritten: &mut Unwritten) -> io::Result<()> {
+        // Somebody may have removed it under way.
+        ours::make_folder(&self.folder)?;
         let lock = OpenOptions::new()
             .create(true)
             .truncate(false)
@@ -329,6 +336,10 @@ mod tests {
         assert_eq!(read.iter().map(|e| e.detail.as_str()).collect::<Vec<_>>(), ["first", "second"]);
         log.retry().unwrap();
         assert_eq!(log.read().len(), 2, "nothing is written twice");
+        // Somebody who tidies up under way takes what was written, and no more.
+        fs::remove_dir_all(log.folder()).unwrap();
+        log.append(&event("third")).unwrap();
+        assert_eq!(log.read().len(), 1);
     }
 
     #[test]

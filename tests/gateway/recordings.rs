@@ -177,6 +177,11 @@ fn a_killed_gateway_leaves_a_recording_that_reads_to_its_last_flush() {
             (answer.status == 200).then(|| answer.json())
         });
         assert_eq!((&list[0]["name"], &list[0]["state"]), (&json!("torn"), &json!("torn")), "{list}");
+        // Nobody asked for its end: it is told, and an alert has what to look at.
+        let events = send(port, "GET", "/v1/events", &[], b"").text();
+        assert!(events.contains("recording torn ended by itself: the gateway was killed"), "{events}");
+        let metrics = send(port, "GET", "/metrics", &[], b"").text();
+        assert!(metrics.contains("kort_recordings_failed_total{thruster=\"t1\"} 1"), "{metrics}");
         for format in ["csv", "mcap"] {
             let file = send(port, "GET", &format!("/v1/recordings/torn?format={format}"), &[], b"");
             let recording = kort_recording::Recording::decode("torn", file.body.as_slice(), None).unwrap();

@@ -11,7 +11,7 @@ use kort_proto::ours::{Foreign, in_our_hands, make_folder, nobody_else_may_repla
 use kort_thruster::rig::Rig;
 
 use crate::error::GatewayError;
-use crate::settings::{self, Settings};
+use crate::settings::{self, Settings, Tls};
 use crate::tls::Certificate;
 use crate::token::Tokens;
 
@@ -101,7 +101,9 @@ pub fn check_config(config: &Config) -> Vec<GatewayError> {
                 taken.map(|(folder, refused)| refused(folder.clone(), io::ErrorKind::NotADirectory.into())),
             );
             wrong.extend(tokens(&settings).err());
-            let keys = settings.tls.as_ref().filter(|keys| !keys.self_signed);
+            // Those that the start makes are not there yet.
+            let made = |keys: &&Tls| keys.self_signed && !keys.certificate.exists() && !keys.key.exists();
+            let keys = settings.tls.as_ref().filter(|keys| !made(keys));
             wrong.extend(keys.and_then(|keys| Certificate::open(keys, Vec::new()).err()).map(Into::into));
         }
     }
@@ -151,6 +153,24 @@ pub(crate) fn certificate(settings: &Settings) -> Result<Option<Arc<Certificate>
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Only where neither is there does the start make both.
+    #[test]
+    fn a_certificate_without_its_key_is_wrong_though_one_could_be_made() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = folder.path().display();
+        let text = format!(
+            "[gateway]\nbind = \"127.0.0.1:0\"\ntokens = \"{at}/tokens.toml\"\n\
+             tls = {{ certificate = \"{at}/cert.pem\", key = \"{at}/key.pem\", self_signed = true }}\n\
+             [thrusters.t1]\nrig = \"rig.toml\"\namplifier = \"simulated\"\n"
+        );
+        let config = Config::parse(&text, None).unwrap();
+        let said = || check_config(&config).iter().map(ToString::to_string).collect::<Vec<_>>().join("; ");
+        assert!(!said().contains("gateway.tls"), "{}", said());
+        let made = rcgen::generate_simple_self_signed(["localhost".to_owned()]).unwrap();
+        fs::write(folder.path().join("cert.pem"), made.cert.pem()).unwrap();
+        assert!(said().contains("gateway.tls") && said().contains("key.pem"), "{}", said());
+    }
 
     #[test]
     fn a_folder_is_tried_and_left_as_it_was() {

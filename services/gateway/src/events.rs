@@ -185,7 +185,8 @@ fn keep(log: &EventLog, mut mark: Mark, inbox: &Receiver<Event>, events: &Events
                 Ok(()) => complained = false,
                 Err(error) if !std::mem::replace(&mut complained, true) => {
                     tracing::error!(
-                        "the event log cannot be written: {error}\nhint: gateway.events needs space"
+                        "the event log in {} cannot be written: {error}\nhint: gateway.events must be a folder that can be written, with space",
+                        log.folder().display()
                     );
                 }
                 Err(_) => (),

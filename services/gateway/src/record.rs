@@ -16,7 +16,6 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, OnceLock, Weak};
 use std::thread::JoinHandle;
@@ -68,9 +67,10 @@ pub struct Recorder {
     starting: Mutex<()>,
     /// What became of recordings, where the disk would not take it.
     unwritten: Mutex<BTreeMap<String, RecordingInfo>>,
+    /// What ended with the gateway before and is not told yet.
+    torn: Mutex<Vec<RecordingInfo>>,
     totals: Mutex<BTreeMap<String, Totals>>,
     events: OnceLock<Weak<Events>>,
-    failures: AtomicU64,
 }
 
 #[derive(Debug)]
@@ -100,23 +100,28 @@ impl Recorder {
             running: Mutex::default(),
             starting: Mutex::default(),
             unwritten: Mutex::default(),
+            torn: Mutex::default(),
             totals: Mutex::default(),
             events: OnceLock::new(),
-            failures: AtomicU64::new(0),
         };
         for mut info in recorder.list() {
             if info.state == RecordingState::Recording {
                 info.state = RecordingState::Torn;
                 info.cause = Some("the gateway was killed while it ran".into());
                 recorder.note_info(&info);
+                lock(&recorder.torn).push(info);
             }
         }
         Ok(recorder)
     }
 
-    /// Where it tells what became of recordings.
+    /// Where it tells what became of recordings, of those first that ended with the gateway before.
     pub fn tell_to(&self, events: &Arc<Events>) {
         let _ = self.events.set(Arc::downgrade(events));
+        for info in std::mem::take(&mut *lock(&self.torn)) {
+            self.count(&info.thruster, |totals| totals.failed += 1);
+            self.ended(&info);
+        }
     }
 
     /// Starts a recording.
@@ -343,7 +348,6 @@ impl Recorder {
 
     /// A recording ended by itself.
     fn ended(&self, info: &RecordingInfo) {
-        self.failures.fetch_add(1, Ordering::Relaxed);
         let cause = info.cause.clone().unwrap_or_default();
         let words = format!("recording {} ended by itself: {cause}", info.name);
         tracing::error!("{words}");

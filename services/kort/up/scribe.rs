@@ -66,7 +66,8 @@ fn write(log: &EventLog, watched: &std::path::Path, inbox: &Receiver<Entry>) {
 fn write_one(log: &EventLog, watched: &std::path::Path, entry: Entry, complained: &mut bool) {
     let written = match entry {
         Entry::Event(event) => {
-            log.append(&event).map_err(|error| format!("{error}\nhint: gateway.events needs space"))
+            let hint = "gateway.events must be a folder that can be written, with space";
+            log.append(&event).map_err(|error| format!("{}: {error}\nhint: {hint}", log.folder().display()))
         }
         Entry::Watched(state) => state.write(watched).map_err(|error| error.to_string()),
     };

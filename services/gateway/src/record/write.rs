@@ -156,7 +156,8 @@ impl Job {
                 (Err(End::Disk(error)), _) | (_, Err(error)) => {
                     let lost = self.given.0.saturating_sub(info.rows);
                     recorder.count_lost(&mut info, lost);
-                    (RecordingState::Failed, Some(error.to_string()))
+                    let file = self.folder.join(format!("{}.{ENDING}", info.name));
+                    (RecordingState::Failed, Some(format!("{}: {error}", file.display())))
                 }
             };
             info.clone()
