@@ -70,7 +70,6 @@ impl LeaseGrant {
     }
 }
 
-/// Takes command. Every accepted command renews the lease; when it ends, thrust is ramped to zero.
 /// Controls, marks without width, and those that turn the direction of text: by them a name in console and log would be read as
 /// another.
 fn is_unseen(c: char) -> bool {
@@ -83,10 +82,13 @@ fn is_unseen(c: char) -> bool {
             | '\u{2028}'..='\u{202e}'
             | '\u{2060}'..='\u{206f}'
             | '\u{feff}'
+            | '\u{fff9}'..='\u{fffb}'
+            | '\u{e0000}'..='\u{e007f}'
     );
     c.is_control() || mark
 }
 
+/// Takes command. Every accepted command renews the lease; when it ends, thrust is ramped to zero.
 #[utoipa::path(post, path = "/v1/thrusters/{id}/lease", tag = "command", request_body = LeaseRequest,
     params(("id" = String, Path, description = "Name of the thruster", example = "t1")),
     responses(
