@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use clap::Args;
 use kort_proto::complaint::Complaint;
 use kort_proto::config::{Config, DEFAULT_PATH, is_there, is_told_by};
+use kort_proto::transport::Deployment;
 use serde::Serialize;
 
 use crate::{DONE, USAGE, print, said};
@@ -199,7 +200,7 @@ fn deployment(file: Option<&Path>, into: &mut Found) {
 
 /// What each service says.
 fn services(config: &Config) -> Vec<String> {
-    let mut said = Vec::new();
+    let mut said: Vec<String> = root(config).into_iter().collect();
     #[cfg(feature = "servo")]
     said.extend(kort_servo::problems(config).iter().map(ToString::to_string));
     #[cfg(feature = "controller")]
@@ -209,6 +210,13 @@ fn services(config: &Config) -> Vec<String> {
     #[cfg(feature = "gateway")]
     said.extend(kort_gateway::check_config(config).iter().map(ToString::to_string));
     said
+}
+
+/// A root that no service could keep shared memory at.
+fn root(config: &Config) -> Option<String> {
+    let root = Some(&config.transport.root).filter(|root| !root.as_os_str().is_empty())?;
+    let refused = Deployment::new(Some(root)).config(0).err()?;
+    Some(config.error(format!("`transport.root` = {refused}")).to_string())
 }
 
 /// What is said of a file, or of another that the words name: `file: …`.

@@ -11,8 +11,8 @@ use kort_proto::ours::{Foreign, in_our_hands, make_folder, nobody_else_may_repla
 use kort_thruster::rig::Rig;
 
 use crate::error::GatewayError;
-use crate::settings::{self, Settings, Tls};
-use crate::tls::Certificate;
+use crate::settings::{self, Settings};
+use crate::tls::{Certificate, TlsError};
 use crate::token::Tokens;
 
 /// Could a gateway start with this configuration? Says so before anything else is started.
@@ -85,6 +85,37 @@ fn can_write(folder: &Path) -> io::Result<()> {
     }
 }
 
+/// Could a file be made in this folder, or the folder first? Asks the nearest one above it that is there, and makes nothing.
+fn could_write(folder: &Path) -> io::Result<()> {
+    // The kernel shows itself there, and takes no file from anybody, whatever the rights say: /proc, /sys, cgroups.
+    const OF_THE_KERNEL: [i64; 3] = [0x9fa0, 0x6265_6572, 0x6367_7270];
+    let whole = std::path::absolute(folder)?;
+    // A link that leads nowhere is there: no folder is made in its place.
+    let there = whole.ancestors().find(|above| above.symlink_metadata().is_ok()).unwrap_or(&whole);
+    let refused = |error: io::Error| io::Error::new(error.kind(), format!("{}: {error}", there.display()));
+    if !there.is_dir() {
+        return Err(refused(io::ErrorKind::NotADirectory.into()));
+    }
+    if rustix::fs::statfs(there).is_ok_and(|disk| OF_THE_KERNEL.contains(&disk.f_type)) {
+        return Err(refused(io::Error::other("the kernel's own, no file can be made there")));
+    }
+    let rights = rustix::fs::Access::WRITE_OK | rustix::fs::Access::EXEC_OK;
+    rustix::fs::access(there, rights).map_err(|error| refused(error.into()))
+}
+
+/// Could certificate and key be read, or made where that is asked for and neither is there?
+fn could_speak_tls(keys: &settings::Tls) -> Result<(), GatewayError> {
+    if !(keys.self_signed && !keys.certificate.exists() && !keys.key.exists()) {
+        Certificate::open(keys, Vec::new())?;
+        return Ok(());
+    }
+    for file in [&keys.certificate, &keys.key] {
+        let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty());
+        could_write(folder.unwrap_or(Path::new("."))).map_err(|error| TlsError::new(file, error))?;
+    }
+    Ok(())
+}
+
 /// What is wrong with this configuration for a gateway: reads all that it reads, and touches no address. Each names
 /// file, key, value and what is allowed.
 pub fn check_config(config: &Config) -> Vec<GatewayError> {
@@ -94,17 +125,12 @@ pub fn check_config(config: &Config) -> Vec<GatewayError> {
         Err(error) => wrong.push(error.into()),
         Ok(settings) => {
             wrong.extend(settings.wrong().into_iter().map(|words| config.error(words).into()));
-            // Nothing is made here; what stands in the place of a folder is no folder later either.
-            let taken =
-                folders(&settings).into_iter().filter(|(folder, _)| folder.exists() && !folder.is_dir());
-            wrong.extend(
-                taken.map(|(folder, refused)| refused(folder.clone(), io::ErrorKind::NotADirectory.into())),
-            );
+            let unwritable = |(folder, refused): (&PathBuf, Refused)| {
+                could_write(folder).err().map(|error| refused(folder.clone(), error))
+            };
+            wrong.extend(folders(&settings).into_iter().filter_map(unwritable));
             wrong.extend(tokens(&settings).err());
-            // Those that the start makes are not there yet.
-            let made = |keys: &&Tls| keys.self_signed && !keys.certificate.exists() && !keys.key.exists();
-            let keys = settings.tls.as_ref().filter(|keys| !made(keys));
-            wrong.extend(keys.and_then(|keys| Certificate::open(keys, Vec::new()).err()).map(Into::into));
+            wrong.extend(settings.tls.as_ref().and_then(|keys| could_speak_tls(keys).err()));
         }
     }
     wrong
@@ -154,24 +180,6 @@ pub(crate) fn certificate(settings: &Settings) -> Result<Option<Arc<Certificate>
 mod tests {
     use super::*;
 
-    /// Only where neither is there does the start make both.
-    #[test]
-    fn a_certificate_without_its_key_is_wrong_though_one_could_be_made() {
-        let folder = tempfile::tempdir().unwrap();
-        let at = folder.path().display();
-        let text = format!(
-            "[gateway]\nbind = \"127.0.0.1:0\"\ntokens = \"{at}/tokens.toml\"\n\
-             tls = {{ certificate = \"{at}/cert.pem\", key = \"{at}/key.pem\", self_signed = true }}\n\
-             [thrusters.t1]\nrig = \"rig.toml\"\namplifier = \"simulated\"\n"
-        );
-        let config = Config::parse(&text, None).unwrap();
-        let said = || check_config(&config).iter().map(ToString::to_string).collect::<Vec<_>>().join("; ");
-        assert!(!said().contains("gateway.tls"), "{}", said());
-        let made = rcgen::generate_simple_self_signed(["localhost".to_owned()]).unwrap();
-        fs::write(folder.path().join("cert.pem"), made.cert.pem()).unwrap();
-        assert!(said().contains("gateway.tls") && said().contains("key.pem"), "{}", said());
-    }
-
     #[test]
     fn a_folder_is_tried_and_left_as_it_was() {
         let folder = tempfile::tempdir().unwrap();
@@ -183,5 +191,39 @@ mod tests {
         assert!(can_write(&blocked).is_err() && can_write(&blocked.join("x")).is_err());
         // Nobody, root neither, makes a file there.
         assert!(can_write(Path::new("/proc/self")).is_err());
+    }
+
+    #[test]
+    fn what_could_be_written_is_found_out_without_making_anything() {
+        let folder = tempfile::tempdir().unwrap();
+        could_write(&folder.path().join("state/events")).unwrap();
+        could_write(Path::new("kort-state/events")).unwrap();
+        let blocked = folder.path().join("blocked");
+        fs::write(&blocked, "").unwrap();
+        for bad in [&blocked, &blocked.join("x"), Path::new("/proc/nope"), Path::new("/sys/nope/x")] {
+            assert!(could_write(bad).is_err(), "{}", bad.display());
+        }
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_certificate_to_be_made_is_asked_for_where_one_of_its_files_is_there() {
+        let folder = tempfile::tempdir().unwrap();
+        let keys = |certificate: &str, key: &str| settings::Tls {
+            certificate: folder.path().join(certificate),
+            key: folder.path().join(key),
+            self_signed: true,
+        };
+        could_speak_tls(&keys("a.pem", "a.key")).unwrap();
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+        for (certificate, key) in [("a.pem", "a.key"), ("b.pem", "b.key")] {
+            Certificate::open(&keys(certificate, key), vec!["localhost".into()]).unwrap();
+        }
+        could_speak_tls(&keys("a.pem", "a.key")).unwrap();
+        let strangers = could_speak_tls(&keys("a.pem", "b.key")).unwrap_err().to_string();
+        assert!(strangers.contains("a.pem"), "{strangers}");
+        let lacking = could_speak_tls(&keys("a.pem", "none.key")).unwrap_err().to_string();
+        assert!(lacking.contains("none.key"), "{lacking}");
+        assert!(could_speak_tls(&keys("none.pem", "a.key")).is_err());
     }
 }

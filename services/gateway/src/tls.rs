@@ -28,7 +28,7 @@ pub struct TlsError {
 }
 
 impl TlsError {
-    fn new(file: &Path, why: impl ToString) -> TlsError {
+    pub(crate) fn new(file: &Path, why: impl ToString) -> TlsError {
         TlsError { file: file.display().to_string(), why: why.to_string() }
     }
 }
