@@ -190,7 +190,7 @@ fn deployment(file: Option<&Path>, into: &mut Found) {
     }
     #[cfg(feature = "gateway")]
     into.warnings.extend(
-        config.iter().filter_map(kort_gateway::doubtful).map(|words| problem(&name, &words.to_string())),
+        config.iter().flat_map(kort_gateway::doubtful).map(|words| problem(&name, &words.to_string())),
     );
     #[cfg(feature = "gateway")]
     for (file, effect, why) in config.iter().flat_map(kort_gateway::unused_effects) {

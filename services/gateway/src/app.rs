@@ -25,6 +25,7 @@ use crate::rig::RigDesk;
 use crate::ring::Ring;
 use crate::tally::Tally;
 use crate::thruster::Thruster;
+use crate::tls::Certificate;
 
 /// Everything the routes share.
 #[derive(Debug)]
@@ -39,6 +40,7 @@ pub(crate) struct App {
     pub(crate) recorder: Arc<Recorder>,
     pub(crate) events: Arc<Events>,
     pub(crate) gate: Gate,
+    pub(crate) certificate: Option<Arc<Certificate>>,
     pub(crate) connections: Arc<Connections>,
     pub(crate) streams: Streams,
     pub(crate) address: String,
@@ -112,6 +114,11 @@ impl App {
 
     pub(crate) fn gate(&self) -> &Gate {
         &self.gate
+    }
+
+    /// The certificate; none for plain HTTP.
+    pub(crate) fn certificate(&self) -> Option<&Certificate> {
+        self.certificate.as_deref()
     }
 
     pub(crate) fn connections(&self) -> &Connections {

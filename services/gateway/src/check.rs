@@ -137,8 +137,12 @@ pub fn check_config(config: &Config) -> Vec<GatewayError> {
 }
 
 /// What is no mistake of this configuration, and hardly as it is meant; the gateway says it in its log when it starts.
-pub fn doubtful(config: &Config) -> Option<ConfigError> {
-    Settings::new_unchecked(config).ok()?.doubtful().map(|words| config.error(words))
+pub fn doubtful(config: &Config) -> Vec<ConfigError> {
+    let Ok(settings) = Settings::new_unchecked(config) else { return Vec::new() };
+    // What is to be made is good, and what cannot be read is told as wrong.
+    let keys = settings.tls.as_ref().filter(|keys| keys.certificate.exists() && keys.key.exists());
+    let certificate = keys.and_then(|keys| Certificate::open(keys, Vec::new()).ok()?.doubtful());
+    settings.doubtful().into_iter().chain(certificate).map(|words| config.error(words)).collect()
 }
 
 /// Effects of the deployment's rigs that no control law and no observer uses: file of the rig, effect, and why.

@@ -87,7 +87,7 @@ pub fn run(config: &Config, deployment: &Deployment) -> Result<(), GatewayError>
     let settings = Settings::new(config)?;
     let thrusters = settings::thrusters(config)?;
     let _part = deployment.take_part("gateway", None)?;
-    if let Some(words) = doubtful(config) {
+    for words in doubtful(config) {
         tracing::warn!("{words}");
     }
     tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?.block_on(serve(
@@ -157,6 +157,7 @@ async fn serve(
         recorder: Arc::clone(&recorder),
         events: Arc::clone(&events),
         gate,
+        certificate: certificate.clone(),
         connections: Arc::clone(&connections),
         streams: Streams::default(),
         address: settings.address(),

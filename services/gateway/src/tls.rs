@@ -5,7 +5,7 @@ use std::io::Write;
 use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
 use std::path::Path;
 use std::sync::{Arc, Mutex};
-use std::time::SystemTime;
+use std::time::{Duration, SystemTime};
 
 use kort_proto::ours::{in_our_hands, make_folder};
 use thiserror::Error;
@@ -37,7 +37,17 @@ impl TlsError {
 #[derive(Debug)]
 pub struct Certificate {
     keys: Tls,
-    now: Mutex<(Stamps, Arc<ServerConfig>)>,
+    now: Mutex<Loaded>,
+}
+
+#[derive(Debug)]
+struct Loaded {
+    stamps: Stamps,
+    config: Arc<ServerConfig>,
+    /// What is to be said of the time for which it is good.
+    doubtful: Option<String>,
+    /// When it ends, Unix time, s.
+    ends_s: i64,
 }
 
 type Stamps = [Option<SystemTime>; 2];
@@ -52,29 +62,42 @@ impl Certificate {
         if keys.self_signed && !keys.certificate.exists() && !keys.key.exists() {
             make(keys, names)?;
         }
-        let now = Mutex::new((stamps(keys), Arc::new(load(keys)?)));
+        let now = Mutex::new(load(keys)?);
         Ok(Certificate { keys: keys.clone(), now })
+    }
+
+    /// What is no mistake, and keeps clients away all the same: it is good no more, or not yet.
+    pub fn doubtful(&self) -> Option<String> {
+        lock(&self.now).doubtful.clone()
+    }
+
+    /// When it ends, Unix time, s.
+    pub fn ends_s(&self) -> i64 {
+        lock(&self.now).ends_s
     }
 
     /// The configuration for the next connection.
     pub fn config(&self) -> Arc<ServerConfig> {
-        lock(&self.now).1.clone()
+        Arc::clone(&lock(&self.now).config)
     }
 
     /// Takes over files that changed; broken ones are told, and the certificate before stays.
     pub fn refresh(&self) {
         let stamps = stamps(&self.keys);
-        if lock(&self.now).0 == stamps {
+        if lock(&self.now).stamps == stamps {
             return;
         }
         match load(&self.keys) {
-            Ok(config) => {
+            Ok(loaded) => {
                 tracing::info!("the certificate was read anew");
-                *lock(&self.now) = (stamps, Arc::new(config));
+                if let Some(words) = &loaded.doubtful {
+                    tracing::warn!("{words}");
+                }
+                *lock(&self.now) = loaded;
             }
             Err(error) => {
                 tracing::warn!("{error}; the certificate before stays in force");
-                lock(&self.now).0 = stamps;
+                lock(&self.now).stamps = stamps;
             }
         }
     }
@@ -84,13 +107,19 @@ fn stamps(keys: &Tls) -> Stamps {
     [&keys.certificate, &keys.key].map(|file| fs::metadata(file).and_then(|about| about.modified()).ok())
 }
 
-fn load(keys: &Tls) -> Result<ServerConfig, TlsError> {
+fn load(keys: &Tls) -> Result<Loaded, TlsError> {
+    // Before they are read: what changes meanwhile is read with the next look.
+    let stamps = stamps(keys);
     let chain = CertificateDer::pem_file_iter(&keys.certificate)
         .and_then(Iterator::collect::<Result<Vec<_>, _>>)
         .map_err(|error| TlsError::new(&keys.certificate, error))?;
-    if chain.is_empty() {
+    let Some(first) = chain.first() else {
         return Err(TlsError::new(&keys.certificate, "holds no certificate"));
-    }
+    };
+    let (_, read) = x509_parser::parse_x509_certificate(first)
+        .map_err(|error| TlsError::new(&keys.certificate, error))?;
+    let [since_s, ends_s] =
+        [read.validity().not_before, read.validity().not_after].map(|time| time.timestamp());
     in_our_hands(&keys.key).map_err(|foreign| TlsError::new(&foreign.path, foreign.why))?;
     // A group may read it, as Debian's `ssl-cert` does.
     let mode = fs::metadata(&keys.key).map(|about| about.mode()).unwrap_or_default();
@@ -104,7 +133,27 @@ fn load(keys: &Tls) -> Result<ServerConfig, TlsError> {
         .and_then(|builder| builder.with_no_client_auth().with_single_cert(chain, key))
         .map_err(|error| TlsError::new(&keys.certificate, error))?;
     config.alpn_protocols = vec![b"http/1.1".to_vec()];
-    Ok(config)
+    let doubtful = doubtful(&keys.certificate, since_s, ends_s, SystemTime::now());
+    Ok(Loaded { stamps, config: Arc::new(config), doubtful, ends_s })
+}
+
+/// A certificate is served whatever the time: a machine under water may have lost its clock, and clients decide for themselves.
+fn doubtful(file: &Path, since_s: i64, ends_s: i64, now: SystemTime) -> Option<String> {
+    let now_s = now.duration_since(SystemTime::UNIX_EPOCH).map_or(0, |now| now.as_secs().cast_signed());
+    let (what, when_s) = if now_s > ends_s {
+        ("ended on", ends_s)
+    } else if now_s < since_s {
+        ("is good only from", since_s)
+    } else {
+        return None;
+    };
+    let when = SystemTime::UNIX_EPOCH + Duration::from_secs(when_s.max(0).cast_unsigned());
+    Some(format!(
+        "`gateway.tls.certificate` = {:?} {what} {}, and this machine's clock says {}: browsers and clients refuse it\nhint: put a new certificate in its place, it is read without a restart; see that the clock is right",
+        file.display().to_string(),
+        humantime::format_rfc3339_seconds(when),
+        humantime::format_rfc3339_seconds(now),
+    ))
 }
 
 fn make(keys: &Tls, names: Vec<String>) -> Result<(), TlsError> {
@@ -131,6 +180,32 @@ fn make(keys: &Tls, names: Vec<String>) -> Result<(), TlsError> {
 mod tests {
     use super::*;
     use std::os::unix::fs::PermissionsExt;
+
+    #[test]
+    fn a_certificate_that_is_good_no_more_or_not_yet_is_told_and_served() {
+        let folder = tempfile::tempdir().unwrap();
+        let keys = Tls {
+            certificate: folder.path().join("cert.pem"),
+            key: folder.path().join("key.pem"),
+            self_signed: true,
+        };
+        let names = || vec!["localhost".to_owned()];
+        let certificate = Certificate::open(&keys, names()).unwrap();
+        assert_eq!(certificate.doubtful(), None, "just made");
+        for (years, words) in [((2001, 2002), "ended on 2002-"), ((2900, 2901), "is good only from 2900-")] {
+            let mut params = rcgen::CertificateParams::new(names()).unwrap();
+            params.not_before = rcgen::date_time_ymd(years.0, 1, 1);
+            params.not_after = rcgen::date_time_ymd(years.1, 1, 1);
+            let key = rcgen::KeyPair::generate().unwrap();
+            fs::write(&keys.certificate, params.self_signed(&key).unwrap().pem()).unwrap();
+            fs::write(&keys.key, key.serialize_pem()).unwrap();
+            certificate.refresh();
+            let told = certificate.doubtful().expect("it is told");
+            assert!(told.contains(words) && told.contains("cert.pem"), "{told}");
+            assert_eq!(certificate.ends_s(), params.not_after.unix_timestamp());
+            assert!(Certificate::open(&keys, names()).unwrap().doubtful().is_some(), "at a start too");
+        }
+    }
 
     #[test]
     fn a_certificate_is_made_once_and_read_anew_when_it_changes() {

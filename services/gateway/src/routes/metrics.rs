@@ -117,6 +117,14 @@ fn service(families: &mut Families, app: &App) {
         &[],
         evicted as f64,
     );
+    if let Some(certificate) = app.certificate() {
+        families.gauge(
+            "tls_certificate_expiry_seconds",
+            "When the TLS certificate ends, Unix time.",
+            &[],
+            certificate.ends_s() as f64,
+        );
+    }
     for (what, free, size) in app.disks() {
         families.gauge("disk_free_bytes", "Space left where this is written.", &[("disk", what)], free);
         families.gauge("disk_size_bytes", "Size of the disk where this is written.", &[("disk", what)], size);
