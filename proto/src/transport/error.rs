@@ -42,7 +42,7 @@ pub enum TransportError {
         error: std::io::Error,
     },
     /// A path that shared memory cannot take.
-    #[error("{}: not usable as the root of shared memory: it has {} bytes; allowed are at most {ROOT_BYTES_MAX}, none of them odd\nhint: a short path, such as /tmp/kort", root.display(), root.as_os_str().len())]
+    #[error("{}: not usable as the root of shared memory: it has {} bytes; allowed are at most {ROOT_BYTES_MAX} bytes, none of them odd\nhint: a short path, such as /tmp/kort", root.display(), root.as_os_str().len())]
     Path {
         /// The root folder.
         root: PathBuf,
