@@ -1,9 +1,13 @@
 //! A motor that turns a pulley by a belt, with the encoder on the one or on the other.
 
+mod common;
+
 use kort_diagnose::diagnose::{Options, diagnose};
 use kort_identify::data::Series;
 use kort_thruster::models::ModelName;
 use kort_thruster::rig::Rig;
+
+use common::Draws;
 
 const ROWS: usize = 700;
 const ROW_S: f64 = 0.02;
@@ -19,20 +23,16 @@ fn recording(of_pulley: bool) -> Series {
     let reduced = MOTOR_KG_M2 * PULLEY_KG_M2 / (MOTOR_KG_M2 + PULLEY_KG_M2);
     let swing_rad_s = 2.5 * std::f64::consts::TAU;
     let (stiffness, damping) = (reduced * swing_rad_s * swing_rad_s, 2.0 * 0.15 * swing_rad_s * reduced);
-    let mut seed = 11_u64;
-    let mut draw = || {
-        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        2.0 * (seed >> 33) as f64 / f64::from(1_u32 << 31) - 1.0
-    };
+    let mut draws = Draws(11);
     let (mut motor, mut pulley, mut twist, mut volts) = (0.0, 0.0, 0.0, 0.0);
     let mut columns =
         ["voltage_cmd_v", "shaft_speed_rad_s"].map(|name| (name.to_string(), Vec::new())).to_vec();
     for row in 0..ROWS {
         if row % 25 == 0 {
-            volts = 2.0 * draw();
+            volts = 2.0 * draws.next();
         }
         columns[0].1.push(volts);
-        columns[1].1.push(if of_pulley { pulley } else { motor } + 0.3 * draw());
+        columns[1].1.push(if of_pulley { pulley } else { motor } + 0.3 * draws.next());
         for _ in 0..FINE {
             let dt = ROW_S / FINE as f64;
             let amperes = (volts - TORQUE_CONSTANT_NM_A * motor) / RESISTANCE_OHM;

@@ -1,10 +1,14 @@
 //! A motor on a dynamometer: what the load takes is measured between the two, and goes its own way.
 
+mod common;
+
 use kort_diagnose::diagnose::{Options, diagnose};
 use kort_diagnose::report::Report;
 use kort_identify::data::Series;
 use kort_thruster::models::ModelName;
 use kort_thruster::rig::Rig;
+
+use common::Draws;
 
 const RIG: &str = r#"
 [rig]
@@ -39,29 +43,25 @@ enum Torque {
 
 /// A motor with dry friction that nobody stated, under steps of its current and of a brake that knows nothing of them.
 fn recording(column: Torque) -> Series {
-    let mut seed = 3_u64;
-    let mut draw = || {
-        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        2.0 * (seed >> 33) as f64 / f64::from(1_u32 << 31) - 1.0
-    };
+    let mut draws = Draws(3);
     let (mut speed, mut amperes, mut brake_n_m) = (0.0_f64, 0.0, 0.0);
     let names = ["current_cmd_a", "shaft_speed_rad_s", "torque_n_m"];
     let mut columns: Vec<(String, Vec<f64>)> = names.iter().map(|n| (n.to_string(), Vec::new())).collect();
     for row in 0..ROWS {
         if row % 130 == 0 {
-            amperes = 5.0 * draw();
+            amperes = 5.0 * draws.next();
         }
         if row % 170 == 60 {
-            brake_n_m = 0.2 * draw();
+            brake_n_m = 0.2 * draws.next();
         }
         let load_n_m = |speed: f64| match column {
             Torque::Transducer(_) => brake_n_m + 0.004 * speed,
             Torque::OfTheDrive => 0.0,
         };
         columns[0].1.push(amperes);
-        columns[1].1.push(speed + 0.1 * draw());
+        columns[1].1.push(speed + 0.1 * draws.next());
         columns[2].1.push(match column {
-            Torque::Transducer(sign) => sign * (load_n_m(speed) + 0.005 * draw()),
+            Torque::Transducer(sign) => sign * (load_n_m(speed) + 0.005 * draws.next()),
             Torque::OfTheDrive => TORQUE_CONSTANT_NM_A * amperes,
         });
         for _ in 0..FINE {

@@ -1,10 +1,14 @@
 //! A motor on a bench with nothing on its shaft, and a rig that states little of it.
 
+mod common;
+
 use kort_diagnose::diagnose::{Options, diagnose};
 use kort_diagnose::report::Finding;
 use kort_identify::data::Series;
 use kort_thruster::models::ModelName;
 use kort_thruster::rig::Rig;
+
+use common::Draws;
 
 const ROWS: usize = 3000;
 const ROW_S: f64 = 0.01;
@@ -22,11 +26,7 @@ struct Bench {
 impl Bench {
     /// Steps of current both ways, with what the drive makes of them: 30 s at 100 Hz.
     fn recording(&self) -> Series {
-        let mut seed = 5_u64;
-        let mut draw = || {
-            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            2.0 * (seed >> 33) as f64 / f64::from(1_u32 << 31) - 1.0
-        };
+        let mut draws = Draws(5);
         let (mut speed, mut angle, mut amperes) = (0.0_f64, 0.0, 0.0);
         let mut columns: Vec<(String, Vec<f64>)> = ["current_cmd_a", "shaft_angle_rad", "shaft_speed_rad_s"]
             .iter()
@@ -34,9 +34,9 @@ impl Bench {
             .collect();
         for row in 0..ROWS {
             if row % 150 == 0 {
-                amperes = 2.0 * draw();
+                amperes = 2.0 * draws.next();
             }
-            let shown = [amperes, angle + 1e-3 * draw(), speed + 0.3 * draw()];
+            let shown = [amperes, angle + 1e-3 * draws.next(), speed + 0.3 * draws.next()];
             columns.iter_mut().zip(shown).for_each(|(column, value)| column.1.push(value));
             for _ in 0..FINE {
                 let dt = ROW_S / FINE as f64;

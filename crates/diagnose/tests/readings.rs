@@ -1,6 +1,8 @@
 //! Two readings of a stand that are no physics of the thruster: thrust that a hull takes or a force sensor's gain makes, which
 //! look alike, and a flow meter that holds its reading over rows with noise of their own.
 
+mod common;
+
 use kort_diagnose::diagnose::{Options, diagnose};
 use kort_diagnose::report::{Report, Verdict};
 use kort_identify::data::Series;
@@ -9,19 +11,11 @@ use kort_thruster::parameters::Parameters;
 use kort_thruster::plant::{Plant, Tick};
 use kort_thruster::rig::Rig;
 
+use common::Draws;
+
 const STAND: &str = include_str!("../../../config/thrusters/whitcomb-yoerger-1999.toml");
 const TICK_S: f64 = 0.002;
 const TICKS_A_ROW: u32 = 10;
-
-/// Uniform in -1 to 1.
-struct Draws(u64);
-
-impl Draws {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) as f64 / f64::from(1_u32 << 30) - 1.0
-    }
-}
 
 /// The stand under levels of its current, logged at 50 Hz; of the thrust so much is shown, and the flow is read every so many
 /// rows and held in between.

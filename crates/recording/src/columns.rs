@@ -19,6 +19,10 @@ pub struct Known {
 pub(crate) const TIME: Known =
     Known { name: "time_s", unit: "s", meaning: "Log instant, strictly increasing." };
 
+/// What a model is compared with: where none of it is there, or all of it stands still, there is nothing to compare.
+pub(crate) const RESPONSES: [&str; 5] =
+    ["shaft_speed_rad_s", "shaft_angle_rad", "thrust_n", "torque_n_m", "flow_m_s"];
+
 /// Every known column: the time, then the one table of signals, in its order.
 pub fn known() -> impl Iterator<Item = Known> {
     let signals = SIGNALS.iter().map(|signal| Known {

@@ -181,14 +181,16 @@ mod tests {
     use super::*;
     use std::os::unix::fs::PermissionsExt;
 
+    /// To be made, in a folder that is not there yet.
+    fn keys_in(folder: &Path) -> Tls {
+        let folder = folder.join("tls");
+        Tls { certificate: folder.join("cert.pem"), key: folder.join("key.pem"), self_signed: true }
+    }
+
     #[test]
     fn a_certificate_that_is_good_no_more_or_not_yet_is_told_and_served() {
         let folder = tempfile::tempdir().unwrap();
-        let keys = Tls {
-            certificate: folder.path().join("cert.pem"),
-            key: folder.path().join("key.pem"),
-            self_signed: true,
-        };
+        let keys = keys_in(folder.path());
         let names = || vec!["localhost".to_owned()];
         let certificate = Certificate::open(&keys, names()).unwrap();
         assert_eq!(certificate.doubtful(), None, "just made");
@@ -210,11 +212,7 @@ mod tests {
     #[test]
     fn a_certificate_is_made_once_and_read_anew_when_it_changes() {
         let folder = tempfile::tempdir().unwrap();
-        let keys = Tls {
-            certificate: folder.path().join("tls/cert.pem"),
-            key: folder.path().join("tls/key.pem"),
-            self_signed: true,
-        };
+        let keys = keys_in(folder.path());
         let names = || vec!["localhost".to_owned(), "[::1]".to_owned()];
         let certificate = Certificate::open(&keys, names()).unwrap();
         let first = fs::read(&keys.certificate).unwrap();

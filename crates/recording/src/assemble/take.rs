@@ -1,11 +1,10 @@
 //! One column of a recording from one column of its source, and what a reader should know of its numbers.
 
 use crate::cell::{Cell, Odd};
+use crate::columns::RESPONSES;
 use crate::error::Place;
 use crate::map::Mapped;
 
-/// What a model is compared with: where such a column stands still throughout, there is nothing to compare.
-const RESPONSES: [&str; 5] = ["shaft_speed_rad_s", "shaft_angle_rad", "thrust_n", "torque_n_m", "flow_m_s"];
 /// A share goes this far beyond -1 to 1 by the steps of its pulses.
 const BEYOND: f64 = 0.02;
 /// Pulses of a speed controller, us.

@@ -6,10 +6,8 @@ use super::names::words;
 use super::rules::{ASKED, COMMANDS, DRIVE};
 use super::survey::{Incomplete, Lack, Still};
 use super::{Field, Log, Topic, same_source};
+use crate::columns::RESPONSES;
 use crate::map::{ColumnMap, Time};
-
-/// What a model can be compared with.
-const RESPONSES: [&str; 5] = ["shaft_speed_rad_s", "shaft_angle_rad", "thrust_n", "torque_n_m", "flow_m_s"];
 
 /// Those that have all that they must, with what they ask for: first those whose command and response change.
 pub(super) fn fitting(log: &Log, table: bool) -> Vec<ColumnMap> {

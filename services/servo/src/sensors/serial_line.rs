@@ -2,8 +2,8 @@
 //!
 //! A line is taken apart at its separators ([`columns`]), or by a regular expression whose groups are the columns
 //! (crate `regex`, whose matching time is bounded; own parsing would be a worse language of the same kind). Each column's unit
-//! must be given; a line in which any wanted column is no number, or one that cannot be, is no reading, nor is one in which another unit follows the
-//! number: a switch of units on the instrument's front. Instruments that
+//! must be given; a line in which any wanted column is no number, or one that cannot be, is no reading. Nor is one, where
+//! separators part it, in which another unit follows the number: the instrument was switched at its front. Instruments that
 //! speak only when asked are sent `ask`.
 
 use std::path::PathBuf;
