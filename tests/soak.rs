@@ -304,7 +304,7 @@ fn a_rig_s_default_is_explained() {
     let told = kort(&["explain", "--for", "t200"]);
     assert!(told.status.success(), "{}", text(&told.stderr));
     let said = text(&told.stdout);
-    for word in ["model2_inversion", "ekf", "lag of the drive", "20.00 ms"] {
+    for word in ["model2_inversion", "ekf", "lag and dead time of the drive", "20.00 ms"] {
         assert!(said.contains(word), "{word}: {said}");
     }
     let json = kort(&["explain", "--for", "speed-drive", "--json"]);

@@ -31,9 +31,10 @@ const LASTING: ObserverOptions = ObserverOptions {
 /// Time scales of a rig under a control period, s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TimeScales {
-    /// Drive: its first-order lag.
+    /// Drive: its first-order lag and its dead time.
     pub drive_s: f64,
-    /// Between a shaft speed and its measurement: filter, and one and a half periods of hold and differencing.
+    /// Between a shaft speed and its measurement: filter, what the sensor is known to be late, and one and a half
+    /// periods of hold and differencing.
     pub sensing_s: f64,
     /// Shaft: from rest to top speed under all torque without load.
     pub shaft_s: f64,
@@ -48,13 +49,13 @@ pub struct TimeScales {
 impl TimeScales {
     /// Of a model.
     pub fn of(model: &ControlModel) -> Self {
-        let [drive_s, filter_s, delay_s] = model.loop_lags_s();
+        let [lag_s, filter_s, delay_s] = model.loop_lags_s();
         let flux = model.flux_coefficient * model.blade.density_kg_m3 * model.blade.area_m2();
         let flow = model.map.flow_m * model.map.speed_rad_s(0.5 * model.thrust_max_n);
         let torque = model.torque_constant_nm_a * model.current_limit_a;
         Self {
-            drive_s,
-            sensing_s: filter_s + delay_s,
+            drive_s: lag_s + model.delay_s,
+            sensing_s: filter_s + delay_s - model.delay_s,
             shaft_s: model.inertia_kg_m2 * model.speed_max_rad_s / torque,
             led_s: 1.0 / Pace::of(model).shaft_per_s,
             servo_s: 1.0 / model.speed_loop(56f64.to_radians()).0,

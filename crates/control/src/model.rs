@@ -43,6 +43,17 @@ pub enum ModelError {
 /// neither current limit nor supply.
 const TIP_SPEED_MAX_M_S: f64 = 60.0;
 
+/// How late sensors are known to be in the mean beyond their stated filters, s.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Late {
+    /// Shaft speed.
+    pub speed_s: f64,
+    /// Thrust.
+    pub thrust_s: f64,
+    /// Axial flow.
+    pub flow_s: f64,
+}
+
 /// The thruster as a controller sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ControlModel {
@@ -92,10 +103,12 @@ pub struct ControlModel {
     pub current_limit_a: f64,
     /// Nominal supply, V.
     pub supply_v: Option<f64>,
-    /// First-order filter on the measured speed, s.
+    /// First-order filter on the measured speed, s, with what its sensor is known to be late beyond the stated one.
     pub speed_filter_s: f64,
-    /// First-order filter on the measured thrust, s.
+    /// The same of the measured thrust, s.
     pub thrust_filter_s: f64,
+    /// What each sensor is known to be late beyond its stated filter.
+    pub late: Late,
     /// Quantum of the measured speed before its filter, rad/s, at the control period.
     pub speed_quantum_rad_s: f64,
     /// Quantum of the measured thrust, N.
@@ -158,6 +171,7 @@ impl ControlModel {
             supply_v: rig.amplifier.supply_v,
             speed_filter_s: s.speed_filter_time_constant_s.unwrap_or(0.0),
             thrust_filter_s: s.thrust_filter_hz.map_or(0.0, |f| 1.0 / (std::f64::consts::TAU * f)),
+            late: Late::default(),
             speed_quantum_rad_s: std::f64::consts::TAU / (counts * period_s),
             thrust_quantum_n: match (s.thrust_full_scale_n, s.thrust_bits) {
                 (Some(scale), Some(bits)) => 2.0 * scale / 2f64.powi(bits as i32),

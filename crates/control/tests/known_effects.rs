@@ -140,6 +140,28 @@ fn a_late_drive_and_late_sensors_leave_the_loop_stable() {
     }
 }
 
+/// An observer that took a late error for prompt would swing about it: a tenth of full thrust and more.
+#[test]
+fn sensors_known_to_be_late_cost_the_default_law_little() {
+    for name in ["t200", "t500", "duct", "tunnel"] {
+        let rig = named(name);
+        let law = LawKind::Model2Inversion;
+        let clean = error(&rig, &[], &[], law);
+        for (id, sizes) in [
+            ("thrust_sensor_lag", &[("thrust_lag_s", 10.0)][..]),
+            ("thrust_sensor_lag", &[("thrust_lag_s", 30.0)]),
+            ("clock_skew", &[("thrust_delay_s", 10.0)]),
+            ("clock_skew", &[("encoder_delay_s", 2.0)]),
+            ("encoder_filter_lag", &[("filter_excess_s", 2.0)]),
+        ] {
+            let effect = [known(&rig, id, sizes)];
+            let with = error(&rig, &effect, &effect, law);
+            println!("{name} {id} {sizes:?}: {clean:.4} -> {with:.4}");
+            assert!(with < clean + 5e-3, "{name} {id} {sizes:?}: {clean} {with}");
+        }
+    }
+}
+
 /// The command as the drive takes it: A, V or rad/s.
 fn told(output: &Output) -> f64 {
     let command = output.command;

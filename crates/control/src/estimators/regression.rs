@@ -81,6 +81,8 @@ pub struct Regression {
     suspect_s: f64,
     started: bool,
     flow_m_s: f64,
+    /// Estimated thrust behind the force sensor's filter, N.
+    felt_n: f64,
     filtered_speed_rad_s: f64,
     filtered_flow_m_s: f64,
     equations: [Equation; 3],
@@ -101,6 +103,7 @@ impl Regression {
             suspect_s: 0.0,
             started: false,
             flow_m_s: 0.0,
+            felt_n: 0.0,
             filtered_speed_rad_s: 0.0,
             filtered_flow_m_s: 0.0,
             equations: [Equation::default(); 3],
@@ -115,13 +118,13 @@ impl Regression {
     pub fn tick(&mut self, input: &EstimatorInput, flux_ratio: f64) -> Option<Result<[Equation; 3], Freeze>> {
         let (model, dt) = (input.nominal, input.dt_s);
         let Some(speed) = input.measured.shaft_speed_rad_s else { return Some(Err(Freeze::NotMeasured)) };
-        let thrust = input.measured.thrust_n;
+        let thrust = self.prompt_thrust_n(input);
         // Shaft and water may move already: a filter that starts at rest would see that as acceleration.
         if !std::mem::replace(&mut self.started, true) {
             self.flow_m_s = input.measured.flow_m_s.unwrap_or(input.estimate.flow_m_s.value);
             (self.filtered_speed_rad_s, self.filtered_flow_m_s) = (speed, self.flow_m_s);
         }
-        self.advance_flow(input, flux_ratio);
+        self.advance_flow(input, thrust, flux_ratio);
         self.filter(model, input, speed, thrust);
         // Filters remember a suspect tick for a while, so that it must not be learnt from later.
         self.suspect_s = if input.suspect { 2.0 / self.lambda_rad_s } else { (self.suspect_s - dt).max(0.0) };
@@ -142,9 +145,16 @@ impl Regression {
         })
     }
 
-    fn advance_flow(&mut self, input: &EstimatorInput, flux_ratio: f64) {
+    /// The measured thrust with what its filter still hides, as the observer expects it, N: the equations know no filter.
+    fn prompt_thrust_n(&mut self, input: &EstimatorInput) -> Option<f64> {
+        let expected = input.estimate.thrust_n.value;
+        self.felt_n += (expected - self.felt_n) * input.dt_s / (input.nominal.thrust_filter_s + input.dt_s);
+        input.measured.thrust_n.map(|thrust| thrust + expected - self.felt_n)
+    }
+
+    fn advance_flow(&mut self, input: &EstimatorInput, thrust: Option<f64>, flux_ratio: f64) {
         let (model, dt) = (input.nominal, input.dt_s);
-        let Some(thrust) = input.measured.thrust_n else {
+        let Some(thrust) = thrust else {
             self.flow_m_s = input.estimate.flow_m_s.value;
             return;
         };

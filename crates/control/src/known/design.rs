@@ -8,13 +8,13 @@ use kort_thruster::blade::{BladeRow, Inflow};
 use kort_thruster::effects::Effect;
 use kort_thruster::models::ModelName;
 use kort_thruster::parameters::{Parameter as P, Parameters};
-use kort_thruster::plant::{Balance, Drive, Foil, Local, Tick};
+use kort_thruster::plant::{Balance, Drive, Foil, Local, Sensed, Tick};
 use kort_thruster::rig::{KnownEffect, Rig};
 
 use super::curves::{FoilCurve, FrictionCurve};
 use super::motion::{bare, followed, torque_n_m};
 use super::{Built, SETTLED_S, built};
-use crate::model::{ControlModel, Swirl};
+use crate::model::{ControlModel, Late, Swirl};
 
 /// Angles of the shaft that are averaged for what follows it.
 const ANGLES: u32 = 48;
@@ -25,8 +25,9 @@ const SETTLING: i32 = 40;
 const PROBE: f64 = 1e-4;
 /// Most own states of an effect that is probed.
 const STATES: usize = 24;
-/// Longest delay that is looked for, s.
+/// Longest delay that is looked for, s: of the drive, and of a sensor, whose slowest filter has settled by then.
 const LONGEST_S: f64 = 0.25;
+const SENSED_S: f64 = 5.0;
 /// How much a blade's coefficients may change with speed and still count as a function of the angle alone.
 const SAME: f64 = 0.02;
 
@@ -41,6 +42,7 @@ pub(crate) fn design(model: &mut ControlModel, rig: &Rig) {
     blades(model, &effects);
     model.known_friction = friction(model, &effects);
     drive(model, rig, &effects);
+    sensors(model, rig);
     rig.effects.iter().for_each(|known| swirl(model, known));
 }
 
@@ -228,20 +230,50 @@ fn drive(model: &mut ControlModel, rig: &Rig, effects: &[Built]) {
 
 /// How late a step of the command arrives in the mean, s.
 fn late_s(effect: &mut dyn Effect, model: &ControlModel) -> f64 {
-    let mut passed = |command: f64| {
+    mean_delay_s(model.period_s, LONGEST_S, |step| {
+        let command = step * 0.5 * model.current_limit_a;
         let mut drive = Drive { command, current_limit_a: model.current_limit_a, ..empty() };
         effect.drive(&Tick::default(), &mut drive);
         drive.command
-    };
-    passed(0.0);
-    let ticks = (LONGEST_S / model.period_s).ceil() as u32;
-    let arrived: Vec<f64> = (0..ticks).map(|_| passed(0.5 * model.current_limit_a)).collect();
+    })
+}
+
+/// What sensors are late beyond their stated filters: observers and loops then have it in theirs.
+fn sensors(model: &mut ControlModel, rig: &Rig) {
+    type Channel = fn(&mut Sensed) -> &mut f64;
+    let channels: [(f64, Channel); 3] = [
+        (model.speed_max_rad_s, |sensed| &mut sensed.shaft_speed_rad_s),
+        (model.thrust_max_n, |sensed| &mut sensed.thrust_n),
+        (1.0, |sensed| &mut sensed.flow_m_s),
+    ];
+    let [speed_s, thrust_s, flow_s] = channels.map(|(full, channel)| {
+        let sensing = built(rig, model.period_s).into_iter().filter(|(_, e)| e.hooks().sense);
+        let late = sensing.map(|(_, mut effect)| {
+            mean_delay_s(model.period_s, SENSED_S, |step| {
+                let mut sensed = Sensed::default();
+                *channel(&mut sensed) = 0.5 * full * step;
+                effect.sense(&Tick::default(), &mut sensed);
+                *channel(&mut sensed)
+            })
+        });
+        late.sum::<f64>()
+    });
+    model.late = Late { speed_s, thrust_s, flow_s };
+    model.speed_filter_s += speed_s;
+    model.thrust_filter_s += thrust_s;
+}
+
+/// How late a step from 0 to 1 arrives in the mean, s.
+fn mean_delay_s(period_s: f64, longest_s: f64, mut passed: impl FnMut(f64) -> f64) -> f64 {
+    let before = passed(0.0);
+    let ticks = (longest_s / period_s).ceil() as u32;
+    let arrived: Vec<f64> = (0..ticks).map(|_| passed(1.0) - before).collect();
     let whole = arrived.last().copied().unwrap_or(0.0);
     if whole == 0.0 {
         return 0.0;
     }
-    let missing: f64 = arrived.iter().map(|command| 1.0 - command / whole).sum();
-    (missing * model.period_s).max(0.0)
+    let missing: f64 = arrived.iter().map(|now| 1.0 - now / whole).sum();
+    (missing * period_s).max(0.0)
 }
 
 fn empty() -> Drive {

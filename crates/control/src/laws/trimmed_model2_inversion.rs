@@ -61,7 +61,9 @@ impl TrimmedModel2Inversion {
         Self {
             inner: Model2Inversion::new(model, servo),
             matched: MatchedTarget::of_thrust(model, Pace::of(model).shaft_per_s),
-            bandwidth_rad_s: options.bandwidth_fraction.min(0.2) * crossover,
+            // A trim behind a slow force sensor is critically damped at most.
+            bandwidth_rad_s: (options.bandwidth_fraction.min(0.2) * crossover)
+                .min(0.25 / model.thrust_filter_s.max(model.period_s)),
             authority: options.authority,
             trim: Integrator::default(),
             asked_n_m: 0.0,

@@ -8,7 +8,7 @@ use crate::model::{ControlModel, Slopes};
 use crate::signals::{Estimate, Estimated};
 
 /// Number of states.
-pub(super) const N: usize = 7;
+pub(super) const N: usize = 8;
 pub(super) const SPEED: usize = 0;
 pub(super) const FLOW: usize = 1;
 pub(super) const SWIRL: usize = 2;
@@ -16,6 +16,7 @@ pub(super) const AMBIENT: usize = 3;
 pub(super) const LOAD: usize = 4;
 pub(super) const FILTERED: usize = 5;
 pub(super) const BLADE: usize = 6;
+pub(super) const FELT: usize = 7;
 
 pub(super) type Vector = SVector<f64, N>;
 pub(super) type Matrix = SMatrix<f64, N, N>;
@@ -54,6 +55,7 @@ impl Noise {
             load * load,
             speed * speed,
             blade * blade,
+            model.thrust_max_n * model.thrust_max_n,
         ]);
         // Torque noise of one percent over the drive's time scale, flow of a few percent in a second.
         let torque_time = model.amplifier_lag_s + model.period_s;
@@ -65,6 +67,7 @@ impl Noise {
             2.0 * load * load / load_time_s,
             0.0,
             2.0 * blade * blade / blade_time_s,
+            0.0,
         ]);
         if model.amplifier == AmplifierKind::Speed {
             // What turns the shaft is the drive's own affair: its speed is followed, its torque says nothing.
@@ -72,11 +75,15 @@ impl Noise {
         }
         // The quantum shrinks through the speed filter; a held flow reading repeats itself.
         let shrink = model.period_s / (model.period_s + 2.0 * model.speed_filter_s);
+        // A sensor that is late shows an error as it was: what it became since is noise, for as long as the lag.
+        let since = 2.0 * process[SPEED] * model.late.speed_s.powi(2) / model.period_s;
         let speed_var =
-            model.speed_quantum_rad_s.powi(2) / 6.0 * shrink + (5e-4 * model.speed_max_rad_s).powi(2);
+            model.speed_quantum_rad_s.powi(2) / 6.0 * shrink + (5e-4 * model.speed_max_rad_s).powi(2) + since;
         let thrust_std =
             (options.thrust_std.clamp(1e-5, 10.0) * model.thrust_max_n).max(model.thrust_quantum_n);
-        let repeats = model.flow_rate_hz.map_or(1.0, |f| (1.0 / (f * model.period_s)).max(1.0));
+        // As does, nearly, one whose sensor is late.
+        let held_s = model.flow_rate_hz.map_or(0.0, |f| 1.0 / f) + 2.0 * model.late.flow_s;
+        let repeats = (held_s / model.period_s).max(1.0);
         Self {
             prior,
             process,
@@ -103,8 +110,14 @@ impl Noise {
             water.load_n_m * (1.0 - (dt / self.load_time_s).min(1.0)),
             keep * x[FILTERED] + (1.0 - keep) * mean_speed,
             water.blade_load_n_m * (1.0 - (dt / self.blade_time_s).min(1.0)),
+            x[FELT],
         ])
     }
+}
+
+/// What the force sensor's filter keeps of itself over a period.
+pub(super) fn felt_keep(model: &ControlModel, dt: f64) -> f64 {
+    if model.thrust_filter_s > 0.0 { (-dt / model.thrust_filter_s).exp() } else { 0.0 }
 }
 
 /// What the speed filter keeps of itself over a period.
@@ -196,14 +209,21 @@ impl Belief {
             (self.x[SPEED], self.x[FILTERED]) = (speed, speed);
             self.x[FLOW] = input.model.map.flow_m_s(speed);
             self.x[AMBIENT] = input.model.ambient_mean_m_s;
+            self.x[FELT] = self.blade_thrust_n(input.model);
         }
     }
 
     /// Goes on from another observer's belief, at the prior's doubt.
-    pub(super) fn start_in(&mut self, water: &Water) {
+    pub(super) fn start_in(&mut self, model: &ControlModel, water: &Water) {
         put_back(&mut self.x, water);
         self.x[FILTERED] = water.speed_rad_s;
+        self.x[FELT] = self.blade_thrust_n(model);
         self.started = true;
+    }
+
+    /// Thrust of the blades as the model has it, N.
+    fn blade_thrust_n(&self, model: &ControlModel) -> f64 {
+        model.load(self.x[SPEED], self.x[FLOW], self.x[SWIRL]).thrust_n
     }
 
     /// Forgets what it believed: the next measured speed starts it again, at the prior's doubt.
@@ -241,6 +261,21 @@ impl Belief {
         let ph = self.p.column(state).into_owned();
         let s = ph[state] + variance;
         self.update(channel, value - self.x[state], ph, s, dt);
+    }
+
+    /// The force sensor's filter over a period, at the state as it then is: one without leaves thrust and its doubt as they are.
+    pub(super) fn feel(&mut self, model: &ControlModel, dt: f64) {
+        let keep = felt_keep(model, dt);
+        let s = model.slopes(model.blade.inflow(self.x[SPEED], self.x[FLOW], self.x[SWIRL]));
+        let (ph, variance) = self.thrust_doubt(model, &s);
+        self.x[FELT] = keep * self.x[FELT] + (1.0 - keep) * s.thrust_n;
+        let own = self.p[(FELT, FELT)];
+        for i in 0..N {
+            let with = keep * self.p[(i, FELT)] + (1.0 - keep) * ph[i];
+            (self.p[(i, FELT)], self.p[(FELT, i)]) = (with, with);
+        }
+        self.p[(FELT, FELT)] =
+            keep * keep * own + 2.0 * keep * (1.0 - keep) * ph[FELT] + (1.0 - keep).powi(2) * variance;
     }
 
     /// `P h` and `h' P h` of thrust, `h` its slopes by speed, flow and swirl.
@@ -289,6 +324,8 @@ impl Belief {
         put_back(&mut self.x, &boxed);
         let speed = 2.0 * model.speed_max_rad_s;
         self.x[FILTERED] = self.x[FILTERED].clamp(-speed, speed);
+        let thrust = 4.0 * model.thrust_max_n;
+        self.x[FELT] = self.x[FELT].clamp(-thrust, thrust);
     }
 
     /// A measured ambient flow is not estimated.

@@ -2,8 +2,8 @@
 //!
 //! Reference: docs/control.md D8; Kalman filter with scalar updates (Bucy & Joseph 1968), the covariance kept
 //! symmetric and within its prior.
-//! State `[Om, vp, us, va, Qf, Om_f, Qb]`; `Om_f` is the speed behind the rig's filter, which is what is
-//! measured; the load that the model does not explain opposes the shaft with `Qf` at any speed, as friction does, and with
+//! State `[Om, vp, us, va, Qf, Om_f, Qb, T_f]`; `Om_f` and `T_f` are speed and thrust behind their sensors' filters,
+//! which is what is measured; the load that the model does not explain opposes the shaft with `Qf` at any speed, as friction does, and with
 //! `Qb (Om/Om_max)^2`, as an error of the blades' torque does. Shaft and water follow Model 2 (with swirl where the model has it) by midpoint steps
 //! of at most what the thruster's fastest pole allows; `va` and `Qd` are first-order Gauss-Markov, so that
 //! an unobservable one goes back to its prior standard deviation and says so. Each measurement
@@ -20,7 +20,7 @@
 use kort_thruster::rig::AmplifierKind;
 
 use super::belief::{
-    AMBIENT, BLADE, Belief, FILTERED, FLOW, LOAD, Matrix, N, Noise, SPEED, SWIRL, Vector, filter_keep,
+    AMBIENT, BLADE, Belief, FELT, FILTERED, FLOW, LOAD, Matrix, N, Noise, SPEED, SWIRL, Vector, filter_keep,
     water_of,
 };
 use super::{ObserverInput, ObserverOptions, Water};
@@ -64,8 +64,8 @@ impl Ekf {
         Self { belief: Belief::new(model, options), options: *options }
     }
 
-    pub(super) fn start_in(&mut self, water: &Water) {
-        self.belief.start_in(water);
+    pub(super) fn start_in(&mut self, model: &ControlModel, water: &Water) {
+        self.belief.start_in(model, water);
     }
 
     /// Predict with the motor's torque, correct with what is measured.
@@ -79,11 +79,9 @@ impl Ekf {
         if let Some(speed) = input.measured.shaft_speed_rad_s {
             self.belief.linear(0, FILTERED, speed, speed_var, dt);
         }
+        self.belief.feel(model, dt);
         if let Some(thrust) = input.measured.thrust_n.filter(|_| self.options.use_thrust) {
-            let x = &self.belief.x;
-            let s = model.slopes(model.blade.inflow(x[SPEED], x[FLOW], x[SWIRL]));
-            let (ph, variance) = self.belief.thrust_doubt(model, &s);
-            self.belief.update(1, thrust - s.thrust_n, ph, variance + thrust_var, dt);
+            self.belief.linear(1, FELT, thrust, thrust_var, dt);
         }
         if let Some(flow) = input.measured.flow_m_s.filter(|_| self.options.use_flow) {
             self.belief.linear(2, FLOW, flow, flow_var, dt);
@@ -181,10 +179,10 @@ mod tests {
         let mut model = stand();
         model.thrust_per_torque_1_m = 5.0;
         let noise = Noise::new(&model, &ObserverOptions::default());
-        let x = Vector::from([45.0, 0.7, 0.0, 0.2, 0.1, 44.0, 0.3]);
+        let x = Vector::from([45.0, 0.7, 0.0, 0.2, 0.1, 44.0, 0.3, 150.0]);
         let dt = 1e-3;
         let f = transition(&model, &x, &noise, dt);
-        for j in [SPEED, FLOW, AMBIENT, LOAD, FILTERED, BLADE] {
+        for j in [SPEED, FLOW, AMBIENT, LOAD, FILTERED, BLADE, FELT] {
             let h = 1e-5;
             let (mut up, mut down) = (x, x);
             up[j] += h;

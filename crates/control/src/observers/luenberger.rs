@@ -17,11 +17,16 @@ use super::{ObserverInput, ObserverOptions, Water};
 use crate::model::ControlModel;
 use crate::signals::Estimate;
 
+/// What a correction may be of its sensor's lag: critically damped.
+const DAMPED: f64 = 0.25;
+
 /// A running observer.
 #[derive(Clone, Copy, Debug)]
 pub struct Luenberger {
     water: Water,
     filtered_rad_s: f64,
+    /// Expected thrust behind its sensor's filter, N.
+    felt_n: f64,
     pole_rad_s: f64,
     options: ObserverOptions,
     started: bool,
@@ -33,6 +38,7 @@ impl Luenberger {
         Self {
             water: Water::default(),
             filtered_rad_s: 0.0,
+            felt_n: 0.0,
             pole_rad_s: 0.4 / (model.speed_filter_s + 1.5 * model.period_s + 0.5 * model.amplifier_lag_s),
             options: *options,
             started: false,
@@ -91,16 +97,17 @@ impl Luenberger {
             // A filter state that never meets its measurement would wind the error up.
             self.filtered_rad_s += p * error * dt;
         }
+        self.felt_n += (s.thrust_n - self.felt_n) * dt / (model.thrust_filter_s + dt);
         if let Some(thrust) = input.measured.thrust_n.filter(|_| self.options.use_thrust) {
             let slope = s.thrust_by_axial;
             let scale = model.thrust_max_n / (model.map.flow_m * model.speed_max_rad_s);
             if slope < -0.05 * scale {
-                let expected = s.thrust_n;
-                pull += 0.3 * p * ((thrust - expected) / slope).clamp(-1.0, 1.0);
+                let pole = (0.3 * p).min(DAMPED / model.thrust_filter_s.max(dt));
+                pull += pole * ((thrust - self.felt_n) / slope).clamp(-1.0, 1.0);
             }
         }
         if let Some(flow) = input.measured.flow_m_s.filter(|_| self.options.use_flow) {
-            pull += 1.0 * (flow - w.flow_m_s);
+            pull += (DAMPED / model.late.flow_s.max(dt)).min(1.0) * (flow - w.flow_m_s);
         }
         self.water.flow_m_s += pull * dt;
         match input.measured.ambient_m_s {

@@ -157,8 +157,8 @@ impl Observer {
         match &mut observer {
             Self::OpenLoop(o) => o.start_in(water),
             Self::Luenberger(o) => o.start_in(water),
-            Self::Ekf(o) => o.start_in(&water),
-            Self::Ukf(o) => o.start_in(&water),
+            Self::Ekf(o) => o.start_in(model, &water),
+            Self::Ukf(o) => o.start_in(model, &water),
         }
         observer
     }

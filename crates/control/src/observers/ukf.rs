@@ -2,15 +2,15 @@
 //!
 //! Reference: Julier & Uhlmann 1997; docs/control.md D8 recommends it near standstill, where `|Om|` and
 //! `|vp|` have kinks that a slope does not see. `2n + 1` points with `kappa = 1`; all weights are positive,
-//! so the covariance stays one. Speed and flow are linear in the state and take the scalar
-//! update of the EKF; thrust takes a second set of points.
+//! so the covariance stays one. What is measured is linear in the state and takes the scalar update of
+//! the EKF; the force sensor's filter takes a second set of points.
 //!
 //! Assumes: blade coefficients, inertia and torque constant known, as `ekf`.
 //! Needs measured: shaft speed and current; thrust, flow and ambient where there are any.
 //! Fails: as `ekf`, model error goes into load or inflow; at several times the cost of `ekf`, for little
 //! away from standstill.
 
-use super::belief::{Belief, FILTERED, FLOW, Matrix, N, SPEED, SWIRL, Vector};
+use super::belief::{Belief, FELT, FILTERED, FLOW, Matrix, N, SPEED, SWIRL, Vector, felt_keep};
 use super::{ObserverInput, ObserverOptions, Water};
 use crate::model::ControlModel;
 use crate::signals::Estimate;
@@ -32,8 +32,8 @@ impl Ukf {
         Self { belief: Belief::new(model, options), options: *options }
     }
 
-    pub(super) fn start_in(&mut self, water: &Water) {
-        self.belief.start_in(water);
+    pub(super) fn start_in(&mut self, model: &ControlModel, water: &Water) {
+        self.belief.start_in(model, water);
     }
 
     /// Predict with the motor's torque, correct with what is measured.
@@ -46,8 +46,9 @@ impl Ukf {
         if let Some(speed) = input.measured.shaft_speed_rad_s {
             self.belief.linear(0, FILTERED, speed, noise.speed_var, dt);
         }
+        self.feel(model, dt);
         if let Some(thrust) = input.measured.thrust_n.filter(|_| self.options.use_thrust) {
-            self.thrust(model, thrust, noise.thrust_var, dt);
+            self.belief.linear(1, FELT, thrust, noise.thrust_var, dt);
         }
         if let Some(flow) = input.measured.flow_m_s.filter(|_| self.options.use_flow) {
             self.belief.linear(2, FLOW, flow, noise.flow_var, dt);
@@ -72,24 +73,30 @@ impl Ukf {
         (b.x, b.p) = (mean, p);
     }
 
-    fn thrust(&mut self, model: &ControlModel, thrust_n: f64, variance: f64, dt: f64) {
-        let b = &mut self.belief;
+    /// The force sensor's filter over a period, as [`Belief::feel`].
+    fn feel(&mut self, model: &ControlModel, dt: f64) {
+        let (b, keep) = (&mut self.belief, felt_keep(model, dt));
         let root = root(&b.p);
         let mut values = [0.0; 2 * N + 1];
         let mut mean = 0.0;
         for (i, value) in values.iter_mut().enumerate() {
             let x = sigma(&b.x, &root, i);
-            *value = model.load(x[SPEED], x[FLOW], x[SWIRL]).thrust_n;
+            let thrust_n = model.load(x[SPEED], x[FLOW], x[SWIRL]).thrust_n;
+            *value = keep * x[FELT] + (1.0 - keep) * thrust_n;
             mean += weight(i) * *value;
         }
         let mut cross = Vector::zeros();
-        let mut s = variance;
+        let mut variance = 0.0;
         for (i, value) in values.iter().enumerate() {
             let d = value - mean;
-            s += weight(i) * d * d;
+            variance += weight(i) * d * d;
             cross += (sigma(&b.x, &root, i) - b.x) * (weight(i) * d);
         }
-        b.update(1, thrust_n - mean, cross, s, dt);
+        b.x[FELT] = mean;
+        for i in 0..N {
+            (b.p[(i, FELT)], b.p[(FELT, i)]) = (cross[i], cross[i]);
+        }
+        b.p[(FELT, FELT)] = variance;
     }
 }
 

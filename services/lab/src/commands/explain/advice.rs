@@ -31,7 +31,7 @@ pub fn run(wanted: &Path, json: bool) -> Result<Outcome, Failure> {
 /// The time scales in words, with their values in s.
 fn scales(s: &TimeScales) -> [(&'static str, &'static str, f64); 6] {
     [
-        ("drive_s", "lag of the drive", s.drive_s),
+        ("drive_s", "lag and dead time of the drive", s.drive_s),
         ("sensing_s", "from a shaft speed to its measurement", s.sensing_s),
         ("shaft_s", "shaft to top speed under all torque, without load", s.shaft_s),
         ("led_s", "shaft led by the model, the drive's lag inverted", s.led_s),
