@@ -1,26 +1,63 @@
 //! What the drive's limits leave: the thrust error of a law that is told everything, behind the same drive.
 //!
 //! It knows the true parameters and, at every tick, the true shaft speed, current, flow, ambient flow, thrust and
-//! load; it has no sensor, no filter and no delay. It aims as `model2_inversion` does and leads the shaft as fast
+//! load; it has no sensor, no filter and no delay. What makes commands late it foresees: of a dead time only the reference
+//! is late, and what rounds a command is left out ([`Prompt`]). It aims as `model2_inversion` does and leads the shaft as fast
 //! as current, supply and slew of the drive let it. What error it has left, no choice of law takes away; a step
 //! costs every law the time that the drive needs for it.
 
+use std::collections::VecDeque;
+
+use kort_control::known::command_late_s;
 use kort_control::laws::aim::Aim;
 use kort_control::laws::lead::{Lead, Meets};
 use kort_control::{ControlModel, ControllerConfig, Estimate, ModelError};
+use kort_thruster::effects::{Context, Descriptor};
 use kort_thruster::parameters::Parameters;
 use kort_thruster::plant::Plant;
-use kort_thruster::rig::AmplifierKind;
+use kort_thruster::rig::{AmplifierKind, Rig};
 
 use crate::run::{Prepared, Progress};
 use crate::score::{Outcome, Sample, Tally};
 use crate::script::{Moment, Script};
-use crate::truth;
+use crate::truth::{self, Hooked};
 
 /// Name in reports.
 pub const NAME: &str = "drive_limits";
 /// Share of top speed below which thrust says nothing of the flow.
 const SEEN: f64 = 0.1;
+
+/// The thruster without what makes its commands late: a law that knows what will come sends each as much earlier.
+struct Prompt {
+    rig: Rig,
+    effects: Vec<Hooked>,
+    /// By how much a dead time makes every command late, s.
+    dead_time_s: f64,
+}
+
+impl Prompt {
+    fn of(prepared: &Prepared, model: &ControlModel) -> Self {
+        let parameters = Parameters::stated(prepared.rig);
+        let context = Context { parameters: &parameters, rig: prepared.rig, tick_s: model.period_s };
+        let late_s = |descriptor: &Descriptor, values: &[f64]| {
+            let mut effect = (descriptor.build.plain)(values, &context);
+            if effect.hooks().drive { command_late_s(effect.as_mut(), model) } else { 0.0 }
+        };
+        let mut dead_time_s = 0.0;
+        let mut prompt = |descriptor: &Descriptor, values: &[f64]| {
+            let late_s = late_s(descriptor, values);
+            dead_time_s += if descriptor.shifts_time { late_s } else { 0.0 };
+            late_s == 0.0
+        };
+        let mut rig = prepared.rig.clone();
+        rig.effects.retain(|known| {
+            let values: Vec<f64> = known.values().collect();
+            known.descriptor().is_none_or(|descriptor| prompt(descriptor, &values))
+        });
+        let effects = prepared.effects.iter().filter(|(d, values)| prompt(d, values)).cloned().collect();
+        Self { rig, effects, dead_time_s }
+    }
+}
 
 struct Told {
     parameters: Parameters,
@@ -28,6 +65,8 @@ struct Told {
     plant: Plant,
     aim: Aim,
     lead: Lead,
+    /// References that a dead time holds back, N: the newest last.
+    held_n: VecDeque<f64>,
     last_reference_n: f64,
     dt_s: f64,
 }
@@ -40,10 +79,13 @@ pub fn limits(prepared: &Prepared, seed: u64, progress: Progress) -> Result<Outc
     let scenario = prepared.scenario;
     let dt_s = 1.0 / scenario.control_rate_hz;
     let parameters = truth::parameters(prepared, seed);
+    let Prompt { rig, effects, dead_time_s } = Prompt::of(prepared, &model(prepared, &parameters, dt_s)?);
+    let prepared = &Prepared { rig: &rig, effects: &effects, ..*prepared };
     let model = model(prepared, &parameters, dt_s)?;
     let plant = truth::plant(prepared, &parameters, dt_s);
     let (aim, lead) = (Aim::default(), Lead::new(&model));
-    let mut told = Told { parameters, model, plant, aim, lead, last_reference_n: 0.0, dt_s };
+    let held_n = VecDeque::from(vec![0.0; (dead_time_s / dt_s).round() as usize]);
+    let mut told = Told { parameters, model, plant, aim, lead, held_n, last_reference_n: 0.0, dt_s };
     let mut script = Script::new(prepared, seed);
     let mut tally = Tally::new(dt_s, prepared.rig, prepared.thrust_max_n, scenario.settle_s);
     let mut changes = scenario.truth.change.iter().peekable();
@@ -95,6 +137,8 @@ fn flow_for_thrust(model: &ControlModel, speed_rad_s: f64, flow_m_s: f64, thrust
 
 impl Told {
     fn tick(&mut self, moment: &Moment) -> Sample {
+        self.held_n.push_back(moment.reference_n);
+        let reference_n = self.held_n.pop_front().unwrap_or(moment.reference_n);
         let model = &self.model;
         let before = *self.plant.truth();
         let flow = flow_for_thrust(model, before.shaft_speed_rad_s, before.axial_m_s, before.thrust_n);
@@ -103,9 +147,9 @@ impl Told {
         estimate.ambient_m_s.value = before.ambient_m_s + flow - before.axial_m_s;
         let expected = model.load(before.shaft_speed_rad_s, flow, 0.0);
         let arrives_s = 1.0 / self.lead.pace().shaft_per_s;
-        let target = self.aim.at(model, &estimate, moment.reference_n, arrives_s);
-        let rate = target.by_thrust * (moment.reference_n - self.last_reference_n) / self.dt_s;
-        self.last_reference_n = moment.reference_n;
+        let target = self.aim.at(model, &estimate, reference_n, arrives_s);
+        let rate = target.by_thrust * (reference_n - self.last_reference_n) / self.dt_s;
+        self.last_reference_n = reference_n;
         let meets = Meets {
             flow_m_s: flow,
             swirl_m_s: 0.0,

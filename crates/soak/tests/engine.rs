@@ -109,6 +109,32 @@ fn a_law_told_the_truth_does_better() {
     assert!(of(Knows::Truth) < 0.9 * of(Knows::Stated), "{} {}", of(Knows::Truth), of(Knows::Stated));
 }
 
+/// Told everything, it knows what comes: a loop on what is now would swing about a dead time. Of a ramp a law may leave a
+/// little less, which leads the reference by more than the shaft needs.
+#[test]
+fn a_late_drive_does_not_make_the_law_that_is_told_everything_swing() {
+    for (late, of_law) in [
+        ("effect = \"transport_delay\"\ndelay_s = 0.05\n", 1.2),
+        ("effect = \"amplifier_lag\"\ncommand_lag_s = 0.03\n", 0.9),
+    ] {
+        let scenario = Scenario::from_toml(STEPS).unwrap();
+        let rig = Rig::from_toml(&format!("{STAND}\n[[effects]]\n{late}")).unwrap();
+        let prepared = Prepared {
+            scenario: &scenario,
+            rig: &rig,
+            effects: &[],
+            replayed: &vec![None; scenario.references.len()],
+            thrust_max_n: 170.0,
+        };
+        let error = |outcome: Outcome| outcome.scores["thrust_rms_n"];
+        let config = ControllerConfig::with_law(LawKind::Model2Inversion);
+        let law = run::<Direct>(&prepared, &config, 1, Knows::Truth, &|_, _, _| {}).unwrap();
+        let left = kort_soak::limits::limits(&prepared, 1, &|_, _, _| {}).unwrap();
+        let (law, left) = (error(law), error(left));
+        assert!(left < of_law * law, "{late}: {left} beside a law's {law}");
+    }
+}
+
 #[test]
 fn a_controller_that_stops_is_counted_as_a_fault() {
     let fault = "[[process_fault]]\nkind = \"controller_restart\"\nat_s = 4\nfor_s = 0.3\n";

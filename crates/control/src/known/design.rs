@@ -222,14 +222,14 @@ fn drive(model: &mut ControlModel, rig: &Rig, effects: &[Built]) {
     // What shifts the command in time is a delay; what rounds it, ahead of the amplifier, one more lag.
     for ((d, e), (_, mut fresh)) in effects.iter().zip(built(rig, model.period_s)) {
         if e.hooks().drive {
-            let late_s = late_s(fresh.as_mut(), model);
+            let late_s = command_late_s(fresh.as_mut(), model);
             if d.shifts_time { model.delay_s += late_s } else { model.amplifier_lag_s += late_s }
         }
     }
 }
 
-/// How late a step of the command arrives in the mean, s.
-fn late_s(effect: &mut dyn Effect, model: &ControlModel) -> f64 {
+/// How late an effect that is fresh lets a step of the command arrive in the mean, s.
+pub fn command_late_s(effect: &mut dyn Effect, model: &ControlModel) -> f64 {
     mean_delay_s(model.period_s, LONGEST_S, |step| {
         let command = step * 0.5 * model.current_limit_a;
         let mut drive = Drive { command, current_limit_a: model.current_limit_a, ..empty() };

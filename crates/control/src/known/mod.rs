@@ -32,6 +32,7 @@ use crate::model::ControlModel;
 use crate::signals::{Estimate, Measurement};
 
 pub use curves::{FoilCurve, FrictionCurve};
+pub use design::command_late_s;
 pub(crate) use design::design;
 use drive::DriveChain;
 pub use drive::{OperatingPoint, Reach};
