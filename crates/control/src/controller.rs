@@ -219,8 +219,10 @@ impl Controller {
         let m = &self.stated;
         let measured = measured.sane(3.0 * m.speed_max_rad_s, 3.0 * m.current_limit_a, 4.0 * m.thrust_max_n);
         let (measured, supply_v, current_a) = self.ideal(&measured, dt);
+        let held_lift = self.known.held_lift(self.estimate.as_ref(), &self.model, dt);
+        let building = held_lift.map(|held| self.model.holding(held));
         let estimate = self.observer.tick(&ObserverInput {
-            model: &self.model,
+            model: building.as_ref().unwrap_or(&self.model),
             measured: &measured,
             current_a,
             dt_s: dt,

@@ -16,7 +16,7 @@ use kort_thruster::rig::{AmplifierKind, Rig};
 use thiserror::Error;
 
 use crate::known::{self, FoilCurve, FrictionCurve};
-pub use blades::Slopes;
+pub use blades::{HeldLift, Slopes};
 pub use static_map::StaticMap;
 pub use swirl::Swirl;
 
@@ -81,6 +81,8 @@ pub struct ControlModel {
     pub known_friction: Option<FrictionCurve>,
     /// What the rig is known to have at its blades beyond the sinusoids of (17).
     pub foil: Option<FoilCurve>,
+    /// What the blades' lift lacks at this moment, where it is known to build up: for the observers, who look at this moment.
+    pub held_lift: Option<HeldLift>,
     /// Flux coefficient of a flow astern as a multiple of that ahead.
     pub flux_astern: f64,
     /// Force on the stand beyond the blades' thrust, as a share of it: less than zero where a hull takes some.
@@ -158,6 +160,7 @@ impl ControlModel {
             coulomb_friction_n_m: 0.0,
             known_friction: None,
             foil: None,
+            held_lift: None,
             flux_astern: 1.0,
             stand_share: 0.0,
             stand_kg_m: 0.0,

@@ -3,7 +3,7 @@
 mod common;
 
 use common::{Loop, rigs};
-use kort_control::{Controller, ControllerConfig, LawKind, Output, Reference};
+use kort_control::{Controller, ControllerConfig, LawKind, ObserverKind, Output, Reference};
 use kort_thruster::effects;
 use kort_thruster::rig::{KnownEffect, Quantity, Rig};
 
@@ -158,6 +158,39 @@ fn sensors_known_to_be_late_cost_the_default_law_little() {
             let with = error(&rig, &effect, &effect, law);
             println!("{name} {id} {sizes:?}: {clean:.4} -> {with:.4}");
             assert!(with < clean + 5e-3, "{name} {id} {sizes:?}: {clean} {with}");
+        }
+    }
+}
+
+/// Steps that throw the blades' angle about, no sensor of force: the thrust that an observer believes is that of its prediction.
+#[test]
+fn an_observer_that_knows_of_lift_that_builds_up_predicts_its_thrust() {
+    for rig in [Rig::from_toml(common::STAND).unwrap(), named("tunnel")] {
+        let effect = [known(&rig, "unsteady_lift_lag", &[("wagner_share", 2.0), ("chord_radii", 3.0)])];
+        for kind in ObserverKind::ALL {
+            let believed_off = |has: &[KnownEffect], told: &[KnownEffect]| {
+                let with = |effects: &[KnownEffect]| Rig { effects: effects.to_vec(), ..rig.clone() };
+                let law = ControllerConfig::with_law(LawKind::VelocityServo);
+                let config = ControllerConfig { observer: kind, ..law };
+                let mut l = Loop::new(&with(has), &config, DT);
+                l.controller = Controller::new(&with(told), &config, DT).unwrap();
+                l.force_sensor = false;
+                let full = l.controller.model().thrust_max_n;
+                let mut sum = 0.0;
+                for share in [0.5, 0.1, -0.4, 0.6, 0.05, -0.2, 0.7] {
+                    for _ in 0..800 {
+                        let believed_n = l.tick(Reference::Thrust(share * full)).estimate.thrust_n.value;
+                        sum += ((believed_n - l.plant.net_thrust_n()) / full).powi(2);
+                    }
+                }
+                f64::sqrt(sum / 5600.0)
+            };
+            let (without, with) = (believed_off(&effect, &[]), believed_off(&effect, &effect));
+            // What an observer errs by where there is nothing to know.
+            let clean = believed_off(&[], &[]);
+            let line = format!("{} {}: {without:.4} -> {with:.4}, clean {clean:.4}", rig.name, kind.name());
+            println!("{line}");
+            assert!(with < clean + 0.05 * (without - clean), "{line}");
         }
     }
 }

@@ -1,7 +1,8 @@
 //! What known effects make of friction and of the blades' coefficients, as tables of fixed size: one look-up
 //! a use, no allocation, and the same for any effect that acts there.
 
-use kort_thruster::blade::{BladeLoad, BladeRow, Inflow};
+use kort_thruster::blade::Inflow;
+use kort_thruster::plant::Foil;
 
 /// Points of a friction table.
 const SPEEDS: usize = 33;
@@ -58,19 +59,14 @@ impl FoilCurve {
         curve.lift.iter().chain(&curve.drag).any(|x| x.abs() > 1e-6).then_some(curve)
     }
 
-    /// Thrust and torque of the row with these additions.
-    pub fn load(&self, row: &BladeRow, inflow: Inflow) -> BladeLoad {
-        let mut foil = row.section(inflow);
-        if foil.speed_m_s < 1e-9 {
-            return BladeLoad::default();
-        }
+    /// Puts the additions to a section in an inflow.
+    pub fn add(&self, foil: &mut Foil, inflow: Inflow) {
         let place = (inflow.angle_rad() / std::f64::consts::TAU + 0.5) * (ANGLES - 1) as f64;
         let k = (place.max(0.0) as usize).min(ANGLES - 2);
         let part = (place - k as f64).clamp(0.0, 1.0);
         let mix = |table: &[f64; ANGLES]| table[k] + (table[k + 1] - table[k]) * part;
         foil.lift += mix(&self.lift);
         foil.drag += mix(&self.drag);
-        row.load_of(&foil, inflow)
     }
 }
 

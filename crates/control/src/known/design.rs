@@ -24,7 +24,7 @@ const SETTLING: i32 = 40;
 /// How far a state is moved to find how its rate depends on it.
 const PROBE: f64 = 1e-4;
 /// Most own states of an effect that is probed.
-const STATES: usize = 24;
+pub(super) const STATES: usize = 24;
 /// Longest delay that is looked for, s: of the drive, and of a sensor, whose slowest filter has settled by then.
 const LONGEST_S: f64 = 0.25;
 const SENSED_S: f64 = 5.0;
@@ -95,7 +95,7 @@ fn water(model: &mut ControlModel, effects: &[Built]) {
 }
 
 /// A section of the plain row in an inflow, and what the effects make of it once their states have settled.
-fn sections(
+pub(super) fn sections(
     model: &ControlModel,
     row: &BladeRow,
     effects: &[Built],
@@ -119,7 +119,7 @@ fn sections(
 }
 
 /// An effect's own states where nothing moves any more, each step implicit in its own state.
-fn settled(effect: &dyn Effect, model: &ControlModel, at: &Local, plain: Foil) -> [f64; STATES] {
+pub(super) fn settled(effect: &dyn Effect, model: &ControlModel, at: &Local, plain: Foil) -> [f64; STATES] {
     let (n, mut own) = (effect.states(), [0.0; STATES]);
     if n == 0 {
         return own;

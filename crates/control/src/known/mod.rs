@@ -17,6 +17,7 @@
 //! is used without a line here; [`uses`] says by the same probing what each is used for, and names
 //! what none of it reaches.
 
+mod building;
 mod curves;
 mod design;
 mod drive;
@@ -28,9 +29,10 @@ use kort_thruster::effects::{Context, Descriptor, Effect};
 use kort_thruster::parameters::Parameters;
 use kort_thruster::rig::{AmplifierKind, Rig};
 
-use crate::model::ControlModel;
+use crate::model::{ControlModel, HeldLift};
 use crate::signals::{Estimate, Measurement};
 
+use building::Building;
 pub use curves::{FoilCurve, FrictionCurve};
 pub use design::command_late_s;
 pub(crate) use design::design;
@@ -65,6 +67,7 @@ pub struct Known {
     drive: DriveChain,
     motion: Motion,
     sensing: Sensing,
+    building: Building,
     /// A speed drive's torque is its own affair.
     by_speed: bool,
 }
@@ -73,7 +76,8 @@ impl std::fmt::Debug for Known {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let (drive, motion, sensing) =
             (!self.drive.is_idle(), !self.motion.is_idle(), !self.sensing.is_idle());
-        write!(f, "Known {{ drive: {drive}, motion: {motion}, sensing: {sensing} }}")
+        let building = !self.building.is_idle();
+        write!(f, "Known {{ drive: {drive}, motion: {motion}, sensing: {sensing}, building: {building} }}")
     }
 }
 
@@ -84,6 +88,7 @@ impl Known {
             drive: DriveChain::new(rig, model),
             motion: Motion::new(rig, model),
             sensing: Sensing::new(rig, model),
+            building: Building::new(rig, model),
             by_speed: rig.amplifier.kind == AmplifierKind::Speed,
         }
     }
@@ -110,6 +115,16 @@ impl Known {
             self.motion.advance(measured, last, current_a, dt_s);
         }
         !self.motion.is_idle()
+    }
+
+    /// What the blades' lift lacks now, where it is known to build up: once a tick, for the observers' prediction.
+    pub fn held_lift(
+        &mut self,
+        last: Option<&Estimate>,
+        model: &ControlModel,
+        dt_s: f64,
+    ) -> Option<HeldLift> {
+        self.building.held(last, model, dt_s)
     }
 
     /// Ambient flow that effects bring, m/s.

@@ -4,6 +4,7 @@ use kort_thruster::effects::{Descriptor, Effect, Path, Spec};
 use kort_thruster::plant::{Sensed, Tick};
 use kort_thruster::rig::{AmplifierKind, KnownEffect, Quantity, Rig};
 
+use super::building::Building;
 use super::built;
 use super::drive::{DriveChain, OperatingPoint};
 use super::motion::{Motion, follows_angle};
@@ -20,6 +21,8 @@ pub enum Use {
     Water,
     /// Lift and drag.
     Blades,
+    /// Lift that builds up.
+    Building,
     /// Swirl of the wake.
     Swirl,
     /// Force on the stand beyond the blades'.
@@ -59,6 +62,9 @@ impl Use {
             }
             Self::Blades => {
                 "lift and drag over the angle of attack, ahead and astern: the static map of every law, the inversion of those that invert a model, every observer"
+            }
+            Self::Building => {
+                "lift that builds up: followed along the estimate, every observer predicts thrust, torque and flow by what has built up; laws aim at the whole of it"
             }
             Self::Swirl => {
                 "swirl: a state of every observer, with which model2_inversion, model3_inversion, rotational_flow_inversion and look_ahead meet the blades"
@@ -224,6 +230,9 @@ fn of_one(rig: &Rig, known: &KnownEffect, period_s: f64) -> Result<Usage, ModelE
             });
         }
     }
+    if !Building::new(&own, &model).is_idle() {
+        uses.push(Use::Building);
+    }
     if effects.into_iter().any(|(_, mut effect)| shown(effect.as_mut(), &model)) {
         uses.push(Use::Sensors);
     }
@@ -333,68 +342,4 @@ fn why(rig: &Rig) -> &'static str {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use kort_thruster::effects::ALL;
-
-    fn of(id: &str) -> Usage {
-        of_effect(kort_thruster::effects::find(id).unwrap())
-    }
-
-    #[test]
-    fn no_effect_is_passed_over_in_silence() {
-        for effect in ALL {
-            let usage = of_effect(effect);
-            assert!(!usage.uses.is_empty() || usage.left.is_some(), "{usage:?}");
-            assert!(usage.uses.is_empty() || !effect.nonparametric, "no rig can state it: {usage:?}");
-        }
-    }
-
-    #[test]
-    fn effects_are_used_where_they_act() {
-        for (id, used) in [
-            ("coulomb_friction", Use::Friction),
-            ("direction_dependent_friction", Use::Friction),
-            ("viscous_friction", Use::Friction),
-            ("windage_drag", Use::Friction),
-            ("entrained_water_inertia", Use::Inertia),
-            ("position_dependent_friction", Use::Angle),
-            ("torque_ripple_cogging", Use::Angle),
-            ("friction_warm_up", Use::Slow),
-            ("gear_load_friction", Use::Torque),
-            ("torque_constant_saturation", Use::Torque),
-            ("thermal_drift_kt", Use::Slow),
-            ("command_dead_band", Use::Command),
-            ("command_curve", Use::Command),
-            ("supply_sag", Use::Limits),
-            ("supply_sag", Use::Command),
-            ("voltage_limit_backemf", Use::Limits),
-            ("current_saturation", Use::Limits),
-            ("amplifier_lag", Use::Lag),
-            ("transport_delay", Use::Delay),
-            ("forward_reverse_asymmetry", Use::Blades),
-            ("nonsinusoidal_lift_drag", Use::Blades),
-            ("blade_stall", Use::Blades),
-            ("rotational_flow", Use::Swirl),
-            ("water_density", Use::Water),
-            ("inertia_added_mass_error", Use::Water),
-            ("duct_loss", Use::Stand),
-            ("thrust_deduction_interaction", Use::Stand),
-            ("ambient_axial_flow", Use::Ambient),
-            ("thrust_bias_gain_hysteresis", Use::Sensors),
-            ("thrust_sensor_lag", Use::Sensors),
-            ("encoder_filter_lag", Use::Sensors),
-            ("encoder_eccentricity", Use::Sensors),
-            ("clock_skew", Use::Sensors),
-            ("flowmeter_offset_lag_location", Use::Sensors),
-            ("torque_channel_bias", Use::Sensors),
-            ("axial_flow_dynamics", Use::Water),
-        ] {
-            assert!(of(id).uses.contains(&used), "{id}: {:?}", of(id));
-        }
-        // What only lags leaves lift and drag where they were once it has settled.
-        for id in ["ventilation", "cavitation", "gear_backlash", "unsteady_lift_lag"] {
-            assert!(of(id).left.is_some(), "{:?}", of(id));
-        }
-    }
-}
+mod tests;

@@ -4,6 +4,16 @@ use kort_thruster::blade::{BladeLoad, Inflow};
 
 use super::ControlModel;
 
+/// Lift that builds up as the blades travel: what is missing of the lift coefficient at this moment is `share` of it,
+/// less what has built up.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct HeldLift {
+    /// Share of the quasi-steady lift that does not come at once.
+    pub share: f64,
+    /// What has built up of it.
+    pub built_up: f64,
+}
+
 /// Thrust and torque with their slopes at one working point.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Slopes {
@@ -29,10 +39,31 @@ impl ControlModel {
 
     #[inline]
     pub(super) fn row_load(&self, tangential_m_s: f64, axial_m_s: f64) -> BladeLoad {
-        match &self.foil {
-            None => self.row.load(tangential_m_s, axial_m_s),
-            Some(curve) => curve.load(&self.row, Inflow { tangential_m_s, axial_m_s }),
+        if self.has_plain_blades() {
+            return self.row.load(tangential_m_s, axial_m_s);
         }
+        let inflow = Inflow { tangential_m_s, axial_m_s };
+        let mut foil = self.row.section(inflow);
+        if foil.speed_m_s < 1e-9 {
+            return BladeLoad::default();
+        }
+        if let Some(held) = self.held_lift {
+            foil.lift += held.built_up - held.share * foil.lift;
+        }
+        if let Some(curve) = &self.foil {
+            curve.add(&mut foil, inflow);
+        }
+        self.row.load_of(&foil, inflow)
+    }
+
+    /// The same with this much of the lift not built up yet.
+    pub fn holding(&self, held: HeldLift) -> Self {
+        Self { held_lift: Some(held), ..*self }
+    }
+
+    /// Lift and drag are the sinusoids of (17), at once.
+    fn has_plain_blades(&self) -> bool {
+        self.foil.is_none() && self.held_lift.is_none()
     }
 
     /// Slopes of blades with a curve of their own, by differences.
@@ -61,7 +92,7 @@ impl ControlModel {
         if v2 < 1e-18 {
             return Slopes::default();
         }
-        if self.foil.is_some() {
+        if !self.has_plain_blades() {
             return self.differences(ut, vp);
         }
         // One division: every slope of every tick passes here.
