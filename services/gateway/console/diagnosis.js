@@ -204,8 +204,7 @@ const errorsOf = (trial) => `${trial.before_rms_n.toFixed(2)} N rms before revis
 const isCompared = (trial) => trial.before_rms_n !== null && trial.since_rms_n !== null;
 function trialWords(trial) {
   if (isCompared(trial)) return `Thrust error under like commands (${trial.compared_s} s of them): ${errorsOf(trial)}.`;
-  const few = trial.compared_s ? `${trial.compared_s} s under like commands before and since are too few to compare` : "nothing was driven under like commands before and since";
-  return `Whether the thrust error is another since revision ${trial.revision} is not known yet: ${few}.`;
+  return `Whether the thrust error is another since revision ${trial.revision} is not judged: ${trial.not_judged}.`;
 }
 
 // What can be diagnosed or fitted: the last minutes, or a recording that is done.

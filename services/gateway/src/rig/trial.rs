@@ -5,11 +5,15 @@
 //! command only, so that driving harder than before is not taken for a worse model: of the same level and the same kind,
 //! steady or moving. What a sensor's noise adds, it adds to both sides.
 
+mod compared;
+
 use std::collections::VecDeque;
 
 use kort_proto::messages::Telemetry;
 use serde::Serialize;
 use utoipa::ToSchema;
+
+use compared::Compared;
 
 const SECOND_NS: u64 = 1_000_000_000;
 /// Driven seconds that are kept of each side.
@@ -22,12 +26,8 @@ const SETTLE_NS: u64 = 5 * SECOND_NS;
 const LEVELS: f64 = 8.0;
 /// A command that moves by more than this share of full thrust within a second is no steady one.
 const MOVING: f64 = 0.02;
-/// Seconds of a like command that are needed on both sides, and of all of them together.
-const LIKE: usize = 3;
+/// Seconds of like commands that are needed for a comparison.
 const ENOUGH: usize = 10;
-/// An error is larger if it is so by this factor, and by so many standard errors of the seconds' scatter.
-const LARGER: f64 = 1.1;
-const SURE: f64 = 3.0;
 
 /// One driven second.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -89,8 +89,11 @@ pub struct TrialView {
     pub since_rms_n: Option<f64>,
     /// Seconds of like command that are compared.
     pub compared_s: usize,
-    /// Is the error larger than before, beyond its scatter?
-    pub larger: bool,
+    /// Is the error larger than before, beyond its scatter? Null while that is not judged.
+    pub larger: Option<bool>,
+    /// Why it is not judged; null where it is.
+    #[schema(example = "no command since was held like one before it")]
+    pub not_judged: Option<String>,
 }
 
 impl TrialView {
@@ -205,7 +208,7 @@ impl Trial {
         if self.revised.as_ref().is_none_or(|revised| revised.told) {
             return None;
         }
-        let view = self.judge().filter(|view| view.larger)?;
+        let view = self.judge().filter(|view| view.larger == Some(true))?;
         self.revised.as_mut()?.told = true;
         Some(view)
     }
@@ -218,7 +221,8 @@ impl Trial {
     fn judge(&self) -> Option<TrialView> {
         let revised = self.revised.as_ref()?;
         let compared = Compared::of(&revised.before, &self.seconds);
-        let enough = compared.seconds >= ENOUGH;
+        let too_little = self.too_little(revised, compared.seconds);
+        let enough = too_little.is_none();
         let rms = |mean_square: f64| enough.then(|| mean_square.sqrt());
         Some(TrialView {
             revision: revised.number,
@@ -227,70 +231,23 @@ impl Trial {
             since_rms_n: rms(compared.since_n2),
             compared_s: compared.seconds,
             // Once told it stands, until another revision comes.
-            larger: revised.told || (enough && compared.is_larger()),
+            larger: if revised.told { Some(true) } else { enough.then(|| compared.is_larger()) },
+            not_judged: too_little.filter(|_| !revised.told),
         })
     }
-}
 
-/// Mean squares of both sides over like commands.
-#[derive(Clone, Copy, Debug, Default)]
-struct Compared {
-    before_n2: f64,
-    since_n2: f64,
-    /// Of their difference, from the scatter of the seconds.
-    variance_n4: f64,
-    seconds: usize,
-}
-
-impl Compared {
-    fn of(before: &VecDeque<Second>, since: &VecDeque<Second>) -> Compared {
-        let mut all = Compared::default();
-        let mut kinds: Vec<(i32, bool)> = since.iter().map(|second| second.like).collect();
-        kinds.sort_unstable();
-        kinds.dedup();
-        for kind in kinds {
-            let (b, s) = (Side::of(before, kind), Side::of(since, kind));
-            if b.seconds < LIKE || s.seconds < LIKE {
-                continue;
+    /// What is missing for a comparison.
+    fn too_little(&self, revised: &Revised, compared: usize) -> Option<String> {
+        const DRIVEN: &str = "was driven under a thrust command, with the thrust measured,";
+        match compared {
+            _ if revised.before.is_empty() => Some(format!("nothing {DRIVEN} shortly before it")),
+            _ if self.seconds.is_empty() => Some(format!("nothing {DRIVEN} since")),
+            0 => Some("no command since was held like one before it".into()),
+            few if few < ENOUGH => {
+                Some(format!("{few} s under like commands before and since are too few: {ENOUGH} are needed"))
             }
-            // Each kind of command counts as often on the one side as on the other.
-            let seconds = b.seconds.min(s.seconds);
-            let weight = seconds as f64;
-            all.seconds += seconds;
-            all.before_n2 += weight * b.mean;
-            all.since_n2 += weight * s.mean;
-            all.variance_n4 += weight * weight * (b.variance_of_mean + s.variance_of_mean);
+            _ => None,
         }
-        if all.seconds > 0 {
-            let weight = all.seconds as f64;
-            all.before_n2 /= weight;
-            all.since_n2 /= weight;
-            all.variance_n4 /= weight * weight;
-        }
-        all
-    }
-
-    fn is_larger(&self) -> bool {
-        self.since_n2.sqrt() > LARGER * self.before_n2.sqrt()
-            && self.since_n2 - self.before_n2 > SURE * self.variance_n4.sqrt()
-    }
-}
-
-/// Seconds of one kind of command.
-struct Side {
-    seconds: usize,
-    mean: f64,
-    variance_of_mean: f64,
-}
-
-impl Side {
-    fn of(all: &VecDeque<Second>, kind: (i32, bool)) -> Side {
-        let of_kind = || all.iter().filter(|second| second.like == kind).map(|second| second.mean_square_n2);
-        let seconds = of_kind().count();
-        let n = seconds as f64;
-        let mean = of_kind().sum::<f64>() / n;
-        let variance = of_kind().map(|value| (value - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
-        Side { seconds, mean, variance_of_mean: variance / n }
     }
 }
 
@@ -326,10 +283,12 @@ mod tests {
         assert_eq!(trial.view(), None);
         drive(&mut trial, &mut at_s, 40.0, 30.0, 1.0);
         trial.revised(3, Some(2));
-        assert!(trial.view().is_some_and(|view| view.before_rms_n.is_none() && !view.larger));
+        let view = trial.view().unwrap();
+        assert_eq!((view.before_rms_n, view.larger), (None, None));
+        assert!(view.not_judged.as_ref().is_some_and(|why| why.ends_with("measured, since")), "{view:?}");
         let news = drive(&mut trial, &mut at_s, 40.0, 30.0, 4.0);
         let [news] = news.as_slice() else { panic!("{news:?}") };
-        assert_eq!((news.revision, news.before, news.larger), (3, Some(2), true));
+        assert_eq!((news.revision, news.before, news.larger), (3, Some(2), Some(true)));
         // A constant and a sine: mean square b^2 + 1/2.
         assert!((news.before_rms_n.unwrap() - 1.5_f64.sqrt()).abs() < 0.05, "{news:?}");
         assert!((news.since_rms_n.unwrap() - 16.5_f64.sqrt()).abs() < 0.1, "{news:?}");
@@ -337,7 +296,8 @@ mod tests {
         // Back again: the trial is of the way back, which makes it better.
         trial.revised(2, Some(1));
         assert!(drive(&mut trial, &mut at_s, 40.0, 30.0, 1.0).is_empty());
-        assert!(trial.view().is_some_and(|view| !view.larger && view.since_rms_n < view.before_rms_n));
+        let view = trial.view().unwrap();
+        assert!(view.larger == Some(false) && view.since_rms_n < view.before_rms_n, "{view:?}");
     }
 
     #[test]
@@ -348,10 +308,27 @@ mod tests {
         assert!(drive(&mut trial, &mut at_s, 4.5, 30.0, 50.0).is_empty(), "it settles");
         assert!(drive(&mut trial, &mut at_s, 40.0, 80.0, 9.0).is_empty(), "driven harder");
         assert!(drive(&mut trial, &mut at_s, 40.0, f64::NAN, 9.0).is_empty(), "not driven");
-        assert_eq!(trial.view().map(|view| view.compared_s), Some(0));
+        let view = trial.view().unwrap();
+        assert_eq!((view.compared_s, view.larger), (0, None));
+        assert!(view.not_judged.is_some_and(|why| why.contains("like one before")));
+        drive(&mut trial, &mut at_s, 5.0, 30.0, 1.0);
+        let view = trial.view().unwrap();
+        assert!(view.larger.is_none() && view.not_judged.unwrap().contains("too few: 10 are needed"));
         assert!(drive(&mut trial, &mut at_s, 30.0, 30.0, 1.0).is_empty(), "as before");
         let view = trial.view().unwrap();
-        assert!(view.compared_s >= ENOUGH && !view.larger, "{view:?}");
+        assert!(view.compared_s >= ENOUGH && view.larger == Some(false), "{view:?}");
+        assert_eq!(view.not_judged, None);
+    }
+
+    #[test]
+    fn where_nothing_was_driven_before_nothing_is_judged() {
+        let (mut trial, mut at_s) = (Trial::new(100.0), 1.0);
+        drive(&mut trial, &mut at_s, 40.0, f64::NAN, 1.0);
+        trial.revised(2, Some(1));
+        drive(&mut trial, &mut at_s, 40.0, 30.0, 9.0);
+        let view = trial.view().unwrap();
+        assert_eq!(view.larger, None);
+        assert!(view.not_judged.as_ref().is_some_and(|why| why.ends_with("before it")), "{view:?}");
     }
 
     #[test]

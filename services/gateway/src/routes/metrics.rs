@@ -327,9 +327,9 @@ fn trial(families: &mut Families, thruster: &Thruster) {
     let label = [("thruster", thruster.id.as_str())];
     families.gauge(
         "rig_revision_worse",
-        "Is the thrust error larger under the rig's revision in force than under the one before?",
+        "Is the thrust error larger under the rig's revision in force than under the one before? Absent while that is not judged.",
         &label,
-        f64::from(trial.larger),
+        trial.larger.map_or(f64::NAN, f64::from),
     );
     let errors = [("before", trial.before_rms_n), ("since", trial.since_rms_n)];
     for (when, rms_n) in errors {
