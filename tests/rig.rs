@@ -173,6 +173,20 @@ fn a_revision_outlives_controller_and_gateway() {
     });
 }
 
+#[test]
+fn a_revision_that_was_answered_is_in_the_log_however_the_service_ends() {
+    common::in_real_time(|| {
+        let stack = Stack::start();
+        let log = stack.site.folder.path().join("events/events.jsonl");
+        let told = |kind: &str| std::fs::read_to_string(&log).unwrap_or_default().matches(kind).count();
+        let (status, taken) = ask(&stack, "POST", "/rig", &[TEXT], &rubbing());
+        assert_eq!((status, told("\"rig_changed\"")), (200, 1), "{taken}");
+        let (status, back) = ask(&stack, "POST", "/rig/rollback", &[], "");
+        kill(stack.process_of("gateway"), "KILL");
+        assert_eq!((status, told("\"rig_rolled_back\"")), (200, 1), "{back}");
+    });
+}
+
 /// Headers and body of a request; status, type of its answer, and a word of it.
 type Case<'a> = (&'a [(&'a str, &'a str)], &'a str, u16, &'a str, &'a str);
 

@@ -83,6 +83,8 @@ pub fn run(
         run_errands(&mut bridges, recorder, ticker.next_ns());
         ticker.wait();
     }
+    // What was done since the last tick.
+    bridges.iter().for_each(|bridge| bridge.link.thruster.tell_notes(Instant::now()));
 }
 
 /// Until the next tick: hands on requests that come, and looks for what came of them.
@@ -160,7 +162,7 @@ impl Bridge {
 
     fn tick(&mut self, deployment: &Deployment, recorder: &Recorder, pulse: &Pulse) {
         let now = Instant::now();
-        self.tell_notes(now);
+        self.link.thruster.tell_notes(now);
         if self.checked.is_none_or(|at| now.duration_since(at) >= REOPEN_EVERY) {
             self.checked = Some(now);
             self.link.thruster.hear(|_| {}); // silence too is news: what was rendered is no longer so

@@ -22,11 +22,15 @@ const AT_HAND: usize = 5000;
 const LOOK_EVERY: Duration = Duration::from_millis(200);
 /// Events that may wait for the disk.
 const QUEUE: usize = 4096;
+/// Whoever waits for the disk to have taken an event waits so long at most: it may be full, or away. The supervisor gives the
+/// gateway two seconds to end.
+const WRITTEN_WITHIN: Duration = Duration::from_millis(500);
 
 /// The log.
 #[derive(Debug)]
 pub struct Events {
     outbox: SyncSender<Event>,
+    /// Events that were noted and are not on the disk.
     waiting: AtomicU64,
     known: Mutex<Known>,
     pace: Mutex<Pace>,
@@ -80,15 +84,19 @@ impl Events {
         }
     }
 
-    /// Waits a moment for what was noted to be written: the process is about to end.
-    pub fn settle(&self) {
-        self.tell_held(true);
-        for _ in 0..50 {
-            if self.waiting.load(Ordering::Relaxed) == 0 {
-                return;
-            }
-            std::thread::sleep(Duration::from_millis(5));
+    /// Waits until what was noted is on the disk, as far as the disk takes it: whoever is told that something was done finds it
+    /// in the log, however the service ends.
+    pub async fn written(&self) {
+        let begun = Instant::now();
+        while self.waiting.load(Ordering::Relaxed) > 0 && begun.elapsed() < WRITTEN_WITHIN {
+            tokio::time::sleep(Duration::from_millis(1)).await;
         }
+    }
+
+    /// Tells what is held back too and waits until all of it is on the disk: the process is about to end.
+    pub async fn settle(&self) {
+        self.tell_held(true);
+        self.written().await;
     }
 
     /// An event of now. Repeats of what anybody may do are told together, with their count; what takes the lease is one man's
@@ -170,28 +178,28 @@ impl Events {
 
 /// Writes what comes and reads what others wrote, until the gateway ends.
 fn keep(log: &EventLog, mut mark: Mark, inbox: &Receiver<Event>, events: &Events) {
-    let mut complained = false;
+    let (mut complained, mut unwritten) = (false, 0);
     loop {
-        let event = match inbox.recv_timeout(LOOK_EVERY) {
-            Ok(event) => Some(event),
-            Err(RecvTimeoutError::Timeout) => {
-                let _ = log.retry();
-                None
+        let written = match inbox.recv_timeout(LOOK_EVERY) {
+            Ok(event) => {
+                unwritten += 1;
+                log.append(&event)
             }
+            Err(RecvTimeoutError::Timeout) => log.retry(),
             Err(RecvTimeoutError::Disconnected) => return,
         };
-        if let Some(event) = event {
-            match log.append(&event) {
-                Ok(()) => complained = false,
-                Err(error) if !std::mem::replace(&mut complained, true) => {
-                    tracing::error!(
-                        "the event log in {} cannot be written: {error}\nhint: gateway.events must be a folder that can be written, with space",
-                        log.folder().display()
-                    );
-                }
-                Err(_) => (),
+        match written {
+            Ok(()) => {
+                complained = false;
+                events.waiting.fetch_sub(std::mem::take(&mut unwritten), Ordering::Relaxed);
             }
-            events.waiting.fetch_sub(1, Ordering::Relaxed);
+            Err(error) if !std::mem::replace(&mut complained, true) => {
+                tracing::error!(
+                    "the event log in {} cannot be written: {error}\nhint: gateway.events must be a folder that can be written, with space",
+                    log.folder().display()
+                );
+            }
+            Err(_) => (),
         }
         events.tell_held(false);
         let end = log.end();

@@ -286,6 +286,6 @@ async fn serve(
     recorder.stop_all();
     stop_bus.store(true, Ordering::Relaxed);
     let _ = bus.join();
-    events.settle();
+    events.settle().await;
     Ok(())
 }

@@ -6,6 +6,7 @@ mod command;
 mod faults;
 mod kept_law;
 mod law;
+mod told;
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, mpsc};
 use std::time::{Duration, Instant};
@@ -26,7 +27,6 @@ use crate::desk::Desk;
 use crate::events::Events;
 use crate::excitation::ExcitationStep;
 use crate::heard::Heard;
-use crate::lease::By;
 use crate::problem::{Kind, Problem};
 use crate::rig::Trial;
 use crate::view::{
@@ -62,6 +62,8 @@ pub struct Thruster {
     /// Wakes the bus for a request.
     bell: Arc<Bell>,
     events: Arc<Events>,
+    /// Held by whoever hands the desk's notes on: they are told in the order in which they were noted.
+    telling: Mutex<()>,
     rendered: Mutex<(Rendered, Bytes)>,
     /// The diagnosis or the fit that runs.
     analysis: Mutex<Option<Underway>>,
@@ -98,6 +100,7 @@ impl Thruster {
             asks,
             bell,
             events,
+            telling: Mutex::default(),
             analysis: Mutex::default(),
             calibration: Mutex::default(),
             trial: Mutex::new(Trial::new(range.thrust_n)),
@@ -211,14 +214,6 @@ impl Thruster {
             before => self.did(who, lease, EventKind::FaultsCleared, &format!("cleared {}", Names(before))),
         }
         Ok(())
-    }
-
-    /// Something was done: it is noted, and the lease it was done with lives on.
-    pub fn did(&self, who: &str, lease: Option<&str>, kind: EventKind, what: &str) {
-        let mut desk = self.desk();
-        let By { who, words } = desk.lease.by(who, lease);
-        desk.done(lease, Instant::now());
-        desk.note(kind, &who, format!("{words} {what}"));
     }
 
     /// The thruster's state, rendered at most once for each sample heard.

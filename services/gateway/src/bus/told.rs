@@ -33,18 +33,6 @@ fn tells_of(told: &Event, since: Option<&str>, tripped: &Trip, now_ns: u64) -> b
 }
 
 impl Bridge {
-    /// What the desk noted goes to the event log.
-    pub(super) fn tell_notes(&self, now: Instant) {
-        let notes = {
-            let mut desk = self.link.thruster.desk();
-            desk.expire(now);
-            desk.notes()
-        };
-        for note in notes {
-            self.link.events.tell(note.kind, Some(&self.link.thruster.id), &note.who, note.detail);
-        }
-    }
-
     /// Faults that were not latched before go to the event log, with what the thruster did before. Those that this
     /// gateway finds latched at its start may stand there already.
     pub(super) fn tell_tripped(&mut self, who: usize, faults: u64) {

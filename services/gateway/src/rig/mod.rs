@@ -221,6 +221,8 @@ impl RigDesk {
             (EventKind::RigChanged, words)
         };
         self.thruster.did(&asker.who, asker.lease.as_deref(), kind, &format!("{words}: {differs}"));
+        // The book has it: whatever ends the service now, the log has it too.
+        self.thruster.written().await;
         Ok(Revised { applied: true, in_force, difference, unused_effects: checked.unused() })
     }
 
