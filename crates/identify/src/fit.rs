@@ -307,7 +307,7 @@ impl Problem<'_> {
             let promised = from.merit - minimum.misfit - minimum.penalty;
             let moved = |times: f64| -> Vec<f64> {
                 let by = |k: usize| from.values[k] + times * minimum.step[k] * free[k].sigma;
-                (0..free.len()).map(|k| by(k).clamp(free[k].low, free[k].high)).collect()
+                (0..free.len()).map(|k| free[k].within(by(k))).collect()
             };
             let mut to = self.point(hypothesis, moved(1.0), floor);
             let mut times = 2.0;

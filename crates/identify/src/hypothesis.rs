@@ -6,13 +6,15 @@
 
 use std::sync::Arc;
 
-use kort_thruster::effects::{Descriptor, Scale, Spec, Stretch};
+use kort_thruster::effects::{Descriptor, Scale, Spec};
 use kort_thruster::models::ModelName;
 use kort_thruster::parameters::{Parameter as P, Parameters};
 use kort_thruster::rig::{KnownEffect, Quantity, Rig};
 use nalgebra::DMatrix;
 
-use crate::data::{Prepared, Response};
+use crate::data::Prepared;
+
+pub use crate::free::{Free, Target};
 
 /// Relative uncertainty (two sigma) of a coefficient in a rig that states no tolerance at all.
 pub const UNSTATED_TOL: f64 = 0.5;
@@ -33,61 +35,6 @@ const FELT: usize = 3;
 const LEAST_SHARE: f64 = 0.02;
 /// How far a coefficient may move, in stated tolerances (two sigma each).
 const REACH: f64 = 1.5;
-
-/// What a free number changes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Target {
-    /// A parameter of the baseline.
-    Base(P),
-    /// When a channel was sampled, s late.
-    Sampling {
-        /// The channel.
-        response: Response,
-    },
-    /// How long a sensor that is slower than the log takes the mean for a reading, s.
-    Averaging {
-        /// The channel.
-        response: Response,
-    },
-    /// A value of an effect: which effect of the hypothesis, which value.
-    Effect(usize, usize),
-}
-
-/// A free number.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Free {
-    /// What it changes.
-    pub target: Target,
-    /// Name for reports.
-    pub name: &'static str,
-    /// Unit for reports.
-    pub unit: &'static str,
-    /// Whether the rig states it.
-    pub stated: bool,
-    /// Prior mean.
-    pub mean: f64,
-    /// Prior standard deviation.
-    pub sigma: f64,
-    /// Least value allowed.
-    pub low: f64,
-    /// Greatest value allowed.
-    pub high: f64,
-    /// When it acts, if only for a while.
-    pub acts: Option<Stretch>,
-}
-
-impl Free {
-    /// Distance of a value from the prior's mean, in standard deviations.
-    pub fn score(&self, value: f64) -> f64 {
-        (value - self.mean) / self.sigma
-    }
-
-    /// Whether a value stands at the edge of what is allowed.
-    pub fn at_bound(&self, value: f64) -> bool {
-        let slack = 1e-6 * (self.high - self.low);
-        value <= self.low + slack || value >= self.high - slack
-    }
-}
 
 /// An effect as it stands in a hypothesis.
 #[derive(Clone)]

@@ -10,6 +10,7 @@ pub mod data;
 pub mod edges;
 mod excerpt;
 pub mod fit;
+mod free;
 mod gaps;
 mod held;
 pub mod heldout;
