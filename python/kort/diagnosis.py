@@ -67,6 +67,8 @@ class Finding:
     """Effects that this recording cannot tell from it."""
     evidence: list[str]
     """Why, in words."""
+    not_adopted: str | None = None
+    """Why a rig description does not take it over; none where it does."""
 
 
 @dataclass(frozen=True)
@@ -180,8 +182,8 @@ class Diagnosis:
     document: dict[str, Any]
     """The JSON document that this mirrors."""
     rig_toml: str
-    """The rig description with what is believed as its ``[[effects]]``, probability 0.7 and more without a rival, and with
-    what ``with_effects`` took as known, unless it may as well be zero."""
+    """The rig description with what is believed as its ``[[effects]]``, probability 0.7 and more without a rival and a size that
+    can be told from nothing, and with what ``with_effects`` took as known, unless it may as well be zero."""
     html: str
     """The report as one self-contained page."""
 

@@ -40,7 +40,7 @@ impl Decision {
 }
 
 /// From this probability on a name is believed.
-const BELIEVED: f64 = 0.7;
+pub const BELIEVED: f64 = 0.7;
 /// No name that only undoes another is likelier than this: what is left of both may be neither.
 const EVEN: f64 = 0.5;
 /// A remainder below this share of what was to be explained is of no practical size.

@@ -3,6 +3,7 @@
 //! Data go one way: probes and screens say which effects are worth a fit, the search fits sets of them, the
 //! posterior weighs the sets, one function decides, and words come last.
 
+mod adoption;
 mod cancelling;
 mod choices;
 mod column;

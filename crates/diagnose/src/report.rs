@@ -75,6 +75,8 @@ pub struct Finding {
     pub confounded_with: Vec<String>,
     /// Why.
     pub evidence: Vec<String>,
+    /// Why a rig description does not take it over; null where it does.
+    pub not_adopted: Option<String>,
 }
 
 /// A set of effects that explains the recording.

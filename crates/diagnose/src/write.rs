@@ -9,6 +9,7 @@ use kort_identify::thin::Thin;
 use kort_thruster::effects::Path;
 use kort_thruster::rig::Rig;
 
+use crate::adoption;
 use crate::cancelling::cancelling;
 use crate::decide::{Circumstances, Decision, Named, decide};
 use crate::diagnose::Options;
@@ -327,6 +328,7 @@ impl<'a, 'p> Writer<'a, 'p> {
         Finding {
             effect: named.effect.into(),
             path: self.path(named.effect).into(),
+            not_adopted: adoption::why_not(named.effect, probability, &named.rivals, &values),
             probability,
             statement: effect.map_or_else(String::new, words::statement),
             equation: effect.map_or("", |e| e.equation).into(),

@@ -68,7 +68,7 @@ async function loadDiagnosis() {
   const summary = found === last ? found.summary : `Of ${whenOf(found)}, an earlier one: ${found.summary}`;
   says("diagnosis-text", found.state !== "done" ? endingOf(found) : ended ? `${ended}. ${found.id}: ${summary}` : summary);
   $("findings").replaceChildren(...found.findings.map((f) =>
-    cells([f.effect.replaceAll("_", " "), f.path, f.probability.toFixed(2), percent(f.excess_error_removed), sizesOf(report, f.effect), f.statement])));
+    cells([f.effect.replaceAll("_", " "), f.path, f.probability.toFixed(2), percent(f.excess_error_removed), sizesOf(report, f.effect), f.not_adopted ? `${f.statement} Use leaves it out: ${f.not_adopted}.` : f.statement])));
   const link = Object.assign(document.createElement("a"), { href: `${diagnosesOf()}/${found.id}/report`, target: "_blank", textContent: `report of ${found.id}` });
   link.addEventListener("click", (event) => openPage(event, link));
   const place = Object.assign(document.createElement("button"), { textContent: "Show it here", onclick: () => placePage(link).catch(() => {}) });

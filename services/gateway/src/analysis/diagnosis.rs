@@ -38,6 +38,9 @@ pub struct FindingView {
     pub statement: String,
     /// Share of the held-out squared error above the noise that it removes.
     pub excess_error_removed: Option<f64>,
+    /// Why a rig description does not take it over; null where it does.
+    #[serde(default)]
+    pub not_adopted: Option<String>,
 }
 
 impl From<JobInfo> for DiagnosisInfo {
@@ -63,6 +66,7 @@ impl Analysis for DiagnosisInfo {
                     probability: finding["probability"].as_f64().unwrap_or(0.0),
                     statement: text(&finding["statement"]).unwrap_or_default(),
                     excess_error_removed: finding["heldout"]["excess_error_removed"].as_f64(),
+                    not_adopted: text(&finding["not_adopted"]),
                 })
                 .collect(),
         }

@@ -7,7 +7,7 @@ use kort_diagnose::diagnose::{Diagnosis, Options, diagnose};
 use kort_diagnose::report::Report;
 use kort_thruster::rig::Rig;
 
-use crate::believed::{DIAGNOSED, believed};
+use crate::believed::{DIAGNOSED, believed, left_out};
 use crate::failure::{Failure, Outcome, print, print_json, write_text};
 use crate::fitted_rig::with_fitted_effects;
 use crate::input::{Input, Loaded};
@@ -30,7 +30,8 @@ pub struct Diagnose {
     #[command(flatten)]
     input: Input,
     /// Write the rig description with what was found as its [[effects]], which fit, diagnose, simulate and
-    /// soak then use: names of probability 0.7 and more that have no rival, and those of --with
+    /// soak then use: names of probability 0.7 and more that have no rival and a size that can be told from nothing,
+    /// and those of --with
     #[arg(short, long, value_name = "RIG2")]
     output: Option<PathBuf>,
     /// Print one JSON document (kort.diagnosis/2)
@@ -69,11 +70,12 @@ pub fn adopted(loaded: &Loaded, report: &Report) -> Result<(String, Vec<String>,
     let mut told = report.baseline.effects.clone();
     told.retain(|told| loaded.rig.effects.iter().all(|stated| stated.effect != told.effect));
     let text = Rig::with_effects_toml(&loaded.rig_text, &found, DIAGNOSED).map_err(Failure::failed)?;
-    let (text, left_out) = with_fitted_effects(&text, &told, &[], TOLD).map_err(Failure::failed)?;
+    let (text, not_told) = with_fitted_effects(&text, &told, &[], TOLD).map_err(Failure::failed)?;
+    let refused = left_out(report).map(|(effect, why)| format!("{effect} is left out: {why}"));
     let written = Rig::from_toml(&text).map_err(Failure::failed)?;
     told.retain(|told| written.effects.iter().any(|known| known.effect == told.effect));
     let names = found.iter().map(|f| f.effect).chain(told.iter().map(|t| t.effect.as_str()));
-    Ok((text, names.map(String::from).collect(), left_out))
+    Ok((text, names.map(String::from).collect(), refused.chain(not_told).collect()))
 }
 
 impl Diagnose {

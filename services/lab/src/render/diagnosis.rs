@@ -96,6 +96,7 @@ fn finding(f: &Finding) -> Markup {
             }))
         }
         ul { @for e in &f.evidence { li { (e) } } }
+        @if let Some(why) = &f.not_adopted { p { "A rig description does not take it over: " (why) "." } }
     }
 }
 

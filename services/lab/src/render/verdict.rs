@@ -202,6 +202,9 @@ fn finding(sheet: &mut Sheet, f: &Finding) {
         sheet.more(&format!("this recording cannot tell it from {}", list.join(", ")));
     }
     f.evidence.iter().for_each(|e| sheet.more(&format!("* {e}")));
+    if let Some(why) = &f.not_adopted {
+        sheet.more(&format!("a rig does not take it over: {why}"));
+    }
 }
 
 fn heldout(sheet: &mut Sheet, heldout: &HeldOut) {

@@ -14,11 +14,11 @@ use kort_thruster::rig::{KnownEffect, Rig};
 use rayon::prelude::*;
 
 use super::Watch;
-use super::adoption::{Adoption, Found};
+use super::adoption::{Adoption, Found, LeftOut};
 use super::chain::ProductionChain;
 use super::load::{Contestant, Loaded, SoakError};
 use super::report::Report;
-use crate::believed::{DIAGNOSED, believed};
+use crate::believed::{DIAGNOSED, believed, left_out};
 
 /// An adoption that makes thrust error larger by more than this factor has failed.
 pub const WORSE: f64 = 1.05;
@@ -116,7 +116,7 @@ fn one(loaded: &Loaded, seed: u64) -> Result<Done, SoakError> {
     let Some((_, first_law)) = laws.first() else {
         return Err(SoakError::HidesNothing { scenario: scenario.name.clone() });
     };
-    let found = case.diagnosed(hides, first_law)?;
+    let Diagnosed { found, left_out } = case.diagnosed(hides, first_law)?;
     let adopted_rig = case.adopted(&found)?;
     let truth = hidden::told(&loaded.rig, &case.drawn);
     let mut done = Done { adoptions: Vec::new(), first: Vec::new(), runs: 1 };
@@ -140,6 +140,7 @@ fn one(loaded: &Loaded, seed: u64) -> Result<Done, SoakError> {
             law: name.to_owned(),
             hidden: case.drawn.iter().map(Found::of_drawn).collect(),
             adopted: found.iter().map(|(known, probability)| Found::of_known(known, *probability)).collect(),
+            left_out: left_out.clone(),
             before: first,
             after: second,
             truth_told: errors.told,
@@ -150,6 +151,13 @@ fn one(loaded: &Loaded, seed: u64) -> Result<Done, SoakError> {
         done.first.push(before);
     }
     Ok(done)
+}
+
+/// What a diagnosis came to.
+struct Diagnosed {
+    /// What is believed, and how surely.
+    found: Vec<(KnownEffect, f64)>,
+    left_out: Vec<LeftOut>,
 }
 
 /// Thrust errors of a law, N: with the stated rig, with what was adopted, and told the truth.
@@ -170,12 +178,8 @@ impl Case<'_> {
             .map_err(|source| SoakError::Model { file: self.loaded.scenario.name.clone(), source })
     }
 
-    /// The first run's recording, diagnosed with the stated rig: what is believed, and how surely.
-    fn diagnosed(
-        &self,
-        hides: &Hidden,
-        config: &ControllerConfig,
-    ) -> Result<Vec<(KnownEffect, f64)>, SoakError> {
+    /// The first run's recording, diagnosed with the stated rig.
+    fn diagnosed(&self, hides: &Hidden, config: &ControllerConfig) -> Result<Diagnosed, SoakError> {
         let (loaded, scenario) = (self.loaded, &self.loaded.scenario);
         let mut log = Log::new(loaded.rig.amplifier.kind, scenario.control_rate_hz, hides.log_rate_hz);
         run_logged::<ProductionChain>(&self.prepared(), config, self.seed, Knows::Stated, &mut log)
@@ -193,13 +197,16 @@ impl Case<'_> {
         let rig = Rig::from_toml(&text).map_err(|e| self.unwritten(&e))?;
         let sure =
             |id: &str| diagnosis.report.findings.iter().find(|f| f.effect == id).map(|f| f.probability);
-        Ok(rig
+        let told = |(effect, why): (&str, &str)| LeftOut { effect: effect.into(), why: why.into() };
+        let left_out = left_out(&diagnosis.report).map(told).collect();
+        let found = rig
             .effects
             .into_iter()
             .filter(|known| found.iter().any(|f| f.effect == known.effect))
             .map(|known| (sure(known.effect).unwrap_or(0.0), known))
             .map(|(probability, known)| (known, probability))
-            .collect())
+            .collect();
+        Ok(Diagnosed { found, left_out })
     }
 
     fn unwritten(&self, error: &dyn std::fmt::Display) -> SoakError {

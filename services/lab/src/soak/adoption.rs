@@ -43,6 +43,15 @@ impl Found {
     }
 }
 
+/// An effect that was named and not adopted.
+#[derive(Clone, Debug, Serialize)]
+pub struct LeftOut {
+    /// Its identifier.
+    pub effect: String,
+    /// Why.
+    pub why: String,
+}
+
 /// One law with one seed.
 #[derive(Clone, Debug, Serialize)]
 pub struct Adoption {
@@ -58,6 +67,8 @@ pub struct Adoption {
     pub hidden: Vec<Found>,
     /// What was believed and adopted.
     pub adopted: Vec<Found>,
+    /// What was named and not adopted.
+    pub left_out: Vec<LeftOut>,
     /// Thrust RMS error with the stated rig, N.
     pub before: f64,
     /// The same with the adopted rig, N.
@@ -196,6 +207,9 @@ pub fn text(all: &[Adoption]) -> String {
             a.rig, a.seed, a.law, a.before, a.after, a.truth_told, adaptive, a.ratio
         );
         let _ = writeln!(out, "    hidden: {}; adopted: {}", names(&a.hidden), names(&a.adopted));
+        for LeftOut { effect, why } in &a.left_out {
+            let _ = writeln!(out, "    {effect} is left out: {why}");
+        }
         if let Some(cause) = &a.cause {
             let _ = writeln!(out, "    FAILED, thrust is worse by more than {WORSE}: {cause}");
         }
@@ -294,6 +308,7 @@ mod tests {
             law: law.into(),
             hidden: vec![found("supply_sag")],
             adopted: if seed == 1 { vec![found("supply_sag")] } else { Vec::new() },
+            left_out: Vec::new(),
             before,
             after,
             truth_told,
