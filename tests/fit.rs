@@ -255,10 +255,10 @@ fn rigs_that_cannot_be_read() {
     for (from, to, words) in [
         ("radius_m", "raduis_m", &["propeller.raduis_m", "did you mean `radius_m`"][..]),
         ("[motor]", "[motro]", &["motro", "motor"]),
-        ("= 0.542 ", "= \"x\" ", &["propeller.lift_max", "\"x\""]),
-        ("= 0.542 ", "= nan ", &["propeller.lift_max", "NaN"]),
-        ("current_limit_a = 9.0", "current_limit_a = -9.0", &["amplifier.current_limit_a", "-9"]),
-        ("inertia_kg_m2 = 0.01 ", "", &["inertia_kg_m2"]),
+        ("= { value = 0.542, tol = 0.15 } ", "= \"x\" ", &["propeller.lift_max", "\"x\""]),
+        ("= 0.542, ", "= nan, ", &["propeller.lift_max", "NaN"]),
+        ("value = 9.0,", "value = -9.0,", &["amplifier.current_limit_a", "-9"]),
+        ("inertia_kg_m2 = { value = 0.01, tol = 0.5 } ", "", &["inertia_kg_m2"]),
         ("[rig]", "[rig", &["bad.rig.toml"]),
     ] {
         assert!(good.contains(from), "{from}");

@@ -28,16 +28,17 @@ pub fn held(stack: &Stack, command: &str, mut begin: impl FnMut()) -> u32 {
     })
 }
 
-/// The stand's rig description that says of some values how well they are known: a fit moves these and no other.
+/// The stand's rig description that says of these values alone how well they are known: a fit moves these and no other.
 pub fn stand_with_tolerances(tolerances: &[(&str, f64)]) -> String {
     let rig = include_str!("../../config/thrusters/whitcomb-yoerger-1999.toml");
-    let mut lines: Vec<String> = rig.lines().map(str::to_owned).collect();
-    for (name, tol) in tolerances {
-        let begins = format!("{name} = ");
-        let line =
-            lines.iter_mut().find(|line| line.starts_with(&begins)).unwrap_or_else(|| panic!("no {name}"));
-        let value = line[begins.len()..].split_whitespace().next().unwrap();
-        *line = format!("{begins}{{ value = {value}, tol = {tol} }}");
-    }
-    lines.join("\n")
+    let of = |line: &str| {
+        let stated = line.split_once(" = { value = ");
+        let stated = stated.and_then(|(name, rest)| Some((name, rest.split_once(", tol = ")?.0)));
+        let Some((name, value)) = stated else { return line.to_owned() };
+        match tolerances.iter().find(|(known, _)| *known == name) {
+            Some((_, tol)) => format!("{name} = {{ value = {value}, tol = {tol} }}"),
+            None => format!("{name} = {value}"),
+        }
+    };
+    rig.lines().map(of).collect::<Vec<_>>().join("\n")
 }

@@ -32,7 +32,7 @@ fn an_operator_is_told_of_a_worse_revision_and_goes_back() {
         // Ten seconds of like command are compared, at the least.
         std::thread::sleep(Duration::from_secs(12));
         let rig = include_str!("../../config/thrusters/whitcomb-yoerger-1999.toml");
-        let worse = rig.replace("lift_max = 0.542", "lift_max = 1.0");
+        let worse = rig.replace("value = 0.542", "value = 1.0");
         assert_ne!(rig, worse);
         page.eval(&format!("void call('POST', `${{base()}}/rig`, {})", json!({ "toml": worse })));
         page.until(&text_is("rig-text", "revision 2"));

@@ -218,9 +218,9 @@ fn all_that_is_wrong_with_a_rig_is_said_at_once() {
     let site = Site::new();
     let rig = site.folder.path().join("bent.toml");
     let bent = include_str!("../../config/thrusters/whitcomb-yoerger-1999.toml")
-        .replace("radius_m = 0.13 ", "radius_m = 130 ")
+        .replace("radius_m = { value = 0.13,", "radius_m = { value = 130,")
         .replace("log_rate_hz", "log_rate_hertz")
-        .replace("inertia_kg_m2 = 0.01", "efficiency = 0.9")
+        .replace("inertia_kg_m2 = { value = 0.01, tol = 0.5 }", "efficiency = 0.9")
         .replace("\"not recorded\"", "\"no\"");
     std::fs::write(&rig, format!("{bent}\n[[effects]]\neffect = \"colomb_friction\"\n")).unwrap();
     let text = std::fs::read_to_string(site.config()).unwrap();

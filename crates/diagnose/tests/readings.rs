@@ -9,7 +9,7 @@ use kort_identify::data::Series;
 use kort_thruster::models::ModelName;
 use kort_thruster::parameters::Parameters;
 use kort_thruster::plant::{Plant, Tick};
-use kort_thruster::rig::Rig;
+use kort_thruster::rig::{Flow, Rig};
 
 use common::Draws;
 
@@ -21,9 +21,15 @@ const TICKS_A_ROW: u32 = 10;
 /// rows and held in between.
 fn diagnosed(shown_of_thrust: f64, rows_a_reading: Option<u32>) -> Report {
     let mut rig = Rig::from_toml(STAND).unwrap();
-    // Known blades: rough ones take up what the thrust is short of.
+    // Known blades in known water: rough ones take up what the thrust is short of.
     for known in rig.propeller.iter_mut().flat_map(|p| [&mut p.lift_max, &mut p.drag_max]) {
         known.tol = Some(0.01);
+    }
+    let Flow { density_kg_m3, flux_coefficient, added_mass_coefficient } = &mut rig.flow;
+    for known in
+        [density_kg_m3, flux_coefficient, added_mass_coefficient, &mut rig.motor.torque_constant_nm_a]
+    {
+        known.tol = None;
     }
     rig.sensors.flow_rate_hz = rows_a_reading.map(|rows| 50.0 / f64::from(rows));
     let mut plant = Plant::new(ModelName::Model2, &rig, &Parameters::stated(&rig), &[], TICK_S);

@@ -1,5 +1,6 @@
-//! Examples in the user's pages are read as they stand.
+//! Examples in the user's pages are read as they stand, and shipped rigs say where each number is from and how sure it is.
 
+use kort_thruster::parameters::{Parameter, Parameters};
 use kort_thruster::rig::{Load, Rig};
 
 const PAGE: &str = include_str!("../../../docs/recordings.md");
@@ -35,4 +36,36 @@ fn known_effects_are_documented_as_they_are_read() {
     let names: Vec<&str> = rigs[0].effects.iter().map(|known| known.effect).collect();
     assert_eq!(names, ["coulomb_friction", "gear_load_friction"]);
     assert!((rigs[0].effects[0].value("coulomb_torque_n_m") - 0.08).abs() < 1e-12);
+}
+
+/// A word behind it, or a comment above it, for each number; a tolerance for each that the program takes one of.
+#[test]
+fn shipped_rigs_state_each_number_with_source_and_tolerance() {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../config/thrusters");
+    let mut bare = Vec::new();
+    for file in std::fs::read_dir(folder).unwrap().map(|file| file.unwrap().path()) {
+        let text = std::fs::read_to_string(&file).unwrap();
+        let rig = Rig::from_toml(&text).unwrap();
+        let mut above = "";
+        for line in text.lines() {
+            let (stated, source) = line.split_once('#').unwrap_or((line, ""));
+            let is_number = stated.split_once('=').is_some_and(|(_, value)| {
+                value.trim().starts_with(|c: char| c.is_ascii_digit() || "{-+".contains(c))
+            });
+            if is_number && source.trim().is_empty() && !above.starts_with('#') {
+                bare.push(format!("{}: no source: {line}", rig.name));
+            }
+            above = line;
+        }
+        for parameter in Parameter::ALL {
+            let stands = text
+                .lines()
+                .any(|line| line.split('=').next().is_some_and(|key| key.trim() == parameter.name()));
+            let unsure = Parameters::quantity(&rig, parameter).is_some_and(|stated| stated.tol.is_none());
+            if stands && unsure {
+                bare.push(format!("{}: no tolerance: {}", rig.name, parameter.name()));
+            }
+        }
+    }
+    assert!(bare.is_empty(), "{}", bare.join("\n"));
 }
