@@ -328,7 +328,7 @@ impl<'a, 'p> Writer<'a, 'p> {
         Finding {
             effect: named.effect.into(),
             path: self.path(named.effect).into(),
-            not_adopted: adoption::why_not(named.effect, probability, &named.rivals, &values),
+            not_adopted: adoption::why_not(problem, named.effect, probability, &named.rivals, &values),
             probability,
             statement: effect.map_or_else(String::new, words::statement),
             equation: effect.map_or("", |e| e.equation).into(),

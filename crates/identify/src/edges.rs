@@ -158,27 +158,6 @@ impl Prepared {
         ((self.time_s[row] - self.time_s[row - 1]) / self.tick_s).round().max(1.0) as usize
     }
 
-    /// What a log that is slower than the control hides of when the drive acted, in words; none where every step of the
-    /// command has its tick.
-    pub fn hidden_between_rows(&self) -> Option<String> {
-        let placed = self.edges.iter().filter(|row| self.ticks_before(**row) > 1);
-        let gaps: Vec<f64> = placed.map(|row| self.time_s[*row] - self.time_s[*row - 1]).collect();
-        if self.driving == Driving::Speed || gaps.is_empty() {
-            return None;
-        }
-        let usual_s = gaps.iter().sum::<f64>() / gaps.len() as f64;
-        let (what, of) = match self.driving {
-            Driving::Command(_) => ("steps of the command", "a delay of the drive"),
-            _ => ("jumps of what drives the model", "a delay of the response"),
-        };
-        Some(format!(
-            "{}: {} of {} {what} fell between two rows of the log, {usual_s:.3} s apart in the mean. At which instant between them is fitted too, so {of} shorter than that shows only in part: a log at the control rate would tell",
-            self.name,
-            gaps.len(),
-            self.edges.len(),
-        ))
-    }
-
     /// Places that are tried for a step: every tick of a log interval, as many in a gap.
     fn places(&self) -> usize {
         let longest = self.edges.iter().map(|row| self.ticks_before(*row)).max().unwrap_or(1);

@@ -5,6 +5,7 @@
 
 mod averages;
 pub mod between;
+mod between_rows;
 pub mod checks;
 pub mod data;
 pub mod edges;
