@@ -128,7 +128,6 @@ fn one(loaded: &Loaded, seed: u64) -> Result<Done, SoakError> {
         let learns = config.law != LawKind::ThrustPi && config.estimator == EstimatorKind::Off;
         let adaptive = if learns { Some(case.run(&adapting, Knows::Stated)?) } else { None };
         done.runs += 3 + usize::from(after.is_some());
-        let rms = |outcome: &Outcome| outcome.scores.get("thrust_rms_n").copied().unwrap_or(f64::NAN);
         let (first, second) = (rms(&before), after.as_ref().map_or(rms(&before), rms));
         let ratio = second / first;
         let errors = Errors { first, second, told: rms(&told) };
@@ -151,6 +150,11 @@ fn one(loaded: &Loaded, seed: u64) -> Result<Done, SoakError> {
         done.first.push(before);
     }
     Ok(done)
+}
+
+/// Thrust error of a run, N.
+fn rms(outcome: &Outcome) -> f64 {
+    outcome.scores.get("thrust_rms_n").copied().unwrap_or(f64::NAN)
 }
 
 /// What a diagnosis came to.
@@ -232,8 +236,7 @@ impl Case<'_> {
         for (k, (known, _)) in found.iter().enumerate() {
             let rest: Vec<_> =
                 found.iter().enumerate().filter(|(i, _)| *i != k).map(|(_, f)| f.clone()).collect();
-            let outcome = self.run(config, Knows::Rig(&self.adopted(&rest)?))?;
-            let without = outcome.scores.get("thrust_rms_n").copied().unwrap_or(f64::INFINITY);
+            let without = rms(&self.run(config, Knows::Rig(&self.adopted(&rest)?))?);
             if without < best.map_or(errors.second, |(least, _)| least) {
                 best = Some((without, known));
             }
@@ -241,14 +244,31 @@ impl Case<'_> {
         let Some((without, known)) = best else {
             return Ok("no single one of the findings: they err together".into());
         };
-        let there = self.drawn.iter().any(|d| d.hooked.0.id == known.effect);
-        let what = match there {
-            false => "is not there".to_owned(),
+        let truth = hidden::told(&self.loaded.rig, &self.drawn).effects;
+        let what = match truth.iter().find(|truth| truth.effect == known.effect) {
+            None => "is not there".to_owned(),
             // Right or wrong in size, it does the law no good.
-            true if errors.told > errors.first => {
+            Some(_) if errors.told > errors.first => {
                 format!("is there, and told the truth the law does worse too ({:.3} N)", errors.told)
             }
-            true => "is there, but its size is wrong".to_owned(),
+            Some(truth) => {
+                let right: Vec<_> = found
+                    .iter()
+                    .map(|(f, sure)| (if f.effect == truth.effect { truth } else { f }.clone(), *sure))
+                    .collect();
+                let error = rms(&self.run(config, Knows::Rig(&self.adopted(&right)?))?);
+                if error > WORSE * errors.first {
+                    let missed = self.drawn.iter().map(|d| d.hooked.0.id);
+                    let missed: Vec<_> =
+                        missed.filter(|id| found.iter().all(|(f, _)| f.effect != *id)).collect();
+                    format!(
+                        "is there, and at its true size the error is {error:.3} N too: it makes up for what was not adopted ({})",
+                        missed.join(", ")
+                    )
+                } else {
+                    format!("is there, but its size is wrong (at the true one the error is {error:.3} N)")
+                }
+            }
         };
         Ok(format!("{} {what}: without it the error is {without:.3} N", known.effect))
     }
