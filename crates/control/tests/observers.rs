@@ -3,7 +3,7 @@
 mod common;
 
 use common::{Loop, rigs};
-use kort_control::{ControllerConfig, EstimatorKind, LawKind, ObserverKind, Reference};
+use kort_control::{ControllerConfig, EstimatorKind, LawKind, Measurement, ObserverKind, Reference};
 use kort_thruster::rig::Rig;
 
 fn config(observer: ObserverKind) -> ControllerConfig {
@@ -94,6 +94,25 @@ fn a_filter_comes_back_after_a_sensor_fault() {
             observer.name(),
             out.estimate
         );
+    }
+}
+
+/// A law that leads a shaft which is not there drives the true one at full current: it must not be left alone with what it believes for
+/// longer than the shaft takes to top speed (61 ms on the stand).
+#[test]
+fn a_filter_that_lost_the_shaft_finds_it_before_the_shaft_is_anywhere() {
+    let rig = &rigs()[0];
+    for observer in [ObserverKind::Ekf, ObserverKind::Ukf] {
+        let mut l = Loop::new(rig, &config(observer), 0.001);
+        l.run(Reference::Thrust(80.0), 4.0);
+        let elsewhere = -l.plant.sensed().shaft_speed_rad_s;
+        let mut believed = 0.0;
+        for _ in 0..80 {
+            let shown = Measurement { shaft_speed_rad_s: Some(elsewhere), ..l.measured() };
+            let out = l.controller.tick(&shown, Reference::Thrust(80.0), 0.001);
+            believed = out.estimate.shaft_speed_rad_s.value;
+        }
+        assert!((believed / elsewhere - 1.0).abs() < 0.1, "{}: {believed} at {elsewhere}", observer.name());
     }
 }
 

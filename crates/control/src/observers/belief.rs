@@ -33,7 +33,12 @@ pub(super) struct Noise {
     pub(super) ambient_time_s: f64,
     pub(super) load_time_s: f64,
     pub(super) blade_time_s: f64,
+    /// A gate is shut no longer than this, s.
+    shut_s: f64,
 }
+
+/// The longest that a gate is shut, s.
+const SHUT_S: f64 = 0.2;
 
 impl Noise {
     pub(super) fn new(model: &ControlModel, options: &ObserverOptions) -> Self {
@@ -93,6 +98,8 @@ impl Noise {
             ambient_time_s,
             load_time_s,
             blade_time_s,
+            // By then all torque has brought the shaft from rest to top speed, and what is believed of it is worth nothing.
+            shut_s: SHUT_S.min(model.inertia_kg_m2 * model.speed_max_rad_s / torque),
         }
     }
 
@@ -160,13 +167,13 @@ pub(super) enum Verdict {
 }
 
 impl Gate {
-    pub(super) fn judge(&mut self, innovation: f64, variance: f64, dt: f64) -> Verdict {
+    pub(super) fn judge(&mut self, innovation: f64, variance: f64, longest_s: f64, dt: f64) -> Verdict {
         if innovation * innovation <= 25.0 * variance {
             self.shut_s = 0.0;
             return Verdict::Use;
         }
         self.shut_s += dt;
-        if self.shut_s > 0.2 {
+        if self.shut_s > longest_s {
             self.shut_s = 0.0;
             Verdict::Reset
         } else {
@@ -236,7 +243,7 @@ impl Belief {
     /// Scalar update with sensitivities `ph = P h` and innovation variance `s`. With the optimal gain
     /// `ph / s` the Joseph form `(I - K h')P(I - K h')' + K r K'` comes down to `P - ph ph' / s`.
     pub(super) fn update(&mut self, channel: usize, innovation: f64, ph: Vector, s: f64, dt: f64) {
-        match self.gates[channel].judge(innovation, s, dt) {
+        match self.gates[channel].judge(innovation, s, self.noise.shut_s, dt) {
             Verdict::Use => {}
             Verdict::Reject => {
                 self.gated += 1;

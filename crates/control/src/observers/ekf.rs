@@ -7,7 +7,7 @@
 //! `Qb (Om/Om_max)^2`, as an error of the blades' torque does. Shaft and water follow Model 2 (with swirl where the model has it) by midpoint steps
 //! of at most what the thruster's fastest pole allows; `va` and `Qd` are first-order Gauss-Markov, so that
 //! an unobservable one goes back to its prior standard deviation and says so. Each measurement
-//! is a scalar update behind a five-sigma gate; a gate shut for a fifth of a second opens with
+//! is a scalar update behind a five-sigma gate; a gate shut for as long as the shaft takes to top speed, a fifth of a second at most, opens with
 //! the filter started again from the measured speed, or a stale one would never come back.
 //!
 //! `va` and `Qd` are not separable from shaft speed alone: their standard errors then stay near the
