@@ -34,7 +34,7 @@ const STEP_SHARE: f64 = 0.05;
 /// A gap longer than this may hide changes of the drive, s.
 const LONG_GAP_S: f64 = 0.2;
 /// After such a gap the state is taken as known again, s.
-const SETTLE_S: f64 = 2.0;
+pub const SETTLE_S: f64 = 2.0;
 
 /// Runs all checks on one recording.
 pub fn check(series: &Series, rig: &Rig) -> Checked {

@@ -2,12 +2,15 @@
 //!
 //! What hypotheses cost grows with the time that is simulated, what the recording tells does not: most of an hour is
 //! more of the same. Of a long recording stretches are taken in which most moves, half of them spread over its whole
-//! length, so that what changes slowly shows as well; between them the simulation leaps.
+//! length, so that what changes slowly shows as well; between them the simulation leaps. After a leap what was fast before
+//! has to be forgotten first, so no stretch is short beside that, and what lies between two is a pause or is compared too:
+//! across a mere gap the command would be unknown, and it is not.
 
 use std::ops::Range;
 
 use kort_thruster::rig::Rig;
 
+use crate::checks::SETTLE_S;
 use crate::data::{KNOWN, Series, control_period_s, pause_s};
 use crate::spectrum::median_interval;
 
@@ -15,8 +18,10 @@ use crate::spectrum::median_interval;
 const MOST_TICKS: f64 = 1e5;
 /// Rows of all recordings of which nothing is left out: of a slow log every row counts.
 const FEWEST_ROWS: f64 = 5000.0;
-/// Stretches of one recording.
+/// Most stretches of one recording.
 const STRETCHES: usize = 10;
+/// Shortest stretch, s: a quarter of it is lost after the leap.
+const SHORTEST_S: f64 = 4.0 * SETTLE_S;
 
 /// The rows of each recording that are compared; none where all are.
 pub fn stretches(series: &[Series], rig: &Rig) -> Option<Vec<Vec<Range<usize>>>> {
@@ -55,25 +60,29 @@ pub fn words(series: &Series, rows: &[Range<usize>]) -> String {
     )
 }
 
-/// Rows of one recording, a share of its length.
+/// Rows of one recording, a share of its length or the shortest stretch if that is more.
 fn of_one(series: &Series, share: f64) -> Vec<Range<usize>> {
-    let rows = series.time_s.len();
-    let blocks = ((STRETCHES as f64 / share).round() as usize).clamp(1, rows);
+    let (rows, time_s) = (series.time_s.len(), &series.time_s);
+    let span_s = time_s[rows - 1] - time_s[0];
+    let stretch_s = (share * span_s / STRETCHES as f64).max(SHORTEST_S);
+    let blocks = ((span_s / stretch_s) as usize).clamp(1, rows);
+    let count = ((share * blocks as f64).round() as usize).clamp(1, STRETCHES);
     let bounds: Vec<usize> = (0..=blocks).map(|k| k * rows / blocks).collect();
     let moves = movement(series, &bounds);
     let livelier = |a: &usize, b: &usize| moves[*b].total_cmp(&moves[*a]);
-    let spread = STRETCHES / 2;
+    let spread = count / 2;
     let mut chosen: Vec<usize> = (0..spread)
         .filter_map(|s| (s * blocks / spread..(s + 1) * blocks / spread).min_by(livelier))
         .collect();
     let mut rest: Vec<usize> = (0..blocks).filter(|k| !chosen.contains(k)).collect();
     rest.sort_by(livelier);
-    chosen.extend(rest.into_iter().take(STRETCHES - spread));
+    chosen.extend(rest.into_iter().take(count - spread));
     chosen.sort_unstable();
+    let pause_s = pause_s(time_s);
     let mut stretches: Vec<Range<usize>> = Vec::new();
     for k in chosen {
         match stretches.last_mut() {
-            Some(last) if last.end == bounds[k] => last.end = bounds[k + 1],
+            Some(last) if time_s[bounds[k]] - time_s[last.end - 1] <= pause_s => last.end = bounds[k + 1],
             _ => stretches.push(bounds[k]..bounds[k + 1]),
         }
     }
@@ -105,8 +114,8 @@ fn variance(values: &[f64]) -> f64 {
 mod tests {
     use kort_thruster::rig::Rig;
 
-    use super::{excerpt, stretches};
-    use crate::data::Series;
+    use super::{SHORTEST_S, excerpt, stretches};
+    use crate::data::{Series, pause_s};
 
     /// An hour at 20 Hz in which a drive is only used from 2000 to 2100 s, and hums a little all the time.
     fn hour() -> Series {
@@ -138,6 +147,25 @@ mod tests {
             assert!(part.time_s.iter().any(|t| (from..to).contains(t)), "nothing from {from} to {to} s");
         }
         assert!(part.time_s.windows(2).all(|w| w[0] < w[1]));
+    }
+
+    /// What is left out between two stretches is a pause, and a stretch lasts longer than what is forgotten after it: a log of
+    /// a drive at 5 kHz is long in ticks and short in seconds.
+    #[test]
+    fn stretches_of_a_fast_drive_are_no_gaps() {
+        let mut fast = hour();
+        let rows = 25_000;
+        fast.time_s = (0..rows).map(|k| 0.004 * k as f64).collect();
+        fast.columns.iter_mut().for_each(|c| c.1 = fast.time_s.iter().map(|t| (3.0 * t).sin()).collect());
+        let mut rig = rig();
+        rig.sensors.control_rate_hz = Some(5000.0);
+        let rows = &stretches(std::slice::from_ref(&fast), &rig).unwrap()[0];
+        for stretch in rows {
+            let span_s = fast.time_s[stretch.end - 1] - fast.time_s[stretch.start];
+            assert!(span_s > 0.99 * SHORTEST_S, "{stretch:?}");
+        }
+        let pauses = rows.windows(2).map(|w| fast.time_s[w[1].start] - fast.time_s[w[0].end - 1]);
+        assert!(pauses.into_iter().all(|s| s > pause_s(&fast.time_s)), "{rows:?}");
     }
 
     #[test]

@@ -18,7 +18,7 @@ use crate::readings;
 use crate::refuse;
 use crate::simulate::Problem;
 use crate::spectrum::median_interval;
-use crate::thin::{Thin, too_thin};
+use crate::thin::{Thin, nothing_left, too_thin};
 use crate::too_slow;
 
 /// Most steps of the fit that tells whether known effects are as stated.
@@ -168,7 +168,7 @@ impl<'a> Setup<'a> {
             problem = problem.without(&hidden.rows);
         }
         notes.splice(0..0, turned(&mut problem, &baseline));
-        thin = mistaken(&problem, &baseline).or(thin);
+        thin = mistaken(&problem, &baseline).or(thin).or_else(|| nothing_left(&problem.masked));
         notes.extend(problem.recorded().filter_map(Prepared::hidden_between_rows));
         if let Some(name) = telling_column(&series, &problem, &baseline) {
             let sizes = spread(&series, &name);

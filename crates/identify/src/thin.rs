@@ -64,6 +64,19 @@ pub fn too_thin(recordings: &[Prepared], rig: &Rig) -> Option<Thin> {
     None
 }
 
+/// Recordings of which the checks left out nearly all: what is compared with so few rows fits anything.
+pub fn nothing_left(masked: &[Vec<bool>]) -> Option<Thin> {
+    let all: usize = masked.iter().map(Vec::len).sum();
+    let left = masked.iter().flatten().filter(|left_out| !**left_out).count();
+    (left < FEWEST_ROWS).then(|| Thin {
+        why: format!(
+            "of {all} rows only {left} are left to compare, too few to learn the noise and hold data out; the notes say why the others were left out"
+        ),
+        still: false,
+        of_the_log: true,
+    })
+}
+
 /// How often what drives changes by more than a trifle of its largest, within recordings and from one to the next.
 fn changes(recordings: &[Prepared]) -> usize {
     let mut drivers: Vec<&str> = recordings.iter().map(|r| r.driving.column()).collect();
@@ -217,6 +230,13 @@ mod tests {
         };
         let prepared = Prepared::new(&series, &rig, false).unwrap();
         too_thin(&[prepared], &rig).map(|thin| thin.still)
+    }
+
+    #[test]
+    fn what_the_checks_left_nothing_of_tells_nothing() {
+        let words = nothing_left(&[vec![true; 900], [vec![false; 99], vec![true; 1]].concat()]);
+        assert!(words.unwrap().why.starts_with("of 1000 rows only 99 are left"));
+        assert!(nothing_left(&[vec![true; 900], vec![false; 200]]).is_none());
     }
 
     #[test]
