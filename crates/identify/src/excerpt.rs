@@ -47,17 +47,26 @@ pub fn excerpt(series: &Series, rows: &[Range<usize>]) -> Series {
     }
 }
 
-/// What was left out, in words.
-pub fn words(series: &Series, rows: &[Range<usize>]) -> String {
+/// What was left out, in words; none if nothing was.
+pub fn words(series: &Series, rows: &[Range<usize>]) -> Option<String> {
     let span = |r: &Range<usize>| series.time_s[r.end - 1] - series.time_s[r.start];
-    let (first, last) = (series.time_s[0], series.time_s[series.time_s.len() - 1]);
-    format!(
-        "{}: of {:.0} s the {:.0} s in which most moves are compared, in {} stretches; between them only what is slow (heat, a tank's return flow) is followed",
-        series.name,
-        last - first,
-        rows.iter().map(span).sum::<f64>(),
-        rows.len()
-    )
+    let compared: usize = rows.iter().map(Range::len).sum();
+    let stretches = match rows.len() {
+        1 => "one stretch".into(),
+        several => {
+            format!(
+                "{several} stretches; between them only what is slow (heat, a tank's return flow) is followed"
+            )
+        }
+    };
+    (compared < series.time_s.len()).then(|| {
+        format!(
+            "{}: of {:.0} s the {:.0} s in which most moves are compared, in {stretches}",
+            series.name,
+            span(&(0..series.time_s.len())),
+            rows.iter().map(span).sum::<f64>(),
+        )
+    })
 }
 
 /// Rows of one recording, a share of its length or the shortest stretch if that is more.

@@ -64,7 +64,7 @@ impl<'a> Setup<'a> {
         for (one, prepared) in whole.iter().zip(&mut setup.problem.recordings) {
             prepared.lay_means(&one.read);
         }
-        let words = series.iter().zip(&rows).map(|(one, rows)| excerpt::words(one, rows));
+        let words = series.iter().zip(&rows).filter_map(|(one, rows)| excerpt::words(one, rows));
         setup.notes.splice(0..0, words.chain(series.iter().filter_map(checks::pauses)));
         Ok(setup)
     }

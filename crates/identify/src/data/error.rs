@@ -30,7 +30,7 @@ pub enum DataError {
     },
     /// Nothing to compare with.
     #[error(
-        "{recording}: driven by {driving}, but no measured response beside it: {found}\nhint: record shaft_speed_rad_s, thrust_n, torque_n_m or flow_m_s as well; a log of commands alone can be replayed (kort simulate, a segment of kind \"replay\"), not diagnosed"
+        "{recording}: driven by {driving}, but no measured response beside it: {found}\nhint: record shaft_speed_rad_s, thrust_n, torque_n_m or flow_m_s as well; one that is there under another name comes in through a column map (`kort columns FILE` proposes it); a log of commands alone can be replayed (kort simulate, a segment of kind \"replay\"), not diagnosed"
     )]
     NoResponse {
         /// The recording.
