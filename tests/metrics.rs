@@ -32,6 +32,7 @@ fn every_metric_that_an_operator_of_months_needs_is_there() {
             r#"kort_process_resident_bytes{thruster="",process="gateway"}"#,
             r#"kort_http_request_duration_seconds_count{route="/v1/thrusters/{id}/setpoint"}"#,
             "kort_streams_open",
+            "kort_events_unwritten",
             r#"kort_setpoint_age_seconds{thruster="t1"}"#,
             r#"kort_disk_free_bytes{disk="recordings"}"#,
             r#"kort_motor_power_watts{thruster="t1"}"#,

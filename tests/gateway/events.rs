@@ -66,3 +66,28 @@ fn stops_without_end_are_told_once_and_counted() {
         assert!(events.iter().any(|event| event["kind"] == "armed"), "{events:?}");
     });
 }
+
+/// What the disk does not take is told by a number, and is written once it can be.
+#[test]
+fn events_that_the_disk_does_not_take_are_counted_until_it_does() {
+    common::in_real_time(|| {
+        let stack = Stack::start();
+        let folder = stack.site.folder.path().join("events");
+        let unwritten = || {
+            let metrics = stack.text("/metrics")?;
+            metrics.lines().find_map(|line| line.strip_prefix("kort_events_unwritten "))?.parse().ok()
+        };
+        common::wait("all to be written", || (unwritten() == Some(0)).then_some(()));
+        // A file where the folder was: nothing can be made in it.
+        std::fs::remove_dir_all(&folder).unwrap();
+        std::fs::write(&folder, "").unwrap();
+        let (status, lease) =
+            stack.http("POST", "/lease", Some(serde_json::json!({"holder": "bench"}))).unwrap();
+        assert_eq!(status, 201, "{lease}");
+        common::wait("an event that is not written", || (unwritten()? > 0).then_some(()));
+        std::fs::remove_file(&folder).unwrap();
+        common::wait("it to be written", || (unwritten() == Some(0)).then_some(()));
+        let log = std::fs::read_to_string(folder.join("events.jsonl")).unwrap();
+        assert!(log.contains("lease_taken"), "{log}");
+    });
+}

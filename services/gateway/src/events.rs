@@ -84,11 +84,16 @@ impl Events {
         }
     }
 
+    /// How many events were noted and are not on the disk.
+    pub fn unwritten(&self) -> u64 {
+        self.waiting.load(Ordering::Relaxed)
+    }
+
     /// Waits until what was noted is on the disk, as far as the disk takes it: whoever is told that something was done finds it
     /// in the log, however the service ends.
     pub async fn written(&self) {
         let begun = Instant::now();
-        while self.waiting.load(Ordering::Relaxed) > 0 && begun.elapsed() < WRITTEN_WITHIN {
+        while self.unwritten() > 0 && begun.elapsed() < WRITTEN_WITHIN {
             tokio::time::sleep(Duration::from_millis(1)).await;
         }
     }

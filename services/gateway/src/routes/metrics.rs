@@ -117,6 +117,13 @@ fn service(families: &mut Families, app: &App) {
         &[],
         evicted as f64,
     );
+    let unwritten = app.events().unwritten() as f64;
+    families.gauge(
+        "events_unwritten",
+        "Events that the event log on disk has not taken yet.",
+        &[],
+        unwritten,
+    );
     if let Some(certificate) = app.certificate() {
         families.gauge(
             "tls_certificate_expiry_seconds",
