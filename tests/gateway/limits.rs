@@ -101,9 +101,10 @@ fn a_recording_leaves_the_space_to_others_that_is_to_stay_free() {
             (kept.rows() as u64, 0),
             (info["rows"].as_u64().unwrap(), info["lost_samples"].as_u64().unwrap())
         );
-        let shown = wait("the fault", || {
+        let latched = |stack: &Stack| {
             stack.state()?["faults"].as_array()?.iter().find(|f| f["name"] == "recording_failed").cloned()
-        });
+        };
+        let shown = wait("the fault", || latched(&stack));
         assert_eq!(shown["code"], 49, "{shown}");
         let t = stack.watch().next();
         assert!(t.armed == 1 && t.faults == 0, "the thrust is untouched: {t:?}");
@@ -112,5 +113,27 @@ fn a_recording_leaves_the_space_to_others_that_is_to_stay_free() {
         std::fs::remove_file(inside.join("others")).unwrap();
         record(port, "next");
         assert_eq!(send(port, "DELETE", "/v1/recordings/next", &[], b"").json()["state"], "complete");
+        // The next gateway shows it as it was, the one after it was cleared no more.
+        let succeeded = |stack: &Stack| {
+            let before = stack.process_of("gateway");
+            kill(before, "KILL");
+            wait("a successor", || stack.process("gateway").filter(|process| *process != before));
+            wait("its state", || stack.state())
+        };
+        succeeded(&stack);
+        assert_eq!(latched(&stack), Some(shown));
+        // The lease went with the gateway; the servo's faults can be cleared once its controller hears the next one.
+        wait("it to be cleared", || {
+            let answer = send(port, "POST", "/v1/thrusters/t1/clear-faults", &[], b"");
+            (answer.status == 200).then_some(())
+        });
+        assert_eq!(latched(&stack), None);
+        wait("the clearing to be written", || {
+            let events =
+                std::fs::read_to_string(stack.site.folder.path().join("events/events.jsonl")).ok()?;
+            events.contains("faults_cleared").then_some(())
+        });
+        succeeded(&stack);
+        assert_eq!(latched(&stack), None);
     });
 }

@@ -87,11 +87,14 @@ impl Thruster {
     pub fn new(
         id: &str,
         range: SetpointRange,
-        heard: Heard,
+        mut heard: Heard,
         bell: Arc<Bell>,
         events: Arc<Events>,
     ) -> (Thruster, mpsc::Receiver<Ask>) {
         let (asks, inbox) = mpsc::sync_channel(64);
+        // Nobody else keeps the gateway's own fault: the log says that it was not cleared.
+        let failed = events.latched(id, Fault::RecordingFailed);
+        heard.own_faults |= failed.map_or(0, |_| Fault::RecordingFailed.bit());
         let thruster = Thruster {
             id: id.to_owned(),
             range: Mutex::new(range),
