@@ -123,8 +123,11 @@ fn a_revision_is_taken_under_way_and_gone_back_from() {
         let lease = stack.leases["t1"].clone();
         let (status, same) = ask(&stack, "POST", "/rig", &[TEXT, ("Lease-Id", &lease)], &text);
         assert_eq!((status, &parsed(&same)["applied"]), (200, &json!(false)), "{same}");
+        let dry = stack.expect("POST", "/rig/rollback?dry_run=true", None);
+        assert_eq!((&dry["applied"], &dry["in_force"]["number"]), (&json!(false), &json!(2)), "{dry}");
         let back = stack.expect("POST", "/rig/rollback", None);
         assert_eq!((&back["in_force"]["number"], &back["difference"][0]["after"]), (&json!(1), &Value::Null));
+        assert_eq!(dry["difference"], back["difference"], "as it was announced");
         runs_on(&stack, &first["revision"]);
         not_judged(trial(&stack), 1, Value::Null);
         let (status, none) = stack.http("POST", "/rig/rollback", None).unwrap();

@@ -159,17 +159,15 @@ impl RigDesk {
                 desk.may(lease, now)?;
                 desk.done(lease, now);
             }
-            let difference = difference::between(&text_before, text);
-            let unused_effects = checked.unused();
-            return Ok(Revised { applied: false, in_force: before, difference, unused_effects });
+            return Ok(compared(before, &text_before, text, &checked));
         }
         self.put_in_force(asker, text, checked, How::Made(making)).await
     }
 
-    /// Goes back to the revision that was in force before this one.
-    pub async fn roll_back(&self, asker: &Asker) -> Result<Revised, Problem> {
+    /// Goes back to the revision that was in force before this one. A dry run only checks and compares.
+    pub async fn roll_back(&self, asker: &Asker, dry_run: bool) -> Result<Revised, Problem> {
         let _turn = self.turn.lock().await;
-        let (now, _) = self.book.current();
+        let (now, text_now) = self.book.current();
         let back = now.before.and_then(|number| self.book.revision(number)).ok_or_else(|| {
             Problem::new(
                 Kind::Refused,
@@ -179,6 +177,9 @@ impl RigDesk {
         })?;
         let (entry, text) = back;
         let checked = self.check(&text)?;
+        if dry_run {
+            return Ok(compared(now, &text_now, &text, &checked));
+        }
         self.put_in_force(asker, &text, checked, How::Back(entry.number)).await
     }
 
@@ -311,6 +312,12 @@ impl RigDesk {
         )
         .hint("see that the folder of gateway.rigs can be written and has space")
     }
+}
+
+/// What a text would change, which is not put in force.
+fn compared(in_force: Entry, text_in_force: &str, text: &str, checked: &Checked) -> Revised {
+    let difference = difference::between(text_in_force, text);
+    Revised { applied: false, in_force, difference, unused_effects: checked.unused() }
 }
 
 fn kind(kind: AmplifierKind) -> &'static str {

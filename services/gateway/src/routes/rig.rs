@@ -227,14 +227,14 @@ async fn revise(
     whole(async move { desk.revise(&asker, &text, making, dry_run).await.map(axum::Json) }).await
 }
 
-/// Goes back to the revision that was in force before the present one, bumpless. Needs the role admin, and the
-/// `Lease-Id` in force while somebody holds one.
+/// Goes back to the revision that was in force before the present one, bumpless. With `dry_run=true` nothing changes. Needs
+/// the role admin, and the `Lease-Id` in force while somebody holds one.
 #[utoipa::path(post, path = "/v1/thrusters/{id}/rig/rollback", tag = "rig",
-    params(("id" = String, Path, description = "Name of the thruster", example = "t1"),
+    params(("id" = String, Path, description = "Name of the thruster", example = "t1"), How,
            ("Lease-Id" = Option<String>, Header, pattern = "^[!-~]+$", description = "The lease_id of the lease in force, if there is one")),
     responses(
         (status = 200, description = "What is in force now, and what differs", body = Revised),
-        (status = 400, description = "`malformed-header`", body = Problem, content_type = "application/problem+json"),
+        (status = 400, description = "`malformed-header`, `malformed-query`", body = Problem, content_type = "application/problem+json"),
         (status = 404, description = "`unknown-thruster`", body = Problem, content_type = "application/problem+json"),
         (status = 409, description = "`refused`: there is no revision before; `lease-held`, `lease-lost`", body = Problem, content_type = "application/problem+json"),
         (status = 422, description = "`invalid-rig`: this kort does not take the revision before any more", body = Problem, content_type = "application/problem+json"),
@@ -244,10 +244,11 @@ async fn roll_back(
     State(app): State<Arc<App>>,
     Extension(who): Extension<Identity>,
     Path(id): Path<String>,
+    Query(How { dry_run }): Query<How>,
     LeaseId(lease): LeaseId,
 ) -> Result<axum::Json<Revised>, Problem> {
     let (desk, asker) = (Arc::clone(app.rig(&id)?), Asker { who: who.name, lease });
-    whole(async move { desk.roll_back(&asker).await.map(axum::Json) }).await
+    whole(async move { desk.roll_back(&asker, dry_run).await.map(axum::Json) }).await
 }
 
 /// The text that a request names, and where it comes from.
