@@ -55,6 +55,39 @@ fn recordings_are_tagged_while_they_run_and_after_and_found_by_it() {
     });
 }
 
+/// What somebody moved away by hand is listed as gone, and the route says the same; moved back it is there again.
+#[test]
+fn a_recording_without_its_file_is_gone_in_list_and_route_alike() {
+    common::in_real_time(|| {
+        let stack = Stack::start();
+        let port = stack.site.port;
+        assert_eq!(send(port, "POST", "/v1/recordings", &[JSON], br#"{"name": "moved"}"#).status, 201);
+        wait("rows", || stack.get("/v1/recordings")?[0]["rows"].as_u64().filter(|rows| *rows > 2));
+        assert_eq!(send(port, "DELETE", "/v1/recordings/moved", &[], b"").status, 200);
+        let listed = || send(port, "GET", "/v1/recordings", &[], b"").json()[0].clone();
+        let file = stack.site.folder.path().join("recordings/moved.mcap");
+        let away = stack.site.folder.path().join("away.mcap");
+        std::fs::rename(&file, &away).unwrap();
+        let gone = listed();
+        assert_eq!((&gone["state"], &gone["bytes"]), (&json!("gone"), &json!({})), "{gone}");
+        let why = gone["cause"].as_str().unwrap();
+        assert!(why.contains("moved.mcap is not there"), "{gone}");
+        for path in ["moved", "moved.csv", "moved/estimates"] {
+            let refused = send(port, "GET", &format!("/v1/recordings/{path}"), &[], b"");
+            assert_problem(&refused, 404, "unknown-recording", path);
+            assert!(refused.text().contains(why), "{path}: {}", refused.text());
+        }
+        let tagged = send(port, "PATCH", "/v1/recordings/moved", &[JSON], br#"{"tags": ["tow"]}"#);
+        assert_problem(&tagged, 404, "unknown-recording", "tags");
+        std::fs::rename(&away, &file).unwrap();
+        assert_eq!((&listed()["state"], &listed()["cause"]), (&json!("complete"), &json!(null)));
+        assert_eq!(send(port, "GET", "/v1/recordings/moved", &[], b"").status, 200);
+        std::fs::remove_file(&file).unwrap();
+        assert_eq!(send(port, "DELETE", "/v1/recordings/moved", &[], b"").status, 204);
+        assert_eq!(send(port, "GET", "/v1/recordings", &[], b"").json(), json!([]));
+    });
+}
+
 /// Tuned, saved, put in force again, started with and soaked: one file.
 #[test]
 fn a_tuned_controller_is_saved_as_a_file_that_everything_takes() {

@@ -364,14 +364,6 @@ impl Recorder {
         }
     }
 
-    fn sized(&self, mut info: RecordingInfo) -> RecordingInfo {
-        info.bytes = fs::metadata(self.file(&info.name, ENDING))
-            .map(|about| (ENDING.to_owned(), about.len()))
-            .into_iter()
-            .collect();
-        info
-    }
-
     fn file(&self, name: &str, extension: &str) -> PathBuf {
         self.folder.join(format!("{name}.{extension}"))
     }

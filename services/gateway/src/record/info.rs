@@ -56,4 +56,6 @@ pub enum RecordingState {
     Torn,
     /// The disk refused: readable up to what it took; `cause` says why.
     Failed,
+    /// Its file was moved or removed by hand: it cannot be fetched, and DELETE takes it off the list.
+    Gone,
 }

@@ -58,6 +58,9 @@ impl Recorder {
         }
         let mut info = self.known(name)?;
         may(who, &info.owner, name)?;
+        if info.state == RecordingState::Gone {
+            return Err(self.absent(name));
+        }
         info.tags = tags;
         self.note_info(&info);
         Ok(info)
@@ -88,6 +91,31 @@ impl Recorder {
             format!("{} deleted recording {name}", who.name),
         );
         Ok(None)
+    }
+
+    /// Why nothing of this name can be fetched, as the list has it.
+    pub fn absent(&self, name: &str) -> Problem {
+        match self.known(name) {
+            Err(unknown) => unknown,
+            Ok(info) => {
+                let why = info.cause.unwrap_or_else(|| "its file is not there".into());
+                Problem::new(Kind::UnknownRecording, format!("recording {name:?} cannot be fetched: {why}"))
+                    .hint("DELETE /v1/recordings/{name} takes it off the list")
+            }
+        }
+    }
+
+    /// With what lies on the disk of it. One that runs without its file ends with the next look of its own thread.
+    pub(super) fn sized(&self, mut info: RecordingInfo) -> RecordingInfo {
+        let about = fs::metadata(self.file(&info.name, ENDING));
+        let gone = about.as_ref().is_err_and(|error| error.kind() == io::ErrorKind::NotFound);
+        if gone && info.state != RecordingState::Recording {
+            let words = format!("its file {}.{ENDING} is not there: moved or removed by hand", info.name);
+            info.state = RecordingState::Gone;
+            info.cause = Some(info.cause.map_or(words.clone(), |cause| format!("{cause}; {words}")));
+        }
+        info.bytes = about.map(|about| (ENDING.to_owned(), about.len())).into_iter().collect();
+        info
     }
 
     fn known(&self, name: &str) -> Result<RecordingInfo, Problem> {

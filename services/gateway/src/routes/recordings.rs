@@ -269,7 +269,7 @@ async fn remove(
         (status = 200, description = "The file", headers(("content-disposition" = String, description = "Name to save it under")),
             content((Vec<u8> = "application/octet-stream"), (Vec<u8> = "application/vnd.apache.parquet"), (String = "text/csv"))),
         (status = 400, description = "`malformed-path`, `malformed-query`", body = Problem, content_type = "application/problem+json"),
-        (status = 404, description = "`unknown-recording`: there is none of this name, or nothing of it can be read yet", body = Problem, content_type = "application/problem+json"),
+        (status = 404, description = "`unknown-recording`: there is none of this name, its file is gone, or nothing of it can be read yet", body = Problem, content_type = "application/problem+json"),
         (status = 503, description = "`overloaded`: CSV and Parquet are made and sent to one reader at a time", body = Problem, content_type = "application/problem+json")))]
 async fn fetch(
     State(app): State<Arc<App>>,
@@ -282,8 +282,9 @@ async fn fetch(
         .unwrap_or((&name, None));
     let format = format.or(ending).unwrap_or(FileFormat::Mcap);
     let found = app.recorder().find(stem).map(|path| (path, stem));
-    let (path, stem) =
-        found.or_else(|| Some((app.recorder().find(&name)?, name.as_str()))).ok_or_else(|| unknown(&name))?;
+    let Some((path, stem)) = found.or_else(|| Some((app.recorder().find(&name)?, name.as_str()))) else {
+        return Err(absent(&app, stem).await);
+    };
     let save_as = format!("attachment; filename=\"{stem}.{}\"", format.ending());
     let (length, body) = match format {
         FileFormat::Csv => text::other(path, Format::Csv).await?,
@@ -308,9 +309,10 @@ async fn as_it_is(path: &std::path::Path) -> Result<(Option<usize>, Body), Probl
     Ok((Some(length as usize), Body::from_stream(ReaderStream::new(file.take(length)))))
 }
 
-fn unknown(name: &str) -> Problem {
-    Problem::new(Kind::UnknownRecording, format!("there is no recording {name:?}"))
-        .hint("GET /v1/recordings lists them")
+/// Why there is nothing to send.
+async fn absent(app: &App, name: &str) -> Problem {
+    let (recorder, name) = (Arc::clone(app.recorder()), name.to_owned());
+    blocking(move || recorder.absent(&name)).await.unwrap_or_else(|problem| problem)
 }
 
 fn unreadable(path: &std::path::Path, error: impl std::fmt::Display) -> Problem {

@@ -7,7 +7,7 @@ use serde::Deserialize;
 use utoipa::IntoParams;
 
 use super::text::{nothing_yet, turn};
-use super::{blocking, unknown};
+use super::{absent, blocking};
 use crate::App;
 use crate::estimates::Estimates;
 use crate::extract::{Path, Query};
@@ -37,7 +37,7 @@ fn hz_default() -> f64 {
     responses(
         (status = 200, description = "What it holds of them", body = Estimates),
         (status = 400, description = "`malformed-path`, `malformed-query`", body = Problem, content_type = "application/problem+json"),
-        (status = 404, description = "`unknown-recording`: there is none of this name, or nothing of it can be read yet", body = Problem, content_type = "application/problem+json"),
+        (status = 404, description = "`unknown-recording`: there is none of this name, its file is gone, or nothing of it can be read yet", body = Problem, content_type = "application/problem+json"),
         (status = 422, description = "`out-of-range`", body = Problem, content_type = "application/problem+json"),
         (status = 503, description = "`overloaded`: one is made of a recording at a time", body = Problem, content_type = "application/problem+json")))]
 pub(super) async fn estimates(
@@ -49,7 +49,7 @@ pub(super) async fn estimates(
         let words = format!("hz = {hz} is outside {} to {}", HZ.start(), HZ.end());
         return Err(Problem::new(Kind::OutOfRange, words).hint("leave it out for all there are"));
     }
-    let path = app.recorder().find(&name).ok_or_else(|| unknown(&name))?;
+    let Some(path) = app.recorder().find(&name) else { return Err(absent(&app, &name).await) };
     let turn = turn().await?;
     let made = blocking(move || {
         let made = Estimates::of_recording(&path, hz).map_err(nothing_yet);
