@@ -9,6 +9,8 @@ use kort_proto::config::{Config, DEFAULT_PATH, is_there, is_told_by};
 use kort_proto::transport::Deployment;
 use serde::Serialize;
 
+#[cfg(all(feature = "servo", feature = "controller", feature = "gateway"))]
+use crate::fail;
 use crate::{DONE, USAGE, print, said};
 
 /// Which files.
@@ -82,8 +84,7 @@ const HOLDS_NOTHING: &str = "holds no key at all\nhint: a deployment needs [thru
 pub fn run(args: &Check) -> Result<ExitCode, ExitCode> {
     let mut found = Found::default();
     if args.files.is_empty() {
-        let default = Path::new(DEFAULT_PATH);
-        deployment(is_there(default).then_some(default), &mut found);
+        deployment(None, &mut found);
     }
     for file in &args.files {
         match std::fs::read_to_string(file) {
@@ -119,6 +120,18 @@ pub fn run(args: &Check) -> Result<ExitCode, ExitCode> {
         said(print(&(lines.join("\n") + "\n")))?;
     }
     Ok(ExitCode::from(if problems.is_empty() { DONE } else { USAGE }))
+}
+
+/// Refuses a deployment with all that keeps its services from starting, before any of them makes anything.
+#[cfg(all(feature = "servo", feature = "controller", feature = "gateway"))]
+pub fn refuse(file: Option<&Path>) -> Result<(), ExitCode> {
+    let mut found = Found::default();
+    wrong(file, &mut found);
+    if found.problems.is_empty() {
+        return Ok(());
+    }
+    let words: Vec<String> = found.problems.iter().map(ToString::to_string).collect();
+    Err(fail(USAGE, &words.join("\nerror: ")))
 }
 
 fn one(file: &Path, text: &str, found: &mut Found) {
@@ -162,8 +175,31 @@ fn described(_: &toml::Table, _: &str, _: &Path) -> Result<Vec<(&'static str, &'
     Err(vec!["this kort was built without its laboratory, and reads deployments only\nhint: check it with a whole one".into()])
 }
 
-/// Everything that servo, controller and gateway would refuse.
+/// Everything that servo, controller and gateway would refuse, and what they would warn of.
 fn deployment(file: Option<&Path>, into: &mut Found) {
+    let (name, config) = wrong(file, into);
+    let absent = config.iter().flat_map(kort_proto::cores::absent);
+    into.warnings.extend(absent.map(|words| problem(&name, &words.to_string())));
+    #[cfg(feature = "controller")]
+    if let Some(config) = &config {
+        let doubtful = config.thrusters.keys().filter_map(|id| kort_controller::doubtful(config, id));
+        into.warnings.extend(doubtful.map(|words| problem(&name, &words.to_string())));
+    }
+    #[cfg(feature = "gateway")]
+    into.warnings.extend(
+        config.iter().flat_map(kort_gateway::doubtful).map(|words| problem(&name, &words.to_string())),
+    );
+    #[cfg(feature = "gateway")]
+    for (file, effect, why) in config.iter().flat_map(kort_gateway::unused_effects) {
+        into.unused(&file, [(effect, why)]);
+    }
+}
+
+/// Everything that they would refuse in a file, in the default one where none is named; how it is called, and what could be
+/// read.
+fn wrong(file: Option<&Path>, into: &mut Found) -> (String, Option<Config>) {
+    let default = Path::new(DEFAULT_PATH);
+    let file = file.or_else(|| is_there(default).then_some(default));
     let name = file.map_or_else(|| "built-in configuration".to_owned(), |file| file.display().to_string());
     let (config, wrong) = Config::load_with_all(file);
     let of_services: Vec<String> = config.iter().flat_map(services).collect();
@@ -181,21 +217,7 @@ fn deployment(file: Option<&Path>, into: &mut Found) {
     for found in of_services.iter().map(|words| problem(&name, words)).filter(|found| !unread(&found.said)) {
         into.problem(found);
     }
-    let absent = config.iter().flat_map(kort_proto::cores::absent);
-    into.warnings.extend(absent.map(|words| problem(&name, &words.to_string())));
-    #[cfg(feature = "controller")]
-    if let Some(config) = &config {
-        let doubtful = config.thrusters.keys().filter_map(|id| kort_controller::doubtful(config, id));
-        into.warnings.extend(doubtful.map(|words| problem(&name, &words.to_string())));
-    }
-    #[cfg(feature = "gateway")]
-    into.warnings.extend(
-        config.iter().flat_map(kort_gateway::doubtful).map(|words| problem(&name, &words.to_string())),
-    );
-    #[cfg(feature = "gateway")]
-    for (file, effect, why) in config.iter().flat_map(kort_gateway::unused_effects) {
-        into.unused(&file, [(effect, why)]);
-    }
+    (name, config)
 }
 
 /// What each service says.

@@ -188,6 +188,7 @@ fn dispatch(command: Command) -> Result<ExitCode, ExitCode> {
         #[cfg(all(feature = "servo", feature = "controller", feature = "gateway"))]
         Command::Up(service) => {
             log();
+            check::refuse(service.config.as_deref())?;
             let (config, deployment) = service.load()?;
             finish(up::run(&config, &deployment))
         }

@@ -19,17 +19,17 @@ use crate::thruster::lock;
 
 /// Why there is no TLS.
 #[derive(Debug, Error)]
-#[error(
-    "gateway.tls, {file}: {why}\nhint: certificate and key are PEM files; self_signed = true makes both where neither is there"
-)]
+#[error("gateway.tls, {file}: {why}\nhint: {hint}")]
 pub struct TlsError {
     file: String,
     why: String,
+    hint: &'static str,
 }
 
 impl TlsError {
     pub(crate) fn new(file: &Path, why: impl ToString) -> TlsError {
-        TlsError { file: file.display().to_string(), why: why.to_string() }
+        let hint = "certificate and key are PEM files; self_signed = true makes both where neither is there";
+        TlsError { file: file.display().to_string(), why: why.to_string(), hint }
     }
 }
 
@@ -120,7 +120,11 @@ fn load(keys: &Tls) -> Result<Loaded, TlsError> {
         .map_err(|error| TlsError::new(&keys.certificate, error))?;
     let [since_s, ends_s] =
         [read.validity().not_before, read.validity().not_after].map(|time| time.timestamp());
-    in_our_hands(&keys.key).map_err(|foreign| TlsError::new(&foreign.path, foreign.why))?;
+    in_our_hands(&keys.key).map_err(|foreign| {
+        let hint = "whoever can write there could speak in this service's name; give the key to this user and take the \
+                    right to write from others (chown, chmod go-w), or make another";
+        TlsError { hint, ..TlsError::new(&foreign.path, foreign.why) }
+    })?;
     // A group may read it, as Debian's `ssl-cert` does.
     let mode = fs::metadata(&keys.key).map(|about| about.mode()).unwrap_or_default();
     if mode & 0o004 != 0 {
